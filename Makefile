@@ -1,0 +1,39 @@
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+PORT   ?= 8000
+
+.DEFAULT_GOAL := help
+.PHONY: help run test bench check validate lock clean
+
+help:  ## this list
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
+
+$(VENV)/.ready: requirements.lock pyproject.toml
+	@$(PYTHON) .preflight.py
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --require-hashes -r requirements.lock
+	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --no-deps --no-build-isolation -e .
+	@touch $@
+
+run: $(VENV)/.ready  ## calibrate and verify the simulated unit, then keep serving (ONCE=1: end with the verdict)
+	@$(BIN)/bench demo --port $(PORT) $(if $(ONCE),--once)
+
+test: $(VENV)/.ready  ## the whole test suite
+	@$(BIN)/python -m pytest -n 2 --dist worksteal
+
+check: $(VENV)/.ready  ## format, lint, types, import contracts
+	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/lint-imports --no-cache && $(BIN)/basedpyright
+
+validate: $(VENV)/.ready  ## Monte Carlo against theory over 1000 simulated units and more
+	@$(BIN)/python -m tests.validation.calibration
+
+bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
+	@$(BIN)/python -m tests.benchmarks
+
+lock: $(VENV)/.ready  ## compile requirements.lock anew
+	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev pyproject.toml -o requirements.lock
+
+clean:  ## remove the environment and the demo's data
+	rm -rf $(VENV) .bench

@@ -1,0 +1,39 @@
+"""PORTS: what a bench must be able to do. A driver or a simulator implements them; a procedure sees only these."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from procedures.bench.clock import Clock
+from procedures.bench.description import BenchDescription
+from procedures.bench.imu import Imu
+from procedures.bench.supply import Supply
+from procedures.bench.turntable import Turntable
+
+__all__ = ["Bench", "BenchDescription", "Clock", "Imu", "Supply", "Turntable"]
+
+
+@dataclass
+class Bench:
+    """The devices around one unit, and the one way to leave them safe. A chamber joins with the thermal cycle."""
+
+    description: BenchDescription
+    clock: Clock
+    turntable: Turntable
+    imu: Imu
+    supply: Supply
+    _devices: tuple[str, ...] = field(default=("turntable", "supply"), repr=False)
+
+    async def make_safe(self) -> None:
+        """Stop the table, switch the unit off. Every device is tried; raises an `ExceptionGroup` of what failed."""
+        failures: list[Exception] = []
+        for device in self._devices:
+            try:
+                await getattr(self, device).make_safe()
+            except Exception as failure:
+                failures.append(failure)
+        if failures:
+            raise ExceptionGroup("the bench could not be made safe", failures)
+
+    def checkpoint(self) -> dict[str, Any] | None:
+        """What a simulated world needs to go on from here after a restart; a real bench has None: it never stops."""
+        return None

@@ -1,0 +1,13 @@
+"""The one way for time to pass."""
+
+from typing import Protocol
+
+
+class Clock(Protocol):
+    """Bench time. On a simulated bench sleeping moves the world, on a real one it waits."""
+
+    def now_s(self) -> float:
+        """Seconds since the bench was opened for the job's first launch."""
+        ...
+
+    async def sleep(self, seconds: float) -> None: ...

@@ -1,0 +1,58 @@
+"""What a laboratory declares of its bench: site, axis limits, and how well the table is known to point."""
+
+from dataclasses import dataclass
+
+from procedures.core.frames import TableAngles
+from procedures.core.site import Site
+
+
+@dataclass(frozen=True)
+class AxisLimits:
+    """Range, rate and acceleration of one table axis."""
+
+    minimum_deg: float
+    maximum_deg: float
+    rate_deg_s: float
+    acceleration_deg_s2: float
+
+
+@dataclass(frozen=True)
+class TableAccuracy:
+    """Standard uncertainties of the table, from its acceptance test. All zero: the table is taken as ideal.
+
+    `orthogonality` holds for each of the two right angles (outer to middle, middle to inner), constant over a
+    job; `pointing` for each axis anew at each station; `level` for the tilt of the outer axis about each horizontal
+    direction; `mounting` for the unit's seat on the table about each of its axes. The last is part of what a
+    calibration measures (the unit's axes *are* those of its mounting plate) and is not propagated.
+    """
+
+    orthogonality_sd_arcsec: float = 0.0
+    pointing_sd_arcsec: float = 0.0
+    level_sd_arcsec: float = 0.0
+
+
+@dataclass(frozen=True)
+class BenchDescription:
+    """A bench as its laboratory declares it."""
+
+    id: str
+    site: Site
+    outer: AxisLimits
+    middle: AxisLimits
+    inner: AxisLimits
+    accuracy: TableAccuracy
+    simulated: bool
+    title: str = ""
+
+    def violations(self, angles: TableAngles) -> tuple[str, ...]:
+        """One sentence for each axis whose limit the angles pass."""
+        demands = (
+            ("outer", self.outer, angles.outer_deg),
+            ("middle", self.middle, angles.middle_deg),
+            ("inner", self.inner, angles.inner_deg),
+        )
+        return tuple(
+            f"{name}_deg = {value:g} is outside {limits.minimum_deg:g} … {limits.maximum_deg:g}"
+            for name, limits, value in demands
+            if not limits.minimum_deg <= value <= limits.maximum_deg
+        )

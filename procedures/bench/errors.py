@@ -1,0 +1,38 @@
+"""What can go wrong on a bench.
+
+BenchError
+├── OutOfRange      a demand beyond a limit: refused before anything moves, never clamped
+├── NotSettled      the table did not come to rest in time
+├── NotPowered      a reading was asked of a unit that is switched off
+├── DeviceFault     a device reports a fault; it is never reset by itself
+├── Disconnected    a device does not answer
+└── Stopped         an operator's stop or cancel ended the work
+"""
+
+
+class BenchError(Exception):
+    """Something on the bench went wrong; the message is fit for a person."""
+
+
+class OutOfRange(BenchError):
+    """A demand beyond a limit: refused before anything moves."""
+
+
+class NotSettled(BenchError):
+    """The table did not come to rest in time."""
+
+
+class NotPowered(BenchError):
+    """A reading was asked of a unit that is switched off."""
+
+
+class DeviceFault(BenchError):
+    """A device reports a fault."""
+
+
+class Disconnected(BenchError):
+    """A device does not answer."""
+
+
+class Stopped(BenchError):
+    """An operator's stop or cancel ended the work."""

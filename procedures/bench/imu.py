@@ -1,0 +1,38 @@
+"""The unit's data link."""
+
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.core.recording import Channel, Station
+
+
+@dataclass(frozen=True)
+class Stream:
+    """A recording that is being made: its description, and its raw blocks as they arrive, each (n, channels) int32."""
+
+    channels: tuple[Channel, ...]
+    rate_hz: float
+    start_s: float
+    blocks: AsyncIterator[NDArray[np.int32]]
+    station: Station | None = None
+
+
+class Imu(Protocol):
+    """What the unit sends."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]: ...
+
+    @property
+    def rate_hz(self) -> float: ...
+
+    def record(self, duration_s: float, station: Station | None = None) -> Stream:
+        """Begin a recording now; time passes while its blocks are read. Exactly round(duration_s·rate_hz) samples.
+
+        Raises `NotPowered`, `Disconnected`.
+        """
+        ...

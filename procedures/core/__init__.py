@@ -1,0 +1,1 @@
+"""Pure numbers and value types: numpy and scipy only. The floor of everything; knows no device, no file, no clock."""

@@ -1,0 +1,50 @@
+"""What an analysis or a plan can refuse. No status codes here: the service has one table for them.
+
+DomainError
+├── BadParameter    a parameter's value is not allowed: names the field, the value and what is allowed
+├── Undetermined    the plan or the recordings cannot determine a parameter: names the lost combinations
+├── UnfitRecording  a recording cannot be analysed as asked: gaps, too short, constant, wrong unit
+└── MissingChannel  a recording lacks a channel that is needed
+"""
+
+from collections.abc import Sequence
+
+
+class DomainError(Exception):
+    """Base of all refusals; the message is fit for a person."""
+
+
+class BadParameter(DomainError):
+    """A parameter's value is not allowed."""
+
+    def __init__(self, field: str, value: object, allowed: str) -> None:
+        super().__init__(f"{field} = {value!r}: {allowed}")
+        self.field = field
+        self.value = value
+        self.allowed = allowed
+
+
+class Undetermined(DomainError):
+    """A set of orientations cannot determine every parameter; no numbers come out."""
+
+    def __init__(self, what: str, lost: Sequence[str], rank: int, wanted: int, condition: float) -> None:
+        super().__init__(
+            f"{what} cannot be determined: rank {rank} of {wanted} (condition {condition:.3g}); lost: {'; '.join(lost)}"
+        )
+        self.lost = tuple(lost)
+        self.rank = rank
+        self.wanted = wanted
+        self.condition = condition
+
+
+class UnfitRecording(DomainError):
+    """A recording cannot be analysed as asked."""
+
+
+class MissingChannel(DomainError):
+    """A recording lacks a channel that is needed."""
+
+    def __init__(self, name: str, present: Sequence[str]) -> None:
+        super().__init__(f"the recording has no channel {name!r}; it has {', '.join(present) or 'none'}")
+        self.name = name
+        self.present = tuple(present)

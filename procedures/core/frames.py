@@ -1,0 +1,70 @@
+"""Attitudes of the unit on the table, and what gravity and the Earth's rotation are in its axes.
+
+This is the *judge's* geometry: commanded angles through ideal, orthogonal axes. The simulated table
+has its own kinematics (MuJoCo bodies) and shares nothing with this file.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from procedures.core import units
+from procedures.core.site import Site
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TableAngles:
+    """The three table angles [deg]: outer about the vertical, middle about z, inner about the unit's x."""
+
+    outer_deg: float = 0.0
+    middle_deg: float = 0.0
+    inner_deg: float = 0.0
+
+
+def table_rotation(angles: TableAngles) -> Rotation:
+    """Attitude of the unit for ideal axes, ``rot_rb = R_y(outer) · R_z(middle) · R_x(inner)`` (see `procedures`).
+
+    In the thesis's (β, γ): inner = β, middle = γ, so ``v_b = R_x(β)ᵀ · R_z(γ)ᵀ · v_r``.
+    """
+    return Rotation.from_euler("YZX", [angles.outer_deg, angles.middle_deg, angles.inner_deg], degrees=True)
+
+
+def orientation_beta_gamma(beta_deg: float, gamma_deg: float) -> TableAngles:
+    """Table angles of a thesis orientation: β about x *after* γ about z (thesis 5.1, figure 5.4)."""
+    return TableAngles(0.0, gamma_deg, beta_deg)
+
+
+def orientation_gamma_beta(beta_deg: float, gamma_deg: float) -> TableAngles:
+    """Table angles of the other order, γ about z *after* β about x: ``rot_rb = R_x(β) · R_z(γ)``.
+
+    The gimbals turn in their own order, so the attitude is decomposed into outer, middle and inner angles.
+    """
+    attitude = Rotation.from_euler("XZ", [beta_deg, gamma_deg], degrees=True)
+    outer, middle, inner = attitude.as_euler("YZX", degrees=True, suppress_warnings=True)
+    return TableAngles(float(outer), float(middle), float(inner))
+
+
+def reference_rotation(azimuth_deg: float) -> Rotation:
+    """``rot_nr``: reference axes in local level; azimuth clockwise from north is a turn of −azimuth about up."""
+    return Rotation.from_euler("y", -azimuth_deg, degrees=True)
+
+
+def specific_force_b(angles: list[TableAngles], site: Site) -> Array:
+    """Specific force of a unit at rest in its own axes, shape (n, 3) [m/s²]: ``rot_rbᵀ · [0, g, 0]``."""
+    up_r = np.array([0.0, site.gravity_m_s2, 0.0])
+    return np.array([table_rotation(a).inv().apply(up_r) for a in angles]).reshape(-1, 3)
+
+
+def earth_rate_b(angles: list[TableAngles], site: Site) -> Array:
+    """Earth's angular velocity in the unit's axes, shape (n, 3) [rad/s].
+
+    ``rot_rbᵀ · rot_nrᵀ · Ω · [cos L, sin L, 0]`` (Groves 2nd ed., 2.4.1, in north-up-east order).
+    """
+    latitude = site.latitude_deg * units.DEG
+    rate_n = site.earth_rate_rad_s * np.array([np.cos(latitude), np.sin(latitude), 0.0])
+    rate_r = reference_rotation(site.azimuth_deg).inv().apply(rate_n)
+    return np.array([table_rotation(a).inv().apply(rate_r) for a in angles]).reshape(-1, 3)

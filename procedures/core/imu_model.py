@@ -1,0 +1,102 @@
+"""Error-model coefficients of a triad and the correction they give.
+
+The model is ``U = b + K·v + n`` (thesis 3.30, 3.34): U the unit's nominal output, v the specific force or
+angular rate in its orthogonal axes. Here live the *type* and the inverse; the forward model that makes data
+is written a second time, independently, in the simulator.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from procedures.core.frames import Array
+
+Vector = tuple[float, ...]
+Matrix = tuple[tuple[float, ...], ...]
+
+COEFFICIENT_NAMES = tuple(name for i in (1, 2, 3) for name in (f"b_{'xyz'[i - 1]}", f"K{i}1", f"K{i}2", f"K{i}3"))
+"""Per triad, channel by channel: [b, K_i1, K_i2, K_i3] for i = x, y, z."""
+
+
+@dataclass(frozen=True)
+class TriadCalibration:
+    """Calibration coefficients of one triad, with the covariance of their estimate.
+
+    Plain tuples, so that the whole is JSON; `array` forms are the properties below. Order in `covariance`, 12×12:
+    as `COEFFICIENT_NAMES`. A coefficient that the method fixes (the lower triangle of a scalar calibration) has
+    zero variance. Make one from arrays with `triad_calibration`.
+    """
+
+    triad: str
+    """"gyro" or "accelerometer"."""
+    output_unit: str
+    """Unit of the output U and of b: "rad/s", "m/s^2" or "count"."""
+    input_unit: str
+    """Unit of v: "rad/s" or "m/s^2"."""
+    bias: Vector
+    matrix: Matrix
+    covariance: Matrix = field(repr=False)
+    model: str = "linear"
+    """"linear" (full K against known vectors) or "scalar" (K upper triangular, magnitude as the only reference)."""
+
+    def __post_init__(self) -> None:
+        for name, value, shape in (
+            ("bias", self.bias_array, (3,)),
+            ("matrix", self.matrix_array, (3, 3)),
+            ("covariance", self.covariance_array, (12, 12)),
+        ):
+            if value.shape != shape or not np.all(np.isfinite(value)):
+                raise ValueError(f"calibration.{name} must be finite and of shape {shape}, got {value.shape}")
+
+    @property
+    def bias_array(self) -> Array:
+        """b, shape (3,)."""
+        return np.array(self.bias, dtype=np.float64)
+
+    @property
+    def matrix_array(self) -> Array:
+        """K, shape (3, 3)."""
+        return np.array(self.matrix, dtype=np.float64)
+
+    @property
+    def covariance_array(self) -> Array:
+        """Covariance of all twelve, shape (12, 12)."""
+        return np.array(self.covariance, dtype=np.float64)
+
+    @property
+    def coefficients(self) -> Array:
+        """All twelve in the order of `COEFFICIENT_NAMES`, shape (12,)."""
+        return np.column_stack([self.bias_array, self.matrix_array]).ravel()
+
+    @property
+    def standard_uncertainties(self) -> Array:
+        """Square root of the covariance's diagonal, shape (12,)."""
+        return np.sqrt(np.diagonal(self.covariance_array))
+
+
+def triad_calibration(
+    triad: str,
+    output_unit: str,
+    input_unit: str,
+    coefficients: ArrayLike,
+    covariance: ArrayLike,
+    model: str = "linear",
+) -> TriadCalibration:
+    """A calibration from arrays: `coefficients` shape (12,), `covariance` shape (12, 12), both ordered as named."""
+    by_channel = np.asarray(coefficients, dtype=np.float64).reshape(3, 4)
+    return TriadCalibration(
+        triad,
+        output_unit,
+        input_unit,
+        tuple(by_channel[:, 0].tolist()),
+        tuple(tuple(row) for row in by_channel[:, 1:].tolist()),
+        tuple(tuple(row) for row in np.asarray(covariance, dtype=np.float64).tolist()),
+        model,
+    )
+
+
+def correct(output: Array, calibration: TriadCalibration) -> Array:
+    """Corrected vectors ``v̂ = K⁻¹(U − b)``, shape of `output`, (3,) or (n, 3) (thesis 3.36, 3.37)."""
+    centred = np.atleast_2d(output) - calibration.bias_array
+    return np.linalg.solve(calibration.matrix_array, centred.T).T.reshape(output.shape)

@@ -1,0 +1,54 @@
+"""A measured value against a requirement, and what all of them say together."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from math import isfinite
+
+
+class Verdict(StrEnum):
+    """What a finished job says of its unit."""
+
+    PASS = "pass"
+    FAIL = "fail"
+    ERROR = "error"
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A requirement on one value, inclusive at both ends, and where it comes from."""
+
+    unit: str
+    maximum: float | None = None
+    minimum: float | None = None
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One value against one limit."""
+
+    name: str
+    value: float
+    limit: Limit
+    passed: bool
+    standard_uncertainty: float | None = None
+    note: str = ""
+
+
+def check(name: str, value: float, limit: Limit, standard_uncertainty: float | None = None, note: str = "") -> Check:
+    """Compare a value with its limit. A value that is not finite never passes."""
+    passed = (
+        isfinite(value)
+        and (limit.maximum is None or value <= limit.maximum)
+        and (limit.minimum is None or value >= limit.minimum)
+    )
+    return Check(name, value, limit, passed, standard_uncertainty, note)
+
+
+def verdict(checks: Iterable[Check]) -> Verdict:
+    """Pass where every check passed; no check at all is an error: nothing was judged."""
+    outcomes = [c.passed for c in checks]
+    if not outcomes:
+        return Verdict.ERROR
+    return Verdict.PASS if all(outcomes) else Verdict.FAIL

@@ -1,0 +1,149 @@
+"""Raw samples and what they mean: channels, stations, recordings.
+
+A recording keeps what the unit sent, integer counts for a real or simulated one. `scale` and `offset` are the data
+sheet's nominal conversion, not the calibration: ``value = scale·(raw − offset)`` in the channel's unit, an increment
+divided by the sample period.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.core.errors import MissingChannel
+from procedures.core.frames import Array, TableAngles
+
+RawArray = NDArray[np.int32] | NDArray[np.float64]
+
+AXES = ("x", "y", "z")
+GYRO = tuple(f"gyro_{axis}" for axis in AXES)
+ACCELEROMETER = tuple(f"accelerometer_{axis}" for axis in AXES)
+TRIADS = {"gyro": GYRO, "accelerometer": ACCELEROMETER}
+
+
+class Quantity(StrEnum):
+    """What a channel measures."""
+
+    ANGLE_INCREMENT = "angle_increment"
+    VELOCITY_INCREMENT = "velocity_increment"
+    ANGULAR_RATE = "angular_rate"
+    SPECIFIC_FORCE = "specific_force"
+    TEMPERATURE = "temperature"
+
+
+INCREMENTS = (Quantity.ANGLE_INCREMENT, Quantity.VELOCITY_INCREMENT)
+UNITS: dict[Quantity, tuple[str, ...]] = {
+    Quantity.ANGLE_INCREMENT: ("rad", "count"),
+    Quantity.VELOCITY_INCREMENT: ("m/s", "count"),
+    Quantity.ANGULAR_RATE: ("rad/s", "count"),
+    Quantity.SPECIFIC_FORCE: ("m/s^2", "count"),
+    Quantity.TEMPERATURE: ("degC", "count"),
+}
+"""The units a channel of each quantity may have; "count" says that its scale is not known yet."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One column of a recording. `unit` is that of ``scale·(raw − offset)``."""
+
+    name: str
+    quantity: Quantity
+    unit: str
+    scale: float = 1.0
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.unit not in UNITS[self.quantity]:
+            raise ValueError(
+                f"channel {self.name!r}: unit {self.unit!r} is none of {', '.join(UNITS[self.quantity])}, "
+                f"which a channel of {self.quantity.value} may have"
+            )
+        if not (np.isfinite(self.scale) and self.scale != 0.0 and np.isfinite(self.offset)):
+            raise ValueError(
+                f"channel {self.name!r}: scale {self.scale!r} and offset {self.offset!r} must be finite, "
+                "the scale not zero"
+            )
+
+    @property
+    def rate_unit(self) -> str:
+        """Unit of the channel once an increment is divided by the sample period."""
+        return {"rad": "rad/s", "m/s": "m/s^2", "count": "count"}.get(self.unit, self.unit)
+
+
+@dataclass(frozen=True)
+class Station:
+    """One orientation and/or temperature of a procedure: move there, let settle, record."""
+
+    index: int
+    label: str
+    angles: TableAngles | None = None
+    temperature_c: float | None = None
+    settle_s: float = 0.0
+    record_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class RecordingInfo:
+    """What a recording is, apart from its samples."""
+
+    id: str
+    unit: str
+    channels: tuple[Channel, ...]
+    rate_hz: float
+    count: int
+    start_s: float = 0.0
+    """Bench time of the first sample's beginning [s]."""
+    station: Station | None = None
+    content_hash: str = ""
+    simulated: bool = False
+
+    @property
+    def duration_s(self) -> float:
+        return self.count / self.rate_hz
+
+    def column(self, name: str) -> int:
+        """Index of a channel by name. Raises `MissingChannel`."""
+        for index, channel in enumerate(self.channels):
+            if channel.name == name:
+                return index
+        raise MissingChannel(name, tuple(c.name for c in self.channels))
+
+
+class Recording(Protocol):
+    """Samples that can be read again and again, block by block."""
+
+    @property
+    def info(self) -> RecordingInfo: ...
+
+    def blocks(self) -> Iterator[RawArray]:
+        """The raw samples in order, each block (n, channels)."""
+        ...
+
+
+@dataclass(frozen=True)
+class MemoryRecording:
+    """A recording held in memory: for tests, and for short stretches cut out of a longer one."""
+
+    info: RecordingInfo
+    raw: RawArray = field(repr=False)
+
+    def blocks(self) -> Iterator[RawArray]:
+        yield self.raw
+
+
+def rates(recording: Recording, names: Sequence[str]) -> Array:
+    """All samples of some channels as nominal rates, shape (n, len(names)), in each channel's `rate_unit`.
+
+    ``scale·(raw − offset)``, times the sample rate where the channel gives increments. Raises `MissingChannel`.
+    """
+    info = recording.info
+    columns = [info.column(name) for name in names]
+    raw = np.concatenate([np.asarray(block)[:, columns] for block in recording.blocks()] or [np.empty((0, len(names)))])
+    channels = [info.channels[c] for c in columns]
+    per_second = np.array([info.rate_hz if c.quantity in INCREMENTS else 1.0 for c in channels])
+    scale = np.array([c.scale for c in channels]) * per_second
+    offset = np.array([c.offset for c in channels])
+    return (raw.astype(np.float64) - offset) * scale

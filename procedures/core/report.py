@@ -1,0 +1,48 @@
+"""What a person is shown of a result: tables and figures as plain data, drawn by the service."""
+
+from dataclasses import dataclass, field
+
+Cell = str | float | int | None
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; a float is printed with six significant digits, None as a dash."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Series:
+    """One line or set of marks. `error` are half-lengths of error bars, same length as `y`."""
+
+    name: str
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    error: tuple[float, ...] = ()
+    style: str = "points"
+    """"points", "line", "line_points" or "reference" (a thin dashed line)."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A plot. `note` is its caption."""
+
+    title: str
+    x_label: str
+    y_label: str
+    series: tuple[Series, ...]
+    x_log: bool = False
+    y_log: bool = False
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Report:
+    """Sections in the order a reader meets them; `summary` is the first paragraph."""
+
+    summary: str = ""
+    sections: tuple[Table | Figure, ...] = field(default=())

@@ -1,0 +1,43 @@
+"""What is known of a unit before a job: its channels, its noise, its stability from launch to launch."""
+
+from dataclasses import dataclass, field
+
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.noise import NoiseCoefficients
+from procedures.core.recording import Channel
+
+
+@dataclass(frozen=True)
+class TriadRecord:
+    """One triad: noise of its channels x, y, z, and how much it changes from one power-up to the next."""
+
+    noise: tuple[NoiseCoefficients, NoiseCoefficients, NoiseCoefficients]
+    bias_run_to_run_sd: float = 0.0
+    """[rad/s] or [m/s²]."""
+    scale_factor_run_to_run_sd: float = 0.0
+    """Relative, dimensionless."""
+    noise_origin: str = "data sheet"
+    """Where the coefficients come from: a data sheet, or the result that found them."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The device under test. `gyro` or `accelerometer` is None where nothing is known of its noise."""
+
+    serial: str
+    sample_rate_hz: float
+    channels: tuple[Channel, ...]
+    gyro: TriadRecord | None = None
+    accelerometer: TriadRecord | None = None
+    averaging_time_s: float = 70.0
+    """Where quantization falls below the rest of the noise (thesis 4.1.3: 70 s); a static run updates it."""
+    calibrations: tuple[TriadCalibration, ...] = field(default=(), repr=False)
+    """The current calibration, one entry a triad; empty before the first."""
+
+    def calibration(self, triad: str) -> TriadCalibration | None:
+        """The current calibration of a triad, or None."""
+        return next((c for c in self.calibrations if c.triad == triad), None)
+
+    def triad(self, triad: str) -> TriadRecord | None:
+        """The record of a triad by name."""
+        return {"gyro": self.gyro, "accelerometer": self.accelerometer}[triad]

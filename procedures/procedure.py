@@ -1,0 +1,122 @@
+"""What a catalogue file provides: a procedure is three functions and a little around them."""
+
+from collections.abc import AsyncIterator, Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from pydantic import BaseModel, ConfigDict
+
+from procedures.bench import Bench, BenchDescription
+from procedures.bench.imu import Stream
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.limits import Check, Verdict
+from procedures.core.recording import Recording, Station
+from procedures.core.report import Report
+from procedures.core.unit import Unit
+
+
+class Parameters(BaseModel):
+    """Base of every parameter model: unknown names are refused, NaN and infinity too."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Outcome(BaseModel):
+    """Base of every result model: JSON-ready numbers, the checks with their verdict, and warnings to the reader."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    checks: tuple[Check, ...] = ()
+    verdict: Verdict
+    warnings: tuple[str, ...] = ()
+
+
+P = TypeVar("P", bound=Parameters)
+R = TypeVar("R", bound=Outcome)
+
+
+@dataclass(frozen=True)
+class Context:
+    """What is known when a job is planned or its recordings are analysed: kept with the job as part of its lineage."""
+
+    unit: Unit
+    bench: BenchDescription
+
+
+@dataclass(frozen=True)
+class PredictedUncertainty:
+    """A coefficient's standard uncertainty before the job, and the parts it is made of."""
+
+    name: str
+    unit: str
+    standard_uncertainty: float
+    from_noise: float
+    from_table: float = 0.0
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a plan can be expected to give."""
+
+    duration_s: float = 0.0
+    uncertainties: tuple[PredictedUncertainty, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class DatedCalibration:
+    """A stored calibration of a unit: its id, when it was made (ISO 8601), and its triads."""
+
+    id: str
+    made_at: str
+    triads: tuple[TriadCalibration, ...]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a method is given to work on."""
+
+    recordings: tuple[Recording, ...] = ()
+    calibrations: tuple[DatedCalibration, ...] = ()
+
+
+def _no_calibrations(_: Any) -> tuple[TriadCalibration, ...]:
+    return ()
+
+
+@dataclass(frozen=True)
+class Procedure(Generic[P, R]):
+    """A recipe: what to do on the bench, and what the recordings then say.
+
+    `resolve` fills defaults that depend on the unit or the bench (the dwell from the averaging time);
+    `schedule` is pure and gives the stations; `predict` says what the plan will be worth, or raises `DomainError` where
+    it is worth nothing; `acquire` may begin at any station and yields one stream per station, in order; `analyse` is
+    pure and can be run again on stored recordings. Storage, progress, cancelling and making safe are the executor's.
+    """
+
+    name: str
+    title: str
+    version: str
+    params: type[P]
+    result: type[R]
+    resolve: Callable[[P, Context], P]
+    schedule: Callable[[P], tuple[Station, ...]]
+    predict: Callable[[P, Context], Prediction]
+    acquire: Callable[[Bench, Sequence[Station]], AsyncIterator[Stream]]
+    analyse: Callable[[Sequence[Recording], P, Context], R]
+    report: Callable[[R], Report]
+    calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
+
+
+@dataclass(frozen=True)
+class Method(Generic[P, R]):
+    """A question asked of recordings or calibrations that exist already; needs no bench."""
+
+    name: str
+    title: str
+    version: str
+    params: type[P]
+    result: type[R]
+    analyse: Callable[[Evidence, P, Unit | None], R]
+    report: Callable[[R], Report]
+    calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
