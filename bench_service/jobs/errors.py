@@ -1,0 +1,53 @@
+"""What the machine room can refuse. No status codes here: `bench_service.api.errors` has the table.
+
+ServiceError
+├── NotFound             no such job, recording, result, unit, bench, procedure, method
+├── IllegalTransition    the job's state does not allow it
+├── IdempotencyConflict  the key was used before with another request
+├── BenchBusy            another process drives this bench
+├── NotMounted           this bench does not have that unit
+├── UnreadableFile       an imported file is not what it says
+├── StorageFull          the database cannot grow
+└── StorageFailure       the database failed in another way
+"""
+
+
+class ServiceError(Exception):
+    """Base of all refusals of the machine room; the message is fit for a person."""
+
+
+class NotFound(ServiceError):
+    """There is no such thing."""
+
+    def __init__(self, kind: str, name: str) -> None:
+        super().__init__(f"there is no {kind} {name!r}")
+        self.kind = kind
+        self.name = name
+
+
+class IllegalTransition(ServiceError):
+    """The job's state does not allow it."""
+
+
+class IdempotencyConflict(ServiceError):
+    """The key was used before with another request."""
+
+
+class BenchBusy(ServiceError):
+    """Another process drives this bench."""
+
+
+class NotMounted(ServiceError):
+    """This bench does not have that unit."""
+
+
+class UnreadableFile(ServiceError):
+    """An imported file is not what it says."""
+
+
+class StorageFull(ServiceError):
+    """The database cannot grow: the disk is full."""
+
+
+class StorageFailure(ServiceError):
+    """The database failed."""

@@ -1,0 +1,94 @@
+"""A job: one execution of a procedure on one unit on one bench, and the states it may pass through."""
+
+from dataclasses import dataclass, field
+from datetime import datetime
+from enum import StrEnum
+from typing import Any
+
+from procedures.core.limits import Verdict
+from procedures.core.recording import Station
+
+
+class JobState(StrEnum):
+    """Where a job is. The last four are final, except that an interrupted one may be queued again."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    PAUSED = "paused"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+    INTERRUPTED = "interrupted"
+
+
+FINAL = frozenset({JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLED})
+
+LEGAL: dict[JobState, frozenset[JobState]] = {
+    JobState.QUEUED: frozenset({JobState.RUNNING, JobState.CANCELLED, JobState.FAILED, JobState.INTERRUPTED}),
+    JobState.RUNNING: frozenset(
+        {JobState.PAUSED, JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLED, JobState.INTERRUPTED}
+    ),
+    JobState.PAUSED: frozenset({JobState.RUNNING, JobState.CANCELLED, JobState.FAILED, JobState.INTERRUPTED}),
+    JobState.INTERRUPTED: frozenset({JobState.QUEUED, JobState.CANCELLED}),
+    JobState.SUCCEEDED: frozenset(),
+    JobState.FAILED: frozenset(),
+    JobState.CANCELLED: frozenset(),
+}
+"""From each state, the states that may follow."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a job did not end well: a short kind ("NotSettled"), and a sentence for a person."""
+
+    kind: str
+    message: str
+    station: int | None = None
+
+
+@dataclass(frozen=True)
+class Job:
+    """One job as it is stored. Times are UTC; `stations_done` counts recordings sealed so far."""
+
+    id: str
+    procedure: str
+    procedure_version: str
+    unit: str
+    bench: str
+    state: JobState
+    created_at: datetime
+    requested_parameters: dict[str, Any]
+    """As the client sent them."""
+    parameters: dict[str, Any]
+    """Complete: every default filled, from the unit and the bench too."""
+    context: dict[str, Any]
+    """What was known of unit and bench at submission (JSON of `procedures.procedure.Context`)."""
+    stations: tuple[Station, ...]
+    duration_s: float
+    """Predicted bench time."""
+    code_version: str
+    simulated: bool
+    seed: int | None = None
+    """Of the simulated world; None on a real bench."""
+    priority: int = 10
+    """Smaller runs first."""
+    labels: dict[str, str] = field(default_factory=dict[str, str])
+    verdict: Verdict | None = None
+    stations_done: int = 0
+    cancel_requested: bool = False
+    started_at: datetime | None = None
+    finished_at: datetime | None = None
+    result_id: str | None = None
+    failure: Failure | None = None
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened to a job; `sequence` counts from 1 within the job."""
+
+    job_id: str
+    sequence: int
+    at: datetime
+    kind: str
+    """"state", "station", "result" or "note"."""
+    data: dict[str, Any]

@@ -1,0 +1,50 @@
+"""Settings: one frozen model, read from the environment once, in `__main__`."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+
+class BadSettings(Exception):
+    """A setting from the environment is not usable; the message names it."""
+
+
+class Settings(BaseModel):
+    """Where the data are and how the service listens. Environment: `BENCH_` + the field's name in capitals."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    database_url: str = "sqlite:///.bench/bench.sqlite"
+    """`sqlite:///file` (embedded, one machine) or `postgresql+psycopg://…` (any number of API processes)."""
+    host: str = "127.0.0.1"
+    port: int = Field(8000, ge=0, le=65535)
+    bench_id: str = Field("sim", pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")
+    """The one bench that this process drives."""
+    unit_truth: Path | None = None
+    """Truth file of the simulated unit; None: the one that ships."""
+    bench_truth: Path | None = None
+    """Truth file of the simulated table and site; None: the one that ships."""
+    real_time_factor: float | None = Field(None, gt=0)
+    """Simulated seconds per real second; None: as fast as the machine allows."""
+    poll_s: float = Field(0.05, gt=0, le=10)
+    """How often the job engine looks for queued work."""
+    max_import_mb: float = Field(1024, gt=0)
+    """Largest recording file that may be imported."""
+
+    @classmethod
+    def from_environ(cls, environ: Mapping[str, str]) -> "Settings":
+        """Read settings from a mapping such as ``os.environ``. Raises `BadSettings`."""
+        given = {name: environ[key] for name in cls.model_fields if (key := f"BENCH_{name.upper()}") in environ}
+        try:
+            return cls.model_validate(given)
+        except ValidationError as error:
+            first = error.errors()[0]
+            name = f"BENCH_{str(first['loc'][0]).upper()}"
+            raise BadSettings(f"{name} = {given.get(str(first['loc'][0]))!r}: {first['msg']}") from error
+
+    @property
+    def sqlite_file(self) -> Path | None:
+        """The database file, or None where the database is a server."""
+        prefix = "sqlite:///"
+        return Path(self.database_url.removeprefix(prefix)) if self.database_url.startswith(prefix) else None

@@ -1,0 +1,26 @@
+"""The only file that reads the real clock or makes an id from it."""
+
+import time
+from datetime import UTC, datetime
+
+import uuid_utils
+
+
+def now() -> datetime:
+    """The present moment, with its time zone (UTC)."""
+    return datetime.now(UTC)
+
+
+def monotonic_s() -> float:
+    """Seconds of a clock that is never set back."""
+    return time.monotonic()  # noqa: TID251  the one place
+
+
+def pause(seconds: float) -> None:
+    """Wait in real time, in this thread."""
+    time.sleep(seconds)  # noqa: TID251  the one place
+
+
+def new_id() -> str:
+    """An id that sorts by the time of its making (UUID version 7)."""
+    return str(uuid_utils.uuid7())
