@@ -1,5 +1,6 @@
 """The only file that reads the real clock or makes an id from it."""
 
+import asyncio
 import time
 from datetime import UTC, datetime
 
@@ -24,3 +25,8 @@ def pause(seconds: float) -> None:
 def new_id() -> str:
     """An id that sorts by the time of its making (UUID version 7)."""
     return str(uuid_utils.uuid7())
+
+
+async def pause_async(seconds: float) -> None:
+    """Wait in real time without holding the thread."""
+    await asyncio.sleep(seconds)  # noqa: TID251  the one place

@@ -106,6 +106,8 @@ class Procedure(Generic[P, R]):
     analyse: Callable[[Sequence[Recording], P, Context], R]
     report: Callable[[R], Report]
     calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
+    uses_calibration: bool = False
+    """Whether the result rests on the unit's current calibration, which then belongs to its lineage."""
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ ServiceError
 ├── IllegalTransition    the job's state does not allow it
 ├── IdempotencyConflict  the key was used before with another request
 ├── BenchBusy            another process drives this bench
+├── NotDriving           this process drives no bench
 ├── NotMounted           this bench does not have that unit
 ├── UnreadableFile       an imported file is not what it says
 ├── StorageFull          the database cannot grow
@@ -35,6 +36,10 @@ class IdempotencyConflict(ServiceError):
 
 class BenchBusy(ServiceError):
     """Another process drives this bench."""
+
+
+class NotDriving(ServiceError):
+    """This process drives no bench: it only reads."""
 
 
 class NotMounted(ServiceError):

@@ -99,4 +99,5 @@ def triad_calibration(
 def correct(output: Array, calibration: TriadCalibration) -> Array:
     """Corrected vectors ``v̂ = K⁻¹(U − b)``, shape of `output`, (3,) or (n, 3) (thesis 3.36, 3.37)."""
     centred = np.atleast_2d(output) - calibration.bias_array
-    return np.linalg.solve(calibration.matrix_array, centred.T).T.reshape(output.shape)
+    corrected: Array = np.linalg.solve(calibration.matrix_array, centred.T).T
+    return corrected.reshape(output.shape)

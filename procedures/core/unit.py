@@ -33,6 +33,8 @@ class Unit:
     """Where quantization falls below the rest of the noise (thesis 4.1.3: 70 s); a static run updates it."""
     calibrations: tuple[TriadCalibration, ...] = field(default=(), repr=False)
     """The current calibration, one entry a triad; empty before the first."""
+    calibration_id: str | None = None
+    """Which stored calibration that is."""
 
     def calibration(self, triad: str) -> TriadCalibration | None:
         """The current calibration of a triad, or None."""

@@ -1,0 +1,21 @@
+"""``python -m bench_service`` and ``bench``: where the environment is read, once."""
+
+import os
+import sys
+
+from bench_service.cli.commands import run_command_line
+from bench_service.settings import BadSettings, Settings
+
+
+def main() -> None:
+    """Run the command line and exit with its code."""
+    try:
+        settings = Settings.from_environ(os.environ)
+    except BadSettings as error:
+        print(f"bench: {error}", file=sys.stderr)
+        sys.exit(2)
+    sys.exit(run_command_line(settings))
+
+
+if __name__ == "__main__":
+    main()

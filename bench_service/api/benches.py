@@ -1,0 +1,43 @@
+"""Benches: what they are, what they are doing, and the software stop."""
+
+from fastapi import APIRouter
+
+from bench_service.api.dependencies import Service
+from bench_service.api.errors import problems
+from bench_service.api.schemas import BenchView, Stopping
+from bench_service.jobs.errors import NotFound
+from bench_service.jobs.service import BenchService
+
+router = APIRouter(prefix="/api/v1/benches", tags=["benches"])
+
+
+def _view(service: BenchService) -> BenchView:
+    running = service.running_job()
+    return BenchView(
+        id=service.driver.description.id,
+        description=service.driver.description,
+        state="idle" if running is None else "busy",
+        job=None if running is None else running.id,
+        units=[unit.serial for unit in service.driver.mounted()],
+    )
+
+
+@router.get("")
+def list_benches(service: Service) -> list[BenchView]:
+    """Every bench of this service: one so far."""
+    return [_view(service)]
+
+
+@router.get("/{bench_id}", responses=problems(404))
+def read_bench(bench_id: str, service: Service) -> BenchView:
+    """Live state, limits, declared accuracy, and the job that drives it."""
+    if bench_id != service.driver.description.id:
+        raise NotFound("bench", bench_id)
+    return _view(service)
+
+
+@router.post("/{bench_id}/stop", status_code=202, responses=problems(404))
+def stop(bench_id: str, service: Service) -> Stopping:
+    """Software stop: end the running job, stop the table, switch the unit off."""
+    job = service.stop_bench(bench_id)
+    return Stopping(bench=bench_id, job=None if job is None else job.id)

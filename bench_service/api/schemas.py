@@ -1,0 +1,360 @@
+"""What goes over the wire: request bodies, and every response modelled. Units are in the field names."""
+
+from datetime import datetime
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from bench_service.jobs.driver import TrueTriad
+from bench_service.jobs.job import Event, Failure, Job, JobState
+from bench_service.jobs.store import RecordingState, StoredCalibration, StoredRecording, StoredResult
+from procedures.bench import BenchDescription
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.limits import Verdict
+from procedures.core.recording import Channel, Station
+from procedures.core.unit import TriadRecord, Unit
+from procedures.procedure import PredictedUncertainty
+
+Labels = dict[str, str]
+NAME = Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f]+$")
+
+
+class Request(BaseModel):
+    """Base of request bodies: unknown fields are refused."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class PreviewRequest(Request):
+    """What a plan would be worth."""
+
+    unit: str = NAME
+    bench: str | None = Field(None, min_length=1, max_length=100)
+    parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+
+
+class JobSubmission(PreviewRequest):
+    """A job to be done."""
+
+    procedure: str = NAME
+    priority: int = Field(10, ge=1, le=1000, description="Smaller runs first")
+    labels: Labels = Field(default_factory=Labels, max_length=50)
+    seed: int | None = Field(None, ge=0, lt=2**48, description="Of a simulated bench: same seed, same bytes")
+
+
+class AnalysisSubmission(Request):
+    """A method and what it is to work on."""
+
+    method: str = NAME
+    recordings: list[str] = Field(default_factory=list[str], max_length=1000)
+    calibrations: list[str] = Field(default_factory=list[str], max_length=1000)
+    parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+
+
+class Reanalysis(Request):
+    """Other parameters for a job's recordings; those left out stay as they were requested."""
+
+    parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+
+
+class UnitDeclaration(Request):
+    """What is declared of a unit (its data sheet), without its serial, which the address has."""
+
+    sample_rate_hz: float = Field(gt=0, le=1e6, allow_inf_nan=False)
+    channels: list[Channel] = Field(default_factory=list[Channel], max_length=64)
+    gyro: TriadRecord | None = None
+    accelerometer: TriadRecord | None = None
+    averaging_time_s: float = Field(70.0, gt=0, le=1e6, allow_inf_nan=False)
+
+
+class ProcedureView(BaseModel):
+    """A procedure with the JSON Schemas of what it takes and gives."""
+
+    name: str
+    title: str
+    version: str
+    parameters: dict[str, Any]
+    result: dict[str, Any]
+
+
+class Preview(BaseModel):
+    """A plan before anything moves."""
+
+    procedure: str
+    unit: str
+    bench: str
+    parameters: dict[str, Any]
+    stations: list[Station]
+    duration_s: float
+    data_bytes: int
+    predicted_uncertainties: list[PredictedUncertainty]
+    warnings: list[str]
+    violations: list[str]
+
+
+class Progress(BaseModel):
+    """How far a job is."""
+
+    station: int = Field(description="Stations finished")
+    stations: int
+    fraction: float
+    eta_s: float | None = Field(description="Bench time left, by the plan")
+
+
+class JobView(BaseModel):
+    """A job."""
+
+    id: str
+    procedure: str
+    procedure_version: str
+    unit: str
+    bench: str
+    state: JobState
+    verdict: Verdict | None
+    progress: Progress
+    priority: int
+    labels: Labels
+    requested_parameters: dict[str, Any]
+    parameters: dict[str, Any]
+    simulated: bool
+    seed: int | None
+    code_version: str
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+    duration_s: float = Field(description="Predicted bench time")
+    error: Failure | None
+    result: str | None = Field(description="Id of the result that gave the verdict")
+    page: str = Field(description="Path of the page for an eye")
+
+    @classmethod
+    def of(cls, job: Job) -> "JobView":
+        stations = len(job.stations)
+        open_state = job.state in (JobState.QUEUED, JobState.RUNNING, JobState.PAUSED)
+        fraction = 1.0 if job.state is JobState.SUCCEEDED else job.stations_done / stations if stations else 0.0
+        return cls(
+            **{name: getattr(job, name) for name in _SAME_IN_JOB},
+            progress=Progress(
+                station=job.stations_done,
+                stations=stations,
+                fraction=fraction,
+                eta_s=job.duration_s * (1 - fraction) if open_state else None,
+            ),
+            error=job.failure,
+            result=job.result_id,
+            page=f"/jobs/{job.id}",
+        )
+
+
+_SAME_IN_JOB = tuple(name for name in JobView.model_fields if name in Job.__dataclass_fields__)
+
+
+class JobPage(BaseModel):
+    """Jobs, newest first."""
+
+    items: list[JobView]
+    next: str | None = Field(description="Cursor: pass it as `after` for the next page")
+
+
+class EventView(BaseModel):
+    """Something that happened to a job: the `data` of a server-sent event."""
+
+    sequence: int
+    at: datetime
+    kind: str
+    data: dict[str, Any]
+
+    @classmethod
+    def of(cls, event: Event) -> "EventView":
+        return cls(sequence=event.sequence, at=event.at, kind=event.kind, data=event.data)
+
+
+class RecordingView(BaseModel):
+    """A recording without its samples."""
+
+    id: str
+    unit: str
+    job: str | None
+    bench: str | None
+    station: Station | None
+    state: RecordingState
+    channels: list[Channel]
+    rate_hz: float
+    count: int
+    duration_s: float
+    start_s: float
+    content_hash: str = Field(description="SHA-256 of samples and channel description, whatever the chunks")
+    simulated: bool
+    stored_bytes: int
+    chunks: int
+    created_at: datetime
+    source: dict[str, Any]
+    results: list[str] | None = Field(None, description="Results that used it; only where one recording is asked for")
+
+    @classmethod
+    def of(cls, stored: StoredRecording, results: tuple[str, ...] | None = None) -> "RecordingView":
+        info = stored.info
+        return cls(
+            id=info.id,
+            unit=info.unit,
+            job=stored.job_id,
+            bench=stored.bench,
+            station=info.station,
+            state=stored.state,
+            channels=list(info.channels),
+            rate_hz=info.rate_hz,
+            count=info.count,
+            duration_s=info.duration_s,
+            start_s=info.start_s,
+            content_hash=info.content_hash,
+            simulated=info.simulated,
+            stored_bytes=stored.stored_bytes,
+            chunks=stored.chunks,
+            created_at=stored.created_at,
+            source=stored.source,
+            results=None if results is None else list(results),
+        )
+
+
+class RecordingPage(BaseModel):
+    """Recordings, newest first."""
+
+    items: list[RecordingView]
+    next: str | None
+
+
+class Lineage(BaseModel):
+    """What made a number."""
+
+    recordings: list[dict[str, str]] = Field(description="id and content hash of each recording, in order")
+    calibrations: list[str]
+    parameters: dict[str, Any]
+    code_version: str
+    simulated: bool
+    seed: int | None
+    job: str | None
+
+
+class ResultView(BaseModel):
+    """A result: the document of its procedure or method, and its lineage."""
+
+    id: str
+    kind: str
+    name: str
+    version: str
+    unit: str | None
+    verdict: Verdict
+    created_at: datetime
+    document: dict[str, Any]
+    lineage: Lineage
+    page: str
+
+    @classmethod
+    def of(cls, result: StoredResult) -> "ResultView":
+        return cls(
+            id=result.id,
+            kind=result.kind,
+            name=result.name,
+            version=result.version,
+            unit=result.unit,
+            verdict=result.verdict,
+            created_at=result.created_at,
+            document=result.document,
+            lineage=Lineage(
+                recordings=[{"id": i, "content_hash": h} for i, h in result.recordings],
+                calibrations=list(result.calibrations),
+                parameters=result.parameters,
+                code_version=result.code_version,
+                simulated=result.simulated,
+                seed=result.seed,
+                job=result.job_id,
+            ),
+            page=f"/results/{result.id}",
+        )
+
+
+class ResultPage(BaseModel):
+    """Results, newest first."""
+
+    items: list[ResultView]
+    next: str | None
+
+
+class CalibrationView(BaseModel):
+    """A calibration in a unit's history."""
+
+    id: str
+    unit: str
+    result: str
+    made_at: datetime
+    current: bool
+    simulated: bool
+    triads: list[TriadCalibration]
+
+    @classmethod
+    def of(cls, stored: StoredCalibration) -> "CalibrationView":
+        return cls(
+            id=stored.id,
+            unit=stored.unit,
+            result=stored.result_id,
+            made_at=stored.made_at,
+            current=stored.current,
+            simulated=stored.simulated,
+            triads=list(stored.triads),
+        )
+
+
+class CalibrationPage(BaseModel):
+    """Calibrations of a unit, newest first."""
+
+    items: list[CalibrationView]
+    next: str | None
+
+
+class UnitView(BaseModel):
+    """A unit as it is declared."""
+
+    serial: str
+    sample_rate_hz: float
+    channels: list[Channel]
+    gyro: TriadRecord | None
+    accelerometer: TriadRecord | None
+    averaging_time_s: float
+    calibration: str | None = Field(description="Id of the current calibration")
+
+    @classmethod
+    def of(cls, unit: Unit) -> "UnitView":
+        return cls(
+            serial=unit.serial,
+            sample_rate_hz=unit.sample_rate_hz,
+            channels=list(unit.channels),
+            gyro=unit.gyro,
+            accelerometer=unit.accelerometer,
+            averaging_time_s=unit.averaging_time_s,
+            calibration=unit.calibration_id,
+        )
+
+
+class BenchView(BaseModel):
+    """A bench: what is declared of it, and what it is doing."""
+
+    id: str
+    description: BenchDescription
+    state: str = Field(description='"idle" or "busy"')
+    job: str | None = Field(description="The job that drives it")
+    units: list[str] = Field(description="Units that it can test")
+
+
+class Stopping(BaseModel):
+    """The answer to a stop. Software is not the emergency stop: that is a hardware circuit beside the table."""
+
+    bench: str
+    job: str | None = Field(description="The job that was running; its bench is safe once it is cancelled")
+    note: str = "This is a software stop. The emergency stop is a hardware circuit beside the table."
+
+
+class Truth(BaseModel):
+    """What a simulated unit really was in a job."""
+
+    job: str
+    triads: list[TrueTriad]

@@ -1,0 +1,85 @@
+"""The composition root: the only place where stores, driver, engine and HTTP meet."""
+
+from collections.abc import AsyncGenerator, Callable
+from contextlib import ExitStack, asynccontextmanager
+from importlib.metadata import version
+
+from fastapi import FastAPI
+from starlette.concurrency import run_in_threadpool
+
+from bench_service.api import analyses, benches, errors, health, jobs, procedures, recordings, units
+from bench_service.drivers.simulated import SimulatedDriver
+from bench_service.jobs.code_version import code_version
+from bench_service.jobs.engine import Engine
+from bench_service.jobs.planning import Planner
+from bench_service.jobs.runner import JobRunner
+from bench_service.jobs.service import BenchService
+from bench_service.pages import routes
+from bench_service.persistence import acquire_lease, engine_database_url, open_stores
+from bench_service.settings import Settings
+from procedures import catalog, methods
+
+ROUTERS = (procedures, jobs, recordings, analyses, units, benches, health)
+
+
+def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> BenchService:
+    """A service that works; `closing` undoes everything in reverse order.
+
+    With `drive` it holds the bench's lease and runs jobs; without, it reads and analyses beside a process that does.
+    Raises `BenchBusy`, `StorageFailure`, `NotMounted`.
+    """
+    driver = SimulatedDriver(settings.bench_id, settings.unit_truth, settings.bench_truth, settings.real_time_factor)
+    stores, database = open_stores(settings.database_url)
+    closing.callback(database.dispose)
+    planner = Planner(catalog.discover(), stores, driver)
+    runner = JobRunner(stores, planner, driver)
+    engine: Engine | None = None
+    if drive:
+        closing.callback(acquire_lease(settings.database_url, settings.bench_id).release)
+        engine = Engine(engine_database_url(settings.database_url), settings.bench_id, settings.poll_s, runner)
+    service = BenchService(stores, driver, planner, methods.discover(), runner, engine, code_version())
+    closing.callback(service.stop)
+    service.start()
+    return service
+
+
+def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[], None]) -> FastAPI:
+    """The application around a service that is open; `at_end` is called when the server shuts down."""
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncGenerator[None]:
+        try:
+            yield
+        finally:
+            await run_in_threadpool(at_end)
+
+    app = FastAPI(
+        title="Bench",
+        summary="Test bench for inertial navigation units",
+        version=version("bench-service"),
+        lifespan=lifespan,
+    )
+    app.state.service = service
+    app.state.max_import_bytes = max_import_bytes
+    for module in ROUTERS:
+        app.include_router(module.router)
+    app.include_router(routes.router)
+    errors.install(app)
+    _declare_problem(app)
+    return app
+
+
+def _declare_problem(app: FastAPI) -> None:
+    """Put the problem document into the OpenAPI components, where every route's errors point."""
+    made = app.openapi
+
+    def openapi() -> dict[str, object]:
+        if app.openapi_schema is None:
+            schema = made()
+            components = errors.Problem.model_json_schema(ref_template="#/components/schemas/{model}")
+            schemas = schema["components"]["schemas"]
+            schemas.update(components.pop("$defs"))
+            schemas["Problem"] = components
+        return app.openapi_schema or {}
+
+    app.openapi = openapi

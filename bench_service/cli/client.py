@@ -1,0 +1,59 @@
+"""One client for both ways: a server's address, or the same application in this process."""
+
+import tempfile
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from bench_service.cli.refusal import Refused
+from bench_service.settings import Settings
+
+TIMEOUT_S = 600.0
+
+
+@contextmanager
+def connect(settings: Settings, server: str | None, drive: bool) -> Generator[httpx.Client]:
+    """A client to `server`, or to an application in this process that lives as long as the block.
+
+    `drive`: whether the embedded application is to run jobs, for which it must have the bench to itself.
+    """
+    if server is not None:
+        with httpx.Client(base_url=server, timeout=TIMEOUT_S) as client:
+            yield client
+        return
+    from bench_service.cli.serving import serving  # a quarter of a second that a client of a server does not need
+
+    with tempfile.TemporaryDirectory(prefix="bench-") as folder:
+        socket_file = Path(folder) / "http"
+        with (
+            serving(settings, drive, socket_file),
+            httpx.Client(
+                base_url="http://embedded", transport=httpx.HTTPTransport(uds=str(socket_file)), timeout=TIMEOUT_S
+            ) as client,
+        ):
+            yield client
+
+
+def call(client: httpx.Client, method: str, path: str, **options: Any) -> Any:
+    """The JSON of a good answer. Raises `Refused` with what the service said."""
+    try:
+        response = client.request(method, path, **options)
+    except httpx.HTTPError as error:
+        raise Refused(f"{client.base_url}{path} does not answer: {error}") from error
+    if response.is_success:
+        return response.json()
+    raise Refused(sentence(response))
+
+
+def sentence(response: httpx.Response) -> str:
+    """A problem document in words."""
+    try:
+        problem = response.json()
+    except ValueError:
+        return f"{response.status_code}: {response.text[:200]}"
+    lines = [problem.get("detail", response.text[:200])]
+    lines += [f"  {e['field']} = {e['value']!r}: {e['message']}" for e in problem.get("errors", [])]
+    return "\n".join(lines)

@@ -1,0 +1,218 @@
+"""The commands. Each says what it did to standard output, and what went wrong to standard error."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from bench_service.cli.client import call, connect, sentence
+from bench_service.cli.refusal import Refused
+from bench_service.cli.tables import check_table, job_table
+from bench_service.cli.watching import exit_code, watch
+from bench_service.jobs.errors import ServiceError
+from bench_service.settings import Settings
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help=__doc__)
+console = Console()
+errors = Console(stderr=True)
+
+Server = Annotated[str | None, typer.Option(help="Address of a service; without it, work in this process")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables")]
+
+
+def run_command_line(settings: Settings, arguments: list[str] | None = None) -> int:
+    """Run one command; its exit code: 0 pass, 1 fail, 2 error."""
+    try:
+        code = app(arguments, standalone_mode=False, obj=settings)
+    except (Refused, ServiceError) as error:
+        errors.print(f"bench: {error}", style="red", markup=False, soft_wrap=True)
+        return 2
+    except typer.Abort:
+        return 2
+    except Exception as error:
+        if hasattr(error, "show") and hasattr(error, "exit_code"):  # a usage error of the command line itself
+            error.show()  # pyright: ignore[reportAttributeAccessIssue]
+            return 2
+        raise
+    return int(code or 0)
+
+
+@app.command()
+def serve(
+    context: typer.Context,
+    host: Annotated[str | None, typer.Option(help="Address to listen on")] = None,
+    port: Annotated[int | None, typer.Option(help="Port to listen on")] = None,
+) -> None:
+    """Serve the API and the pages, and run jobs on the bench, until interrupted."""
+    from bench_service.cli.serving import check_port, ready
+
+    settings = _with(context.obj, host=host, port=port)
+    check_port(settings)
+    with ready(settings) as server:
+        console.print(f"bench {settings.bench_id} at http://{settings.host}:{settings.port}")
+        server.run()
+
+
+@app.command()
+def demo(
+    context: typer.Context,
+    port: Annotated[int | None, typer.Option(help="Port to listen on")] = None,
+    once: Annotated[bool, typer.Option(help="End after the verdict, with it as exit code")] = False,
+    unit: Annotated[str, typer.Option(help="Serial of a simulated unit, SIM-0001 or RANDOM-<number>")] = "SIM-0001",
+    seed: Annotated[int | None, typer.Option(help="Seed of the simulated world")] = None,
+) -> int:
+    """Start the service, calibrate and verify the simulated unit through it, show what came out, keep serving."""
+    from bench_service.cli.demo import demonstrate
+    from bench_service.cli.serving import check_port, serving
+
+    settings = _with(context.obj, port=port)
+    check_port(settings)
+    address = f"http://{settings.host}:{settings.port}"
+    with serving(settings), connect(settings, address, drive=False) as client:
+        console.print(f"bench {settings.bench_id} at {address}")
+        code = demonstrate(client, unit, seed, console)
+        if not once:
+            console.print(f"serving on {address} (API: {address}/docs); Ctrl-C ends", soft_wrap=True)
+            _until_interrupted()
+    return code
+
+
+@app.command()
+def run(
+    context: typer.Context,
+    procedure: str,
+    unit: Annotated[str, typer.Option(help="Serial of the unit")],
+    set_: Annotated[list[str], typer.Option("--set", help="A parameter, name=JSON value; may be repeated")] = [],  # noqa: B006
+    seed: Annotated[int | None, typer.Option(help="Seed of a simulated bench")] = None,
+    server: Server = None,
+    as_json: AsJson = False,
+) -> int:
+    """Run a procedure on a unit and wait for its verdict."""
+    body = {"procedure": procedure, "unit": unit, "parameters": dict(map(_parameter, set_)), "seed": seed}
+    with connect(context.obj, server, drive=True) as client:
+        job = watch(client, call(client, "POST", "/api/v1/jobs", json=body), errors)
+        result = call(client, "GET", f"/api/v1/jobs/{job['id']}/result") if job["result"] else None
+    if as_json:
+        print(json.dumps({"job": job, "result": result}, indent=2))
+    elif result is None:
+        raise Refused(f"job {job['id']} {job['state']}: {(job['error'] or {}).get('message', 'no reason given')}")
+    else:
+        console.print(check_table(result["document"]))
+        console.print(f"verdict {job['verdict']}, job {job['id']}", soft_wrap=True)
+    return exit_code(job["verdict"])
+
+
+@app.command("import")
+def import_(
+    context: typer.Context,
+    files: Annotated[list[Path], typer.Argument(exists=True, dir_okay=False)],
+    description: Annotated[Path, typer.Option(exists=True, dir_okay=False, help="JSON file that says what is in them")],
+    server: Server = None,
+) -> None:
+    """Import a recorded file, or several that are columns of one recording."""
+    with connect(context.obj, server, drive=False) as client:
+        parts = [("files", (path.name, path.read_bytes(), "application/octet-stream")) for path in files]
+        data = {"description": description.read_text(encoding="utf-8")}
+        recording = call(client, "POST", "/api/v1/recordings", files=parts, data=data)
+    console.print_json(json.dumps(recording))
+
+
+@app.command()
+def analyse(
+    context: typer.Context,
+    method: str,
+    recording: Annotated[list[str], typer.Option(help="Id of a recording; may be repeated")] = [],  # noqa: B006
+    calibration: Annotated[list[str], typer.Option(help="Id of a calibration; may be repeated")] = [],  # noqa: B006
+    set_: Annotated[list[str], typer.Option("--set", help="A parameter, name=JSON value; may be repeated")] = [],  # noqa: B006
+    server: Server = None,
+    as_json: AsJson = False,
+) -> int:
+    """Run a method on stored recordings or calibrations."""
+    body = {
+        "method": method,
+        "recordings": recording,
+        "calibrations": calibration,
+        "parameters": dict(map(_parameter, set_)),
+    }
+    with connect(context.obj, server, drive=False) as client:
+        result = call(client, "POST", "/api/v1/analyses", json=body)
+    if as_json:
+        print(json.dumps(result, indent=2))
+    else:
+        console.print(check_table(result["document"]))
+        console.print(f"verdict {result['verdict']}, result {result['id']}", soft_wrap=True)
+    return exit_code(result["verdict"])
+
+
+@app.command()
+def export(
+    context: typer.Context,
+    recording: str,
+    output: Annotated[Path, typer.Option("--output", "-o", help="File to write; its ending is the format")],
+    channels: Annotated[str | None, typer.Option(help="Names, separated by commas; all without it")] = None,
+    start_s: Annotated[float | None, typer.Option(help="From this second of the recording")] = None,
+    stop_s: Annotated[float | None, typer.Option(help="Up to this second of the recording")] = None,
+    server: Server = None,
+) -> None:
+    """Take a recording's samples out as .csv, .parquet or .arrow."""
+    options: dict[str, Any] = {"channels": channels, "start_s": start_s, "stop_s": stop_s}
+    query = {"format": output.suffix.removeprefix("."), **{k: v for k, v in options.items() if v is not None}}
+    partial = output.with_name(output.name + ".part")
+    with (
+        connect(context.obj, server, drive=False) as client,
+        client.stream("GET", f"/api/v1/recordings/{recording}/data", params=query) as response,
+    ):
+        if not response.is_success:
+            response.read()
+            raise Refused(sentence(response))
+        with partial.open("wb") as sink:
+            for piece in response.iter_bytes():
+                sink.write(piece)
+    partial.replace(output)
+    console.print(f"{output}: {output.stat().st_size} bytes")
+
+
+@app.command()
+def jobs(
+    context: typer.Context,
+    state: Annotated[str | None, typer.Option(help="Only jobs in this state")] = None,
+    unit: Annotated[str | None, typer.Option(help="Only jobs of this unit")] = None,
+    limit: Annotated[int, typer.Option(help="How many")] = 20,
+    server: Server = None,
+    as_json: AsJson = False,
+) -> None:
+    """List jobs, newest first."""
+    query = {k: v for k, v in {"state": state, "unit": unit, "limit": limit}.items() if v is not None}
+    with connect(context.obj, server, drive=False) as client:
+        page = call(client, "GET", "/api/v1/jobs", params=query)
+    if as_json:
+        print(json.dumps(page, indent=2))
+    else:
+        console.print(job_table(page["items"]))
+
+
+def _with(settings: Settings, **given: Any) -> Settings:
+    return settings.model_copy(update={name: value for name, value in given.items() if value is not None})
+
+
+def _parameter(text: str) -> tuple[str, Any]:
+    """``name=value`` with the value as JSON, or as plain text where it is none."""
+    name, separator, value = text.partition("=")
+    if not separator or not name:
+        raise Refused(f"--set {text}: expected name=value")
+    try:
+        return name, json.loads(value)
+    except json.JSONDecodeError:
+        return name, value
+
+
+def _until_interrupted() -> None:
+    import threading
+
+    try:
+        threading.Event().wait()
+    except KeyboardInterrupt:
+        print(file=sys.stderr)

@@ -1,0 +1,45 @@
+"""``make run``: calibrate and verify the simulated unit through the service, as an operator would."""
+
+from typing import Any
+
+import httpx
+from rich.console import Console
+
+from bench_service.cli.client import call
+from bench_service.cli.tables import check_table, coefficient_table
+from bench_service.cli.watching import exit_code, watch
+
+PROCEDURES = ("calibration_12_orientations", "verification_9_orientations")
+
+
+def demonstrate(client: httpx.Client, unit: str, seed: int | None, console: Console) -> int:
+    """Calibrate, verify, show; the exit code of the worse verdict."""
+    codes = [_one(client, procedure, unit, seed, console) for procedure in PROCEDURES]
+    return max(codes)
+
+
+def _one(client: httpx.Client, procedure: str, unit: str, seed: int | None, console: Console) -> int:
+    body: dict[str, Any] = {"procedure": procedure, "unit": unit, "seed": seed}
+    job = watch(client, call(client, "POST", "/api/v1/jobs", json=body), console)
+    if job["state"] != "succeeded":
+        console.print(f"[red]{job['state']}[/]: {job['error']}", soft_wrap=True)
+        return 2
+    result = call(client, "GET", f"/api/v1/jobs/{job['id']}/result")
+    if procedure.startswith("calibration"):
+        _show_coefficients(client, job, console)
+    console.print(check_table(result["document"]))
+    for warning in result["document"]["warnings"]:
+        console.print(f"[yellow]{warning}[/]", soft_wrap=True)
+    colour = {"pass": "green", "fail": "red"}.get(job["verdict"], "yellow")
+    console.print(
+        f"{procedure}: verdict [bold {colour}]{job['verdict']}[/], page {client.base_url}{job['page']}", soft_wrap=True
+    )
+    return exit_code(job["verdict"])
+
+
+def _show_coefficients(client: httpx.Client, job: dict[str, Any], console: Console) -> None:
+    newest = call(client, "GET", f"/api/v1/units/{job['unit']}/calibrations", params={"limit": 1})["items"][0]
+    truth = call(client, "GET", f"/api/v1/jobs/{job['id']}/truth")["triads"]
+    table, worst = coefficient_table(newest["triads"], truth)
+    console.print(table)
+    console.print(f"Largest of 24 errors: {worst:.2f} of its own standard uncertainty")

@@ -1,0 +1,5 @@
+"""What a command says when it cannot do what was asked."""
+
+
+class Refused(Exception):
+    """The service refused, or cannot be reached; the message is fit for a person."""

@@ -1,0 +1,66 @@
+"""The HTTP server, in this thread or beside it."""
+
+import socket
+import threading
+from collections.abc import Generator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import uvicorn
+
+from bench_service.app import create_app, open_service
+from bench_service.cli.refusal import Refused
+from bench_service.settings import Settings
+from bench_service.wall_clock import pause
+
+GRACE_S = 3
+"""How long open connections may take to end at shutdown [s]."""
+
+
+@contextmanager
+def ready(settings: Settings, drive: bool = True, socket_file: Path | None = None) -> Generator[uvicorn.Server]:
+    """A server around an open service, ready to run; the service is closed at the end, or when the server shuts down.
+
+    Raises what `open_service` raises: before any thread or signal handler is there.
+    """
+    with ExitStack() as closing:
+        service = open_service(settings, closing, drive)
+        config = uvicorn.Config(
+            create_app(service, int(settings.max_import_mb * 1e6), closing.close),
+            settings.host,
+            settings.port,
+            uds=None if socket_file is None else str(socket_file),
+            log_level="warning",
+            timeout_graceful_shutdown=GRACE_S,
+        )
+        yield uvicorn.Server(config)
+
+
+def check_port(settings: Settings) -> None:
+    """Raises `Refused` with a hint where the port is taken."""
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((settings.host, settings.port))
+        except OSError as error:
+            raise Refused(
+                f"port {settings.port} of {settings.host} is taken ({error.strerror}); "
+                "choose another with PORT=… or BENCH_PORT=…"
+            ) from error
+
+
+@contextmanager
+def serving(settings: Settings, drive: bool = True, socket_file: Path | None = None) -> Generator[None]:
+    """A server in a thread beside this one, answering from the first line of the block. Raises as `ready`."""
+    with ready(settings, drive, socket_file) as running:
+        thread = threading.Thread(target=running.run, name="http")
+        thread.start()
+        try:
+            while not running.started:
+                if not thread.is_alive():
+                    raise Refused("the service did not start; the lines above say why")
+                pause(0.01)
+            yield
+        finally:
+            running.should_exit = True
+            thread.join()

@@ -1,0 +1,69 @@
+"""Tables for a terminal: coefficients beside the truth, checks beside their limits."""
+
+from typing import Any
+
+from rich.table import Table
+
+from procedures.core.imu_model import COEFFICIENT_NAMES
+from procedures.core.units import DISPLAY
+
+
+def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]] | None) -> tuple[Table, float]:
+    """Estimate ± standard uncertainty, truth, error in sigmas; and the largest error in sigmas (0 without truth)."""
+    table = Table(title="Coefficients, U = b + K·v")
+    for column in ("triad", "coefficient", "estimate", "± standard uncertainty", "truth", "error / σ", "unit"):
+        table.add_column(column, justify="left" if column in ("triad", "coefficient", "unit") else "right")
+    true_by_triad = {t["triad"]: t for t in truths or []}
+    worst = 0.0
+    for triad in triads:
+        name, size = DISPLAY[triad["output_unit"]]
+        true = true_by_triad.get(triad["triad"])
+        for index, coefficient in enumerate(COEFFICIENT_NAMES):
+            channel, column = divmod(index, 4)
+            scale, unit = (size, name) if column == 0 else (1.0, "1")
+            estimate = _entry(triad, channel, column)
+            sd = triad["covariance"][index][index] ** 0.5
+            cells = [triad["triad"], coefficient, f"{estimate / scale:.7f}", f"{sd / scale:.2g}", "–", "–", unit]
+            if true is not None:
+                error = (estimate - _entry(true, channel, column)) / sd
+                worst = max(worst, abs(error))
+                cells[4:6] = [f"{_entry(true, channel, column) / scale:.7f}", f"{error:+.2f}"]
+            table.add_row(*cells, end_section=index == len(COEFFICIENT_NAMES) - 1)
+    return table, worst
+
+
+def check_table(document: dict[str, Any]) -> Table:
+    """Each value against its limit."""
+    table = Table(title="Checks")
+    for column in ("check", "value", "limit", "unit", "outcome"):
+        table.add_column(column, justify="left" if column in ("check", "unit", "outcome") else "right")
+    for check in document.get("checks", []):
+        limit = check["limit"]
+        bounds = [f"≥ {limit['minimum']:.4g}"] if limit["minimum"] is not None else []
+        bounds += [f"≤ {limit['maximum']:.4g}"] if limit["maximum"] is not None else []
+        outcome = "[green]pass[/]" if check["passed"] else "[red]fail[/]"
+        table.add_row(check["name"], f"{check['value']:.4g}", ", ".join(bounds), limit["unit"], outcome)
+    return table
+
+
+def job_table(jobs: list[dict[str, Any]]) -> Table:
+    """Jobs, newest first."""
+    table = Table()
+    for column in ("job", "procedure", "unit", "state", "verdict", "stations", "submitted"):
+        table.add_column(column, no_wrap=column == "job")
+    for job in jobs:
+        done = job["progress"]
+        table.add_row(
+            job["id"],
+            job["procedure"],
+            job["unit"],
+            job["state"],
+            job["verdict"] or "–",
+            f"{done['station']}/{done['stations']}",
+            job["created_at"][:19].replace("T", " "),
+        )
+    return table
+
+
+def _entry(triad: dict[str, Any], channel: int, column: int) -> float:
+    return triad["bias"][channel] if column == 0 else triad["matrix"][channel][column - 1]

@@ -1,0 +1,32 @@
+"""Watching a job to its end, with a progress bar for a person."""
+
+from typing import Any
+
+import httpx
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from bench_service.cli.client import call
+from bench_service.wall_clock import pause
+
+ENDED = ("succeeded", "failed", "cancelled", "interrupted")
+LOOK_S = 0.1
+
+
+def watch(client: httpx.Client, job: dict[str, Any], console: Console) -> dict[str, Any]:
+    """Follow a job until it has ended; the job as it then is."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console) as progress:
+        bar = progress.add_task(f"{job['procedure']} {job['unit']}", total=job["progress"]["stations"] or 1)
+        while job["state"] not in ENDED:
+            pause(LOOK_S)
+            job = call(client, "GET", f"/api/v1/jobs/{job['id']}")
+            progress.update(bar, completed=job["progress"]["station"])
+        if job["state"] == "succeeded":
+            progress.update(bar, completed=job["progress"]["stations"] or 1)
+    return job
+
+
+def exit_code(verdict: str | None) -> int:
+    """0 pass, 1 fail, 2 everything else."""
+    return {"pass": 0, "fail": 1}.get(verdict or "", 2)

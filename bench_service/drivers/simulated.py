@@ -1,0 +1,82 @@
+"""The simulated bench as a driver: the only file that imports the simulators."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bench_service.jobs.driver import TrueTriad
+from bench_service.jobs.errors import NotMounted
+from bench_service.wall_clock import pause_async
+from procedures.bench import Bench, BenchDescription
+from procedures.core.unit import Unit
+from simulators.truth import UnitTruth, default_bench, default_unit, load_bench, load_unit, random_unit_truth
+from simulators.world import WorldConfig, build, declared_unit, launch_truth
+
+RANDOM_UNIT = re.compile(r"^RANDOM-(\d{1,9})$")
+"""Serial of a unit whose truth is drawn from the number in it: as many different units as a night needs."""
+
+
+class SimulatedDriver:
+    """A bench whose table, unit and supply live in this process; its data are marked as simulated."""
+
+    def __init__(
+        self,
+        bench_id: str,
+        unit_truth: Path | None = None,
+        bench_truth: Path | None = None,
+        real_time_factor: float | None = None,
+    ) -> None:
+        self._bench = default_bench() if bench_truth is None else load_bench(bench_truth)
+        self._unit = default_unit() if unit_truth is None else load_unit(unit_truth)
+        self._real_time_factor = real_time_factor
+        if bench_id != self._bench.description.id:
+            raise NotMounted(f"the truth file is of bench {self._bench.description.id!r}, not {bench_id!r}")
+
+    @property
+    def description(self) -> BenchDescription:
+        return self._bench.description
+
+    def mounted(self, serial: str | None = None) -> tuple[Unit, ...]:
+        """The unit of the truth file; a serial like RANDOM-7 is mounted by asking for it."""
+        units = [self._unit]
+        if serial is not None and RANDOM_UNIT.match(serial):
+            units.append(self._truth_of(serial))
+        return tuple(declared_unit(unit) for unit in units)
+
+    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None) -> Bench:
+        """A world with that unit on the table, at its beginning or at a checkpoint."""
+        return build(self._config(unit, 0 if seed is None else seed), checkpoint)
+
+    def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
+        """Bias and matrix of the job's launch, run-to-run changes included."""
+        found = launch_truth(self._config(unit, seed))
+        units = {"gyro": "rad/s", "accelerometer": "m/s^2"}
+        return tuple(
+            TrueTriad(
+                triad,
+                units[triad],
+                tuple(float(b) for b in bias),
+                tuple(tuple(float(k) for k in row) for row in matrix),
+            )
+            for triad, (bias, matrix) in found.items()
+        )
+
+    def _config(self, unit: str, seed: int) -> WorldConfig:
+        return WorldConfig(
+            unit=self._truth_of(unit),
+            bench=self._bench,
+            seed=seed,
+            real_time_factor=self._real_time_factor,
+            wait=pause_async,
+        )
+
+    def _truth_of(self, serial: str) -> UnitTruth:
+        if serial == self._unit.serial:
+            return self._unit
+        found = RANDOM_UNIT.match(serial)
+        if found is None:
+            raise NotMounted(
+                f"the simulated bench has no unit {serial!r}; it has {self._unit.serial} and RANDOM-<number>"
+            )
+        return replace(random_unit_truth(int(found.group(1))), serial=serial)

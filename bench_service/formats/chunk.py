@@ -1,0 +1,93 @@
+"""One chunk of a recording as a self-contained Parquet payload.
+
+Knows how samples become bytes and come back bit for bit. Must not know where the bytes are kept.
+
+Counts of a unit at rest are near-constant plus noise, so int32 columns are delta-encoded (miniblocks as narrow as
+the noise) and then zstd; float64 columns are split into byte streams, so that equal exponents lie side by side.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from procedures.core.recording import RawArray
+
+RAW_BYTES = 2 * 1024 * 1024
+"""Raw size of a full chunk: the payload stays under a megabyte for noise up to 10 bits, and decodes in milliseconds."""
+
+SampleType = np.dtype[np.int32] | np.dtype[np.float64]
+"""What a sample may be: counts, or values that a unit computed itself."""
+
+_ENCODINGS = {"int32": "DELTA_BINARY_PACKED", "float64": "BYTE_STREAM_SPLIT"}
+
+
+class UnreadableChunk(Exception):
+    """The payload is not the chunk that was asked for."""
+
+
+@dataclass(frozen=True)
+class ChunkPlace:
+    """What a chunk says of itself: whose samples, from which one on, at which rate."""
+
+    recording_id: str
+    start: int
+    rate_hz: float
+
+
+def sample_type(name: str) -> SampleType:
+    """The type of samples by its name, "int32" or "float64"."""
+    return np.dtype(np.int32) if name == "int32" else np.dtype(np.float64)
+
+
+def rows_per_chunk(channels: int, dtype: SampleType) -> int:
+    """How many samples of each channel fill a chunk."""
+    return max(1, RAW_BYTES // (channels * dtype.itemsize))
+
+
+def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> bytes:
+    """Samples, shape (n, channels), as Parquet with one column a channel."""
+    encoding = _ENCODINGS[samples.dtype.name]
+    schema = pa.schema(
+        [pa.field(name, pa.from_numpy_dtype(samples.dtype), nullable=False) for name in names],
+        metadata={
+            "recording": place.recording_id,
+            "start_sample": str(place.start),
+            "rate_hz": repr(float(place.rate_hz)),
+        },
+    )
+    columns = [pa.array(np.ascontiguousarray(samples[:, index])) for index in range(len(names))]
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        pa.Table.from_arrays(columns, schema=schema),
+        sink,
+        compression="zstd",
+        use_dictionary=False,
+        write_statistics=False,
+        column_encoding=dict.fromkeys(names, encoding),
+    )
+    return sink.getvalue().to_pybytes()
+
+
+def decode_chunk(payload: bytes, names: Sequence[str]) -> RawArray:
+    """The named channels of a chunk in that order, shape (n, len(names)). Raises `UnreadableChunk`."""
+    try:
+        table = pq.ParquetFile(pa.BufferReader(payload)).read(columns=list(names), use_threads=False)
+        columns = [table.column(name).to_numpy() for name in names]
+    except (pa.ArrowException, OSError, KeyError) as error:
+        raise UnreadableChunk(str(error)) from error
+    out = np.empty((table.num_rows, len(names)), dtype=columns[0].dtype)
+    for index, column in enumerate(columns):
+        out[:, index] = column
+    return out
+
+
+def chunk_place(payload: bytes) -> ChunkPlace:
+    """What a payload says of itself. Raises `UnreadableChunk`."""
+    try:
+        metadata = pq.read_schema(pa.BufferReader(payload)).metadata or {}
+        return ChunkPlace(metadata[b"recording"].decode(), int(metadata[b"start_sample"]), float(metadata[b"rate_hz"]))
+    except (pa.ArrowException, OSError, KeyError, ValueError) as error:
+        raise UnreadableChunk(str(error)) from error

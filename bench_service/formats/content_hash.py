@@ -1,0 +1,50 @@
+"""The hash that names what a recording says, however it is cut, compressed or stored.
+
+SHA-256 over one JSON line that describes rate, sample type and channels (name, quantity, unit, scale, offset), and then
+the samples, little-endian, row by row. Must not know chunks, files or databases.
+"""
+
+import hashlib
+import json
+from collections.abc import Sequence
+
+import numpy as np
+
+from bench_service.formats.chunk import SampleType
+from procedures.core.recording import Channel, RawArray
+
+
+class ContentHash:
+    """The hash while samples arrive."""
+
+    def __init__(self, channels: Sequence[Channel], rate_hz: float, dtype: SampleType) -> None:
+        self._dtype = np.dtype(dtype).newbyteorder("<")
+        header = {
+            "channels": [[c.name, c.quantity.value, c.unit, float(c.scale), float(c.offset)] for c in channels],
+            "dtype": np.dtype(dtype).name,
+            "rate_hz": float(rate_hz),
+        }
+        line = json.dumps(header, sort_keys=True, separators=(",", ":"), ensure_ascii=True) + "\n"
+        self._sha = hashlib.sha256(line.encode())
+
+    def update(self, samples: RawArray) -> None:
+        """Add samples, shape (n, channels), of the type that was announced."""
+        self._sha.update(memoryview(np.ascontiguousarray(samples, dtype=self._dtype)).cast("B"))
+
+    def copy(self) -> "ContentHash":
+        """An independent continuation."""
+        twin = object.__new__(ContentHash)
+        twin._dtype = self._dtype
+        twin._sha = self._sha.copy()
+        return twin
+
+    def hexdigest(self) -> str:
+        """The hash of what has arrived, as 64 hexadecimal digits."""
+        return self._sha.hexdigest()
+
+
+def content_hash(channels: Sequence[Channel], rate_hz: float, samples: RawArray) -> str:
+    """The hash of a recording held in memory."""
+    whole = ContentHash(channels, rate_hz, samples.dtype)
+    whole.update(samples)
+    return whole.hexdigest()

@@ -1,0 +1,39 @@
+"""PORT to the machine: what turns a bench's name into devices."""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from procedures.bench import Bench, BenchDescription
+from procedures.core.unit import Unit
+
+
+@dataclass(frozen=True)
+class TrueTriad:
+    """What a simulated triad really was in one launch: ``U = bias + matrix·v`` in the nominal output's unit."""
+
+    triad: str
+    output_unit: str
+    bias: tuple[float, ...]
+    matrix: tuple[tuple[float, ...], ...]
+
+
+class BenchDriver(Protocol):
+    """One bench's devices. `open` is called once per job, and again after a restart."""
+
+    @property
+    def description(self) -> BenchDescription: ...
+
+    def mounted(self, serial: str | None = None) -> tuple[Unit, ...]:
+        """The units that this bench can test, as declared; a simulated bench mounts some when they are asked for."""
+        ...
+
+    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None) -> Bench:
+        """The bench with a unit on it; from a checkpoint, a simulated world goes on where it was.
+
+        Raises `NotMounted`, `BenchError`.
+        """
+        ...
+
+    def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
+        """What a simulated unit really is in a job with this seed; empty on a real bench."""
+        ...

@@ -1,0 +1,160 @@
+"""The job engine, DBOS, behind four verbs. The only file that knows it.
+
+One queue per bench with one job at a time, one step per station, steps that may be repeated. An operator's cancel is a
+flag of our own that the steps see (a cancelled DBOS workflow would free the bench while it still moves); the workflow
+then makes the bench safe and ends. The version is the procedures' contract, not a hash of the sources, so a
+new build goes on with the jobs of the old one.
+"""
+
+import json
+import logging
+from typing import Any
+
+from dbos import DBOS, DBOSConfig, Serializer, SetEnqueueOptions, SetWorkflowID
+from pydantic import TypeAdapter
+
+from bench_service.jobs.job import Failure, Job, JobState
+from bench_service.jobs.runner import JobRunner, StepOutcome
+from bench_service.jobs.session import ShuttingDown
+from bench_service.jobs.store import JobStore
+from bench_service.wall_clock import now
+
+PROCEDURE_ABI = "1"
+"""Raise it when stored workflows can no longer be continued by this code."""
+MAX_RECOVERIES = 50
+"""How often a job may take the service down before it is given up."""
+
+OUTCOME = TypeAdapter(StepOutcome)
+log = logging.getLogger(__name__)
+
+
+class JsonSerializer(Serializer):
+    """Step outputs as JSON: a database that can be read, and no pickle in it."""
+
+    def serialize(self, data: Any) -> str:
+        if isinstance(data, Exception):
+            return json.dumps({"error": f"{type(data).__name__}: {data}"})
+        return json.dumps(data)
+
+    def deserialize(self, serialized_data: str) -> Any:
+        data = json.loads(serialized_data)
+        if isinstance(data, dict) and set(data) == {"error"}:
+            return RuntimeError(data["error"])
+        return data
+
+    def name(self) -> str:
+        return "json"
+
+
+class Engine:
+    """Runs jobs of one bench, in this process, durably."""
+
+    def __init__(self, system_database_url: str, bench_id: str, poll_s: float, runner: JobRunner) -> None:
+        self._queue = f"bench:{bench_id}"
+        self._poll_s = poll_s
+        self._runner = runner
+        config: DBOSConfig = {
+            "name": "bench",
+            "system_database_url": system_database_url,
+            "executor_id": f"bench:{bench_id}",
+            "application_version": PROCEDURE_ABI,
+            "serializer": JsonSerializer(),
+            "log_level": "WARNING",
+            "console_log_level": "ERROR",
+            "max_executor_threads": 8,
+            "notification_listener_polling_interval_sec": 1.0,
+        }
+        DBOS(config=config)
+
+        @DBOS.workflow(name="run_job", max_recovery_attempts=MAX_RECOVERIES)
+        def run_job(job_id: str) -> None:
+            self._run_job(job_id)
+
+        self._workflow = run_job
+
+    def launch(self, jobs: JobStore) -> None:
+        """Start working; jobs that a dead process left go on. The bench's lease must be held."""
+        DBOS.listen_queues([self._queue])
+        DBOS.launch()
+        DBOS.register_queue(
+            self._queue,
+            concurrency=1,
+            worker_concurrency=1,
+            polling_interval_sec=self._poll_s,
+            on_conflict="always_update",
+        )
+        self._reconcile(jobs)
+
+    def enqueue(self, job: Job) -> None:
+        """Queue a job; queueing the same job twice is a no-op."""
+        with SetWorkflowID(job.id), SetEnqueueOptions(priority=job.priority):
+            DBOS.enqueue_workflow(self._queue, self._workflow, job.id)
+
+    def shut_down(self) -> None:
+        """Stop working. The running job is left for the next start; the bench is made safe first."""
+        self._runner.shut_down()
+        DBOS.destroy(destroy_registry=True, workflow_completion_timeout_sec=10)
+
+    def _run_job(self, job_id: str) -> None:
+        runner = self._runner
+        try:
+            outcome = self._stations(job_id)
+            safe = _step("safe", lambda: OUTCOME.dump_python(runner.make_safe(job_id)))
+            if outcome.good:
+                outcome = OUTCOME.validate_python(safe)
+            if outcome.good:
+                outcome = OUTCOME.validate_python(
+                    _step("conclude", lambda: OUTCOME.dump_python(runner.conclude(job_id)))
+                )
+        except ShuttingDown:
+            runner.make_safe(job_id)
+            raise
+        except Exception as error:  # a defect of ours: the job must still end, and the bench safe
+            log.exception("job %s failed inside the service", job_id)
+            runner.make_safe(job_id)
+            outcome = StepOutcome(Failure("InternalError", f"{type(error).__name__}: {error}"))
+        if not outcome.good:
+            _step("end", lambda: runner.end_badly(job_id, outcome))
+
+    def _stations(self, job_id: str) -> StepOutcome:
+        runner = self._runner
+        count: int = _step("prepare", lambda: runner.prepare(job_id))
+        for index in range(count):
+            outcome = OUTCOME.validate_python(
+                _step(f"station {index}", lambda k=index: OUTCOME.dump_python(runner.acquire(job_id, k)))
+            )
+            if not outcome.good:
+                return outcome
+        return StepOutcome(cancelled=count < 0)
+
+    def _reconcile(self, jobs: JobStore) -> None:
+        """Make our jobs and the engine's workflows agree after a crash or a change of version."""
+        for state in (JobState.QUEUED, JobState.RUNNING):
+            cursor: str | None = None
+            while True:
+                page = jobs.list(state=state, after=cursor, limit=200)
+                for job in page.items:
+                    self._reconcile_job(job, jobs)
+                cursor = page.next
+                if cursor is None:
+                    break
+
+    def _reconcile_job(self, job: Job, jobs: JobStore) -> None:
+        if f"bench:{job.bench}" != self._queue:
+            return
+        status = DBOS.get_workflow_status(job.id)
+        if status is None:
+            self.enqueue(job)
+        elif status.status in ("ERROR", "CANCELLED", "MAX_RECOVERY_ATTEMPTS_EXCEEDED"):
+            failure = Failure("EngineGaveUp", f"the job engine ended this job as {status.status}")
+            jobs.transition(job.id, JobState.INTERRUPTED, at=now(), failure=failure)
+        elif status.app_version not in (None, PROCEDURE_ABI):
+            failure = Failure(
+                "OtherVersion", f"begun by version {status.app_version} of the procedures, this is {PROCEDURE_ABI}"
+            )
+            jobs.transition(job.id, JobState.INTERRUPTED, at=now(), failure=failure)
+
+
+def _step(name: str, work: Any) -> Any:
+    """Run a step once: after a crash a finished one gives its stored output."""
+    return DBOS.run_step({"name": name}, work)

@@ -1,0 +1,172 @@
+"""The steps of a job, each safe to repeat: what the engine calls, and what it must not know."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from bench_service.jobs.driver import BenchDriver
+from bench_service.jobs.errors import ServiceError
+from bench_service.jobs.job import FINAL, Failure, Job, JobState
+from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
+from bench_service.jobs.session import BenchSession
+from bench_service.jobs.store import Idempotency, StoredResult, Stores
+from bench_service.wall_clock import new_id, now
+from procedures.bench.errors import BenchError, Stopped
+from procedures.core.errors import DomainError
+from procedures.core.limits import Verdict
+from procedures.core.recording import Recording
+
+
+@dataclass(frozen=True)
+class StepOutcome:
+    """What a step tells the workflow; small, because the engine stores it."""
+
+    failure: Failure | None = None
+    cancelled: bool = False
+
+    @property
+    def good(self) -> bool:
+        return self.failure is None and not self.cancelled
+
+
+class JobRunner:
+    """Runs the steps of jobs on one bench, one job at a time."""
+
+    def __init__(self, stores: Stores, planner: Planner, driver: BenchDriver) -> None:
+        self._stores = stores
+        self._planner = planner
+        self._driver = driver
+        self._session: BenchSession | None = None
+
+    def prepare(self, job_id: str) -> int:
+        """Note what is known of the unit now, and start. How many stations there are; 0 stations, nothing moves."""
+        jobs = self._stores.jobs
+        job = jobs.get(job_id)
+        if job.state in FINAL:
+            return -1
+        context = self._planner.refreshed(CONTEXT.validate_python(job.context))
+        job = jobs.set_context(job_id, CONTEXT.dump_python(context, mode="json"))
+        jobs.transition(job_id, JobState.RUNNING, at=now())
+        return len(job.stations)
+
+    def acquire(self, job_id: str, index: int) -> StepOutcome:
+        """Record one station. Where its recording exists already, a crash came between storing and noting it."""
+        jobs, recordings = self._stores.jobs, self._stores.recordings
+        if index in {r.info.station.index for r in recordings.of_job(job_id) if r.info.station}:
+            jobs.station_done(job_id, index, now(), {})
+            return StepOutcome()
+        if jobs.cancel_requested(job_id):
+            return StepOutcome(cancelled=True)
+        try:
+            info = self._session_of(jobs.get(job_id)).record(index)
+        except Stopped:
+            return StepOutcome(cancelled=True)
+        except (BenchError, DomainError, ServiceError) as error:
+            return StepOutcome(Failure(type(error).__name__, str(error), index))
+        jobs.station_done(
+            job_id, index, now(), {"recording": info.id, "samples": info.count, "hash": info.content_hash}
+        )
+        return StepOutcome()
+
+    def make_safe(self, job_id: str) -> StepOutcome:
+        """Leave the bench safe, also after a restart in which no session survived."""
+        session = self._session
+        if session is None:
+            return StepOutcome()
+        self._session = None
+        try:
+            session.make_safe()
+        except ExceptionGroup as group:
+            message = "; ".join(str(error) for error in group.exceptions)
+            self._stores.jobs.note(job_id, "note", now(), {"text": f"the bench could not be made safe: {message}"})
+            return StepOutcome(Failure("NotSafe", f"the bench could not be made safe: {message}"))
+        finally:
+            session.close()
+        return StepOutcome()
+
+    def conclude(self, job_id: str) -> StepOutcome:
+        """Analyse, store the result with its calibrations, and end the job with the verdict."""
+        job = self._stores.jobs.get(job_id)
+        procedure = self._planner.procedure(job.procedure)
+        try:
+            recordings = [self._stores.recordings.load(r.info.id) for r in self._stores.recordings.of_job(job_id)]
+            result = analysed(job, procedure, job.parameters, recordings)
+            stored = self._stores.results.add(
+                result.stored, result.calibrations, idempotency=Idempotency(f"job:{job_id}", job_id)
+            )
+        except (DomainError, ServiceError) as error:
+            return StepOutcome(Failure(type(error).__name__, str(error)))
+        self._stores.jobs.transition(job_id, JobState.SUCCEEDED, at=now(), verdict=stored.verdict, result_id=stored.id)
+        return StepOutcome()
+
+    def end_badly(self, job_id: str, outcome: StepOutcome) -> None:
+        """End a job that was cancelled or failed; its complete recordings are kept."""
+        job = self._stores.jobs.get(job_id)
+        if job.state in FINAL:
+            return
+        self._stores.recordings.interrupt_open(job_id)
+        to = JobState.CANCELLED if outcome.cancelled else JobState.FAILED
+        verdict = None if outcome.cancelled else Verdict.ERROR
+        self._stores.jobs.transition(job_id, to, at=now(), verdict=verdict, failure=outcome.failure)
+
+    def shut_down(self) -> None:
+        """The service is ending: leave the running job to the next start, and the bench safe."""
+        session = self._session
+        if session is not None:
+            session.shut_down()
+
+    def running_job(self) -> Job | None:
+        """The job that drives the bench now."""
+        return None if self._session is None else self._stores.jobs.get(self._session.job.id)
+
+    def _session_of(self, job: Job) -> BenchSession:
+        if self._session is not None and self._session.job.id == job.id:
+            return self._session
+        self._stores.recordings.interrupt_open(job.id)
+        checkpoint = self._stores.recordings.checkpoint(job.id)
+        bench = self._driver.open(job.unit, job.seed, checkpoint)
+        self._session = BenchSession(
+            job,
+            self._planner.procedure(job.procedure),
+            bench,
+            self._stores.recordings,
+            lambda: self._stores.jobs.cancel_requested(job.id),
+        )
+        return self._session
+
+
+@dataclass(frozen=True)
+class Analysed:
+    """A result ready to be stored, with the calibrations that it gives."""
+
+    stored: StoredResult
+    calibrations: tuple[Any, ...]
+
+
+def analysed(
+    job: Job, procedure: AnyProcedure, parameters: dict[str, Any], recordings: Sequence[Recording]
+) -> Analysed:
+    """Run a procedure's analysis on a job's recordings. Raises `DomainError`, `ValidationError` for the parameters."""
+    context = CONTEXT.validate_python(job.context)
+    params = procedure.resolve(procedure.params.model_validate(parameters), context)
+    outcome = procedure.analyse(recordings, params, context)
+    used = context.unit.calibration_id if procedure.uses_calibration else None
+    stored = StoredResult(
+        id=new_id(),
+        kind="procedure",
+        name=procedure.name,
+        version=procedure.version,
+        parameters=params.model_dump(mode="json"),
+        document=outcome.model_dump(mode="json"),
+        verdict=outcome.verdict,
+        recordings=tuple((r.info.id, r.info.content_hash) for r in recordings),
+        calibrations=(used,) if used else (),
+        code_version=job.code_version,
+        simulated=job.simulated,
+        created_at=now(),
+        unit=job.unit,
+        job_id=job.id,
+        seed=job.seed,
+        context=job.context,
+    )
+    return Analysed(stored, procedure.calibrations(outcome))

@@ -1,0 +1,235 @@
+"""What the service can be asked, in one place: HTTP and command line say it in their own words."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from random import SystemRandom
+from typing import Any
+
+from bench_service.jobs.driver import BenchDriver, TrueTriad
+from bench_service.jobs.engine import Engine
+from bench_service.jobs.errors import IllegalTransition, NotDriving, NotFound
+from bench_service.jobs.job import Job, JobState
+from bench_service.jobs.planning import CONTEXT, Plan, Planner
+from bench_service.jobs.runner import JobRunner, analysed
+from bench_service.jobs.store import Idempotency, RecordingState, StoredResult, Stores
+from bench_service.wall_clock import new_id, now
+from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.recording import Recording
+from procedures.core.report import Report
+from procedures.core.unit import Unit
+from procedures.procedure import DatedCalibration, Evidence, Method, Outcome, Parameters
+
+AnyMethod = Method[Parameters, Outcome]
+SEEDS = SystemRandom()
+
+
+@dataclass(frozen=True)
+class JobRequest:
+    """A job as a client asks for it."""
+
+    procedure: str
+    unit: str
+    bench: str | None = None
+    parameters: dict[str, Any] = field(default_factory=dict[str, Any])
+    priority: int = 10
+    labels: dict[str, str] = field(default_factory=dict[str, str])
+    seed: int | None = None
+
+
+@dataclass(frozen=True)
+class AnalysisRequest:
+    """A method and what it is to work on."""
+
+    method: str
+    recordings: tuple[str, ...] = ()
+    calibrations: tuple[str, ...] = ()
+    parameters: dict[str, Any] = field(default_factory=dict[str, Any])
+
+
+class BenchService:
+    """The machine room's front desk. Every verb is complete when it returns."""
+
+    def __init__(
+        self,
+        stores: Stores,
+        driver: BenchDriver,
+        planner: Planner,
+        methods: Mapping[str, AnyMethod],
+        runner: JobRunner,
+        engine: Engine | None,
+        code_version: str,
+    ) -> None:
+        self.stores = stores
+        self.driver = driver
+        self.planner = planner
+        self.methods = methods
+        self.code_version = code_version
+        self._runner = runner
+        self._engine = engine
+
+    def start(self) -> None:
+        """Register the bench and its units, then begin to work. The bench's lease must be held."""
+        self.stores.units.put_bench(self.driver.description)
+        for unit in self.driver.mounted():
+            self._register(unit)
+        if self._engine is not None:
+            self._engine.launch(self.stores.jobs)
+
+    def stop(self) -> None:
+        """End the service: the running job is left for the next start, the bench made safe."""
+        if self._engine is not None:
+            self._engine.shut_down()
+
+    def submit(self, request: JobRequest, idempotency_key: str | None = None) -> Job:
+        """Plan, store and queue a job. Raises what `Planner.plan` raises, `BadParameter` for an axis limit."""
+        plan = self.planner.plan(request.procedure, request.unit, request.parameters, request.bench)
+        if plan.violations:
+            raise BadParameter("orientations", plan.violations[0], "beyond an axis limit of the bench")
+        if request.seed is not None and not plan.context.bench.simulated:
+            raise BadParameter("seed", request.seed, "only a simulated bench has one")
+        if self._engine is None:
+            raise NotDriving("this process does not drive a bench; ask the service that does")
+        self._register(plan.context.unit)
+        job = self._new_job(request, plan)
+        key = None if idempotency_key is None else Idempotency(f"jobs:{idempotency_key}", fingerprint(request))
+        stored = self.stores.jobs.add(job, key)
+        self._engine.enqueue(stored)
+        return stored
+
+    def cancel(self, job_id: str) -> Job:
+        """Ask a job to end. Raises `IllegalTransition` where it has ended."""
+        return self.stores.jobs.request_cancel(job_id, now())
+
+    def stop_bench(self, bench_id: str) -> Job | None:
+        """Stop what the bench is doing; the job that was running, if any. Its bench is safe once it is cancelled."""
+        if bench_id != self.driver.description.id:
+            raise NotFound("bench", bench_id)
+        running = self._runner.running_job()
+        if running is None:
+            return None
+        try:
+            return self.cancel(running.id)
+        except IllegalTransition:
+            return None
+
+    def running_job(self) -> Job | None:
+        """The job that drives the bench now."""
+        return self._runner.running_job()
+
+    def result_of(self, job_id: str) -> StoredResult:
+        """The result that gave the job its verdict. Raises `NotFound` where there is none (yet)."""
+        job = self.stores.jobs.get(job_id)
+        if job.result_id is None:
+            raise NotFound(f"result yet: job is {job.state.value}; job", job_id)
+        return self.stores.results.get(job.result_id)
+
+    def truth(self, job_id: str) -> tuple[TrueTriad, ...]:
+        """What a simulated unit really was in a job. Raises `NotFound` on a real bench."""
+        job = self.stores.jobs.get(job_id)
+        if not job.simulated or job.seed is None:
+            raise NotFound("truth: nobody knows it on a real bench; job", job_id)
+        return self.driver.truth(job.unit, job.seed)
+
+    def analyse_again(self, job_id: str, parameters: dict[str, Any], key: str | None = None) -> StoredResult:
+        """Analyse a job's recordings with other parameters; the first result stays as it is."""
+        job = self.stores.jobs.get(job_id)
+        recordings = [self.stores.recordings.load(r.info.id) for r in self.stores.recordings.of_job(job_id)]
+        if len(recordings) < len(job.stations):
+            raise UnfitRecording(f"job {job_id} has {len(recordings)} of its {len(job.stations)} recordings")
+        merged = {**job.requested_parameters, **parameters}
+        current = replace(job, code_version=self.code_version)
+        result = analysed(current, self.planner.procedure(job.procedure), merged, recordings)
+        idempotency = None if key is None else Idempotency(f"again:{key}", fingerprint([job_id, parameters]))
+        return self.stores.results.add(result.stored, result.calibrations, False, idempotency)
+
+    def run_method(self, request: AnalysisRequest, key: str | None = None) -> StoredResult:
+        """Run a method on stored recordings or calibrations. Raises `NotFound`, `DomainError`, `ValidationError`."""
+        method = self.method(request.method)
+        params = method.params.model_validate(request.parameters)
+        evidence = self._evidence(request)
+        units = {r.info.unit for r in evidence.recordings} | {
+            self.stores.results.calibration(c).unit for c in request.calibrations
+        }
+        if len(units) > 1:
+            raise UnfitRecording(f"the evidence is of several units: {', '.join(sorted(units))}")
+        serial = next(iter(units), None)
+        outcome = method.analyse(evidence, params, None if serial is None else self.stores.units.unit(serial))
+        stored = StoredResult(
+            id=new_id(),
+            kind="method",
+            name=method.name,
+            version=method.version,
+            parameters=params.model_dump(mode="json"),
+            document=outcome.model_dump(mode="json"),
+            verdict=outcome.verdict,
+            recordings=tuple((r.info.id, r.info.content_hash) for r in evidence.recordings),
+            calibrations=request.calibrations,
+            code_version=self.code_version,
+            simulated=any(r.info.simulated for r in evidence.recordings),
+            created_at=now(),
+            unit=serial,
+        )
+        idempotency = None if key is None else Idempotency(f"analyses:{key}", fingerprint(request))
+        return self.stores.results.add(stored, method.calibrations(outcome), False, idempotency)
+
+    def method(self, name: str) -> AnyMethod:
+        """Raises `NotFound`."""
+        if name not in self.methods:
+            raise NotFound("method", name)
+        return self.methods[name]
+
+    def report(self, result: StoredResult) -> Report:
+        """What a person is shown of a result."""
+        entry = self.planner.catalog.get(result.name) if result.kind == "procedure" else self.methods.get(result.name)
+        if entry is None:
+            return Report(f"{result.name} is no longer in the catalogue; the document below is as it was stored.")
+        return entry.report(entry.result.model_validate(result.document))
+
+    def _evidence(self, request: AnalysisRequest) -> Evidence:
+        recordings: list[Recording] = []
+        for recording_id in request.recordings:
+            stored = self.stores.recordings.get(recording_id)
+            if stored.state is not RecordingState.COMPLETE:
+                raise UnfitRecording(f"recording {recording_id} is {stored.state.value}: kept, but not for analysis")
+            recordings.append(self.stores.recordings.load(recording_id))
+        dated = [self.stores.results.calibration(c) for c in request.calibrations]
+        return Evidence(
+            tuple(recordings), tuple(DatedCalibration(c.id, c.made_at.isoformat(), c.triads) for c in dated)
+        )
+
+    def _register(self, unit: Unit) -> None:
+        """Remember a unit that is met for the first time."""
+        try:
+            self.stores.units.unit(unit.serial)
+        except NotFound:
+            self.stores.units.put_unit(unit)
+
+    def _new_job(self, request: JobRequest, plan: Plan) -> Job:
+        bench = plan.context.bench
+        seed = request.seed if request.seed is not None else SEEDS.getrandbits(48)
+        return Job(
+            id=new_id(),
+            procedure=plan.procedure.name,
+            procedure_version=plan.procedure.version,
+            unit=request.unit,
+            bench=bench.id,
+            state=JobState.QUEUED,
+            created_at=now(),
+            requested_parameters=request.parameters,
+            parameters=plan.parameters.model_dump(mode="json"),
+            context=CONTEXT.dump_python(plan.context, mode="json"),
+            stations=plan.stations,
+            duration_s=plan.prediction.duration_s,
+            code_version=self.code_version,
+            simulated=bench.simulated,
+            seed=seed if bench.simulated else None,
+            priority=request.priority,
+            labels=request.labels,
+        )
+
+
+def fingerprint(request: object) -> str:
+    """A digest of what a client asked, the same for the same request."""
+    return hashlib.sha256(json.dumps(request, sort_keys=True, default=vars).encode()).hexdigest()

@@ -1,0 +1,144 @@
+"""A bench while a job drives it: one thread with its own event loop, and the way to safety out of everything."""
+
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import Future
+from contextlib import aclosing
+from typing import Any, TypeVar
+
+from bench_service.jobs.job import Job
+from bench_service.jobs.store import NewRecording, RecordingStore
+from procedures.bench import Bench
+from procedures.bench.errors import BenchError, Stopped
+from procedures.bench.imu import Stream
+from procedures.core.recording import RecordingInfo, Station
+from procedures.procedure import Outcome, Parameters, Procedure
+
+T = TypeVar("T")
+
+STOP_CHECK_S = 0.2
+"""How long a move or a settle may go on before a stop that was asked for is seen [s, real time]."""
+
+
+class ShuttingDown(BaseException):
+    """The service is ending: the job is left as it is, to go on after the next start. Not an error of the job."""
+
+
+class BenchSession:
+    """Drives one job's stations in order. `record` may begin at any of them: the procedure is opened there.
+
+    `stop_wanted` is asked between blocks, and every `STOP_CHECK_S` of real time while none arrives; True raises
+    `Stopped` in whatever the procedure is doing.
+    """
+
+    def __init__(
+        self,
+        job: Job,
+        procedure: Procedure[Parameters, Outcome],
+        bench: Bench,
+        recordings: RecordingStore,
+        stop_wanted: Callable[[], bool],
+    ) -> None:
+        self.job = job
+        self._procedure = procedure
+        self._bench = bench
+        self._recordings = recordings
+        self._stop_wanted = stop_wanted
+        self._streams: AsyncIterator[Stream] | None = None
+        self._next = -1
+        self._shutting_down = threading.Event()
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(
+            target=self._loop.run_forever, name=f"bench {bench.description.id}", daemon=True
+        )
+        self._thread.start()
+
+    def record(self, index: int) -> RecordingInfo:
+        """Record one station and store it. Raises `BenchError`, `StorageFull`, `StorageFailure`, `ShuttingDown`."""
+        return self._wait(asyncio.run_coroutine_threadsafe(self._record(index), self._loop))
+
+    def shut_down(self) -> None:
+        """Ask whoever waits in `record` to leave with `ShuttingDown`; called from another thread."""
+        self._shutting_down.set()
+
+    def make_safe(self) -> None:
+        """Close the procedure, then stop the table and switch the unit off. Raises an `ExceptionGroup` of failures."""
+        asyncio.run_coroutine_threadsafe(self._make_safe(), self._loop).result()
+
+    def close(self) -> None:
+        """End the thread. The bench must be safe by now."""
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    def _wait(self, future: "Future[T]") -> T:
+        while True:
+            try:
+                return future.result(timeout=STOP_CHECK_S)
+            except TimeoutError:
+                if future.done():
+                    raise
+                if self._shutting_down.is_set():
+                    self._cancel(future)
+                    raise ShuttingDown from None
+                if self._stop_wanted():
+                    self._cancel(future)
+                    raise Stopped("stopped by an operator") from None
+
+    def _cancel(self, future: "Future[Any]") -> None:
+        """Cancel a coroutine on the bench's loop and wait until it has unwound."""
+        future.cancel()
+        asyncio.run_coroutine_threadsafe(self._unwound(), self._loop).result()
+
+    async def _unwound(self) -> None:
+        others = asyncio.all_tasks(self._loop) - {asyncio.current_task(self._loop)}
+        await asyncio.gather(*others, return_exceptions=True)
+
+    async def _record(self, index: int) -> RecordingInfo:
+        station = self.job.stations[index]
+        if self._streams is None or self._next != index:
+            await self._close_streams()
+            self._streams = self._procedure.acquire(self._bench, self.job.stations[index:])
+        stream = await anext(self._streams)
+        if stream.station != station:
+            raise BenchError(f"procedure {self._procedure.name} gave {stream.station} where station {station} was due")
+        info = await self._store(stream, station)
+        self._next = index + 1
+        return info
+
+    async def _store(self, stream: Stream, station: Station) -> RecordingInfo:
+        writer = self._recordings.open(
+            NewRecording(
+                unit=self.job.unit,
+                channels=stream.channels,
+                rate_hz=stream.rate_hz,
+                start_s=stream.start_s,
+                simulated=self.job.simulated,
+                job_id=self.job.id,
+                bench=self.job.bench,
+                station=station,
+            )
+        )
+        try:
+            async for block in stream.blocks:
+                writer.write(block)
+                if self._stop_wanted():
+                    raise Stopped("stopped by an operator")
+                await asyncio.sleep(0)  # noqa: TID251  lets a cancel land; no time passes
+            return writer.seal(self._bench.checkpoint())
+        except BaseException:
+            writer.abandon()
+            raise
+
+    async def _close_streams(self) -> None:
+        if self._streams is not None and hasattr(self._streams, "aclose"):
+            async with aclosing(self._streams):  # pyright: ignore[reportArgumentType]  an async generator
+                pass
+        self._streams = None
+
+    async def _make_safe(self) -> None:
+        try:
+            await self._close_streams()
+        finally:
+            await self._bench.make_safe()

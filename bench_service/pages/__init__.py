@@ -1,0 +1,1 @@
+"""Pages for an eye: plain HTML with plots, made from the same results that the API gives."""

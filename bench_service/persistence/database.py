@@ -1,0 +1,152 @@
+"""Connections and transactions, on SQLite and Postgres. Knows drivers and their errors; must not know any table.
+
+SQLite runs in WAL with ``synchronous=FULL``: with NORMAL a power cut may take back commits that were acknowledged, and
+a station that the job engine counts as done would have lost its samples. The price is one fsync a commit.
+Writers begin with ``BEGIN IMMEDIATE``, so two processes queue for the lock instead of failing in mid-transaction.
+"""
+
+import json
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, Engine, create_engine, event, make_url
+from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError, SQLAlchemyError
+from sqlalchemy.orm import Session
+
+from bench_service import wall_clock
+from bench_service.jobs.errors import StorageFailure, StorageFull
+
+BUSY_S = 30.0
+"""How long a writer waits for another one."""
+
+_SQLITE_FULL = frozenset({sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_SHMSIZE})
+_POSTGRES_FULL = frozenset({"53100"})
+
+
+class Conflict(StorageFailure):
+    """A row contradicts another one: a key that exists already, or a reference to nothing."""
+
+
+class Database:
+    """One database: short reading and writing transactions, with its errors in our words."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+        self._writing_engine = engine.execution_options(bench_write=True)
+
+    @contextmanager
+    def read(self) -> Iterator[Session]:
+        """A transaction that only reads."""
+        with storage_errors(), Session(self.engine) as session:
+            yield session
+
+    @contextmanager
+    def write(self) -> Iterator[Session]:
+        """A transaction that commits at the end, or leaves nothing behind. Raises `StorageFull`, `StorageFailure`."""
+        with storage_errors(), Session(self._writing_engine, expire_on_commit=False) as session, session.begin():
+            yield session
+
+    @contextmanager
+    def write_connection(self) -> Iterator[Connection]:
+        """The same for work below the tables: migrations."""
+        with storage_errors(), self._writing_engine.begin() as connection:
+            yield connection
+
+    @property
+    def is_postgres(self) -> bool:
+        return self.engine.dialect.name == "postgresql"
+
+    def dispose(self) -> None:
+        """Close all connections."""
+        self.engine.dispose()
+
+
+def connect(database_url: str) -> Database:
+    """A database by its URL; the file and folder of an SQLite one are made. Raises `StorageFailure`."""
+    with storage_errors():
+        url = make_url(database_url)
+        if url.get_backend_name() == "sqlite":
+            return Database(_sqlite_engine(database_url, url.database))
+        return Database(
+            create_engine(
+                url,
+                pool_pre_ping=True,
+                pool_size=8,
+                connect_args={"connect_timeout": 10},
+                json_serializer=partial(json.dumps, allow_nan=False),
+            )
+        )
+
+
+def _sqlite_engine(database_url: str, file: str | None) -> Engine:
+    if not file or file == ":memory:":
+        raise StorageFailure(f"{database_url!r}: a file is needed, several connections share the database")
+    try:
+        Path(file).parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageFailure(f"the folder of {file} cannot be made: {error.strerror}") from error
+    engine = create_engine(
+        database_url, connect_args={"timeout": BUSY_S}, json_serializer=partial(json.dumps, allow_nan=False)
+    )
+    event.listen(engine, "connect", _prepare_sqlite)
+    event.listen(engine, "begin", _begin_sqlite)
+    _switch_to_wal(engine)
+    return engine
+
+
+def _prepare_sqlite(connection: Any, _record: object) -> None:
+    connection.isolation_level = None  # transactions are begun by `_begin_sqlite`, not guessed by the driver
+    for pragma in ("synchronous=FULL", "foreign_keys=ON", "journal_size_limit=67108864", "cache_size=-8192"):
+        connection.execute(f"PRAGMA {pragma}")
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    writes = connection.get_execution_options().get("bench_write", False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+
+def _switch_to_wal(engine: Engine) -> None:
+    """WAL is a property of the file. Two processes that switch at once do not wait for each other, so try again."""
+    deadline = wall_clock.monotonic_s() + BUSY_S
+    while True:
+        raw = engine.raw_connection()
+        try:
+            raw.cursor().execute("PRAGMA journal_mode=WAL")
+            return
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY or wall_clock.monotonic_s() > deadline:
+                raise OperationalError("PRAGMA journal_mode=WAL", None, error) from error
+        finally:
+            raw.close()
+        wall_clock.pause(0.02)
+
+
+@contextmanager
+def storage_errors() -> Iterator[None]:
+    """Every error of the database, or of its driver, as `StorageFull`, `Conflict` or `StorageFailure`."""
+    try:
+        yield
+    except IntegrityError as error:
+        raise Conflict(f"the database refused: {error.orig}") from error
+    except DBAPIError as error:
+        if is_full(error.orig):
+            raise StorageFull("the database cannot grow: the disk is full") from error
+        raise StorageFailure(f"the database failed: {error.orig}") from error
+    except SQLAlchemyError as error:
+        raise StorageFailure(f"the database failed: {error}") from error
+    except sqlite3.Error as error:
+        raise StorageFailure(f"the database failed: {error}") from error
+    except OverflowError as error:
+        raise StorageFailure(f"a number does not fit its column: {error}") from error
+
+
+def is_full(error: BaseException | None) -> bool:
+    """Whether a driver's error says that there is no room left."""
+    if isinstance(error, sqlite3.Error):
+        code = getattr(error, "sqlite_errorcode", 0)
+        return code in _SQLITE_FULL or code & 0xFF == sqlite3.SQLITE_FULL
+    return getattr(error, "sqlstate", None) in _POSTGRES_FULL

@@ -1,0 +1,49 @@
+"""A create that is asked twice makes one thing: the client's key is kept with what it made, in the same transaction."""
+
+from collections.abc import Callable
+from datetime import datetime
+from typing import TypeVar
+
+from sqlalchemy.orm import Session
+
+from bench_service.jobs.errors import IdempotencyConflict
+from bench_service.jobs.store import Idempotency
+from bench_service.persistence.database import Conflict
+from bench_service.persistence.tables import IdempotencyKeyRow
+
+T = TypeVar("T")
+
+_RIVALS = 4
+
+
+def made_before(session: Session, idempotency: Idempotency | None, kind: str) -> str | None:
+    """The id of what the key made, or None. Raises `IdempotencyConflict` for a key of another request."""
+    if idempotency is None:
+        return None
+    row = session.get(IdempotencyKeyRow, idempotency.key)
+    if row is None:
+        return None
+    if (row.kind, row.fingerprint) != (kind, idempotency.fingerprint):
+        raise IdempotencyConflict(f"the idempotency key {idempotency.key!r} was used before with another request")
+    return row.made_id
+
+
+def remember(session: Session, idempotency: Idempotency | None, kind: str, made_id: str, at: datetime) -> None:
+    """Keep the key with what it makes; a rival with the same key waits here, and then fails with `Conflict`."""
+    if idempotency is not None:
+        session.add(
+            IdempotencyKeyRow(
+                key=idempotency.key, kind=kind, fingerprint=idempotency.fingerprint, made_id=made_id, created_at=at
+            )
+        )
+        session.flush()
+
+
+def again_after_conflict(work: Callable[[], T]) -> T:
+    """Do a transaction; where a rival won the race, do it again, now seeing what the rival made."""
+    for _ in range(_RIVALS):
+        try:
+            return work()
+        except Conflict:
+            continue
+    return work()

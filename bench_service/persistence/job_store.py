@@ -1,0 +1,188 @@
+"""Jobs and their events in SQL. Knows which change of state is legal; must not know who asks for it, or why.
+
+Every change reads the job's row under a lock (`FOR UPDATE`; on SQLite the writing transaction itself), so of two
+processes that want different ends for one job, one wins and the other is told `IllegalTransition`.
+"""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from bench_service.jobs.errors import IllegalTransition, NotFound
+from bench_service.jobs.job import FINAL, LEGAL, Event, Failure, Job, JobState
+from bench_service.jobs.store import Idempotency, Page
+from bench_service.persistence.database import Database
+from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
+from bench_service.persistence.job_rows import event_of_row, failure_document, job_of_row, row_of_job
+from bench_service.persistence.pages import page
+from bench_service.persistence.tables import EventRow, JobRow
+from procedures.core.limits import Verdict
+
+
+class SqlJobStore:
+    """`bench_service.jobs.store.JobStore`."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def add(self, job: Job, idempotency: Idempotency | None = None) -> Job:
+        def once() -> Job:
+            with self._database.write() as session:
+                known = made_before(session, idempotency, "job")
+                if known is not None:
+                    return job_of_row(_found(session, known))
+                remember(session, idempotency, "job", job.id, job.created_at)
+                session.add(row_of_job(job))
+                session.flush()
+                _append(session, job.id, "state", job.created_at, {"state": job.state.value})
+                return job
+
+        return again_after_conflict(once)
+
+    def get(self, job_id: str) -> Job:
+        with self._database.read() as session:
+            return job_of_row(_found(session, job_id))
+
+    def list(
+        self,
+        *,
+        state: JobState | None = None,
+        procedure: str | None = None,
+        unit: str | None = None,
+        after: str | None = None,
+        limit: int = 50,
+    ) -> Page[Job]:
+        query = select(JobRow)
+        if state is not None:
+            query = query.where(JobRow.state == state.value)
+        if procedure is not None:
+            query = query.where(JobRow.procedure == procedure)
+        if unit is not None:
+            query = query.where(JobRow.unit == unit)
+        with self._database.read() as session:
+            return page(session, query, JobRow.id, after, limit, job_of_row)
+
+    def counts(self) -> dict[JobState, int]:
+        query = select(JobRow.state, func.count()).group_by(JobRow.state)
+        with self._database.read() as session:
+            found = {state: number for state, number in session.execute(query)}  # noqa: C416  rows are not tuples
+        return {state: found.get(state.value, 0) for state in JobState}
+
+    def transition(
+        self,
+        job_id: str,
+        to: JobState,
+        *,
+        at: datetime,
+        verdict: Verdict | None = None,
+        failure: Failure | None = None,
+        result_id: str | None = None,
+    ) -> Job:
+        with self._database.write() as session:
+            row = _found(session, job_id, lock=True)
+            if row.state != to.value:
+                _move(session, row, to, at, verdict, failure, result_id)
+            return job_of_row(row)
+
+    def station_done(self, job_id: str, station: int, at: datetime, data: dict[str, Any]) -> Job:
+        with self._database.write() as session:
+            row = _found(session, job_id, lock=True)
+            if row.stations_done <= station:
+                row.stations_done = station + 1
+                _append(session, job_id, "station", at, {"station": station, **data})
+            return job_of_row(row)
+
+    def set_context(self, job_id: str, context: dict[str, Any]) -> Job:
+        with self._database.write() as session:
+            row = _found(session, job_id, lock=True)
+            row.context = context
+            return job_of_row(row)
+
+    def request_cancel(self, job_id: str, at: datetime) -> Job:
+        with self._database.write() as session:
+            row = _found(session, job_id, lock=True)
+            state = JobState(row.state)
+            if state in FINAL:
+                raise IllegalTransition(f"job {job_id} has ended: it is {state.value}, and cannot be cancelled")
+            if state in (JobState.QUEUED, JobState.INTERRUPTED):
+                row.cancel_requested = True
+                _move(session, row, JobState.CANCELLED, at, None, None, None)
+            elif not row.cancel_requested:
+                row.cancel_requested = True
+                _append(session, job_id, "note", at, {"cancel_requested": True})
+            return job_of_row(row)
+
+    def cancel_requested(self, job_id: str) -> bool:
+        with self._database.read() as session:
+            asked = session.scalar(select(JobRow.cancel_requested).where(JobRow.id == job_id))
+        if asked is None:
+            raise NotFound("job", job_id)
+        return asked
+
+    def note(self, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
+        with self._database.write() as session:
+            _found(session, job_id, lock=True)
+            _append(session, job_id, kind, at, data)
+
+    def events(self, job_id: str, after: int = 0, limit: int = 1000) -> tuple[Event, ...]:
+        query = (
+            select(EventRow)
+            .where(EventRow.job_id == job_id, EventRow.sequence > after)
+            .order_by(EventRow.sequence)
+            .limit(limit)
+        )
+        with self._database.read() as session:
+            events = tuple(event_of_row(row) for row in session.scalars(query))
+            if not events and session.scalar(select(JobRow.id).where(JobRow.id == job_id)) is None:
+                raise NotFound("job", job_id)
+        return events
+
+
+def _found(session: Session, job_id: str, *, lock: bool = False) -> JobRow:
+    query = select(JobRow).where(JobRow.id == job_id)
+    row = session.scalar(query.with_for_update() if lock else query)
+    if row is None:
+        raise NotFound("job", job_id)
+    return row
+
+
+def _move(
+    session: Session,
+    row: JobRow,
+    to: JobState,
+    at: datetime,
+    verdict: Verdict | None,
+    failure: Failure | None,
+    result_id: str | None,
+) -> None:
+    """Change the state of a locked row, with what goes with it, and say so in an event."""
+    before = JobState(row.state)
+    if to not in LEGAL[before]:
+        raise IllegalTransition(f"job {row.id} is {before.value}; it cannot become {to.value}")
+    if verdict is None and to in (JobState.FAILED, JobState.CANCELLED):
+        verdict = Verdict.ERROR
+    row.state = to.value
+    data: dict[str, Any] = {"state": to.value, "before": before.value}
+    if to is JobState.QUEUED:
+        row.verdict = row.failure = row.finished_at = row.result_id = None
+        row.cancel_requested = False
+    elif to is JobState.RUNNING:
+        row.started_at = row.started_at or at
+    elif to is not JobState.PAUSED:
+        row.finished_at = at
+    if verdict is not None:
+        row.verdict = data["verdict"] = verdict.value
+    if failure is not None:
+        row.failure = data["failure"] = failure_document(failure)
+    if result_id is not None:
+        row.result_id = data["result_id"] = result_id
+    _append(session, row.id, "state", at, data)
+
+
+def _append(session: Session, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
+    """Add the next event of a job whose row is locked."""
+    last = session.scalar(select(func.max(EventRow.sequence)).where(EventRow.job_id == job_id)) or 0
+    session.add(EventRow(job_id=job_id, sequence=last + 1, at=at, kind=kind, data=data))
+    session.flush()

@@ -1,0 +1,26 @@
+"""Putting the stores together: one database, four stores. Must not know who uses them."""
+
+from bench_service.jobs.store import Stores
+from bench_service.persistence.database import Database, connect
+from bench_service.persistence.job_store import SqlJobStore
+from bench_service.persistence.migration import upgrade_to_head
+from bench_service.persistence.recording_store import SqlRecordingStore
+from bench_service.persistence.result_store import SqlResultStore
+from bench_service.persistence.unit_store import SqlUnitStore
+
+
+def open_stores(database_url: str) -> tuple[Stores, Database]:
+    """All memory behind a URL, brought to the newest form; `Database.dispose` closes it. Raises `StorageFailure`."""
+    database = connect(database_url)
+    upgrade_to_head(database)
+    return stores_of(database), database
+
+
+def stores_of(database: Database) -> Stores:
+    """The stores of a database that is in the newest form."""
+    return Stores(
+        jobs=SqlJobStore(database),
+        recordings=SqlRecordingStore(database),
+        results=SqlResultStore(database),
+        units=SqlUnitStore(database),
+    )

@@ -1,0 +1,68 @@
+"""Units and benches in SQL: what is declared of them. Calibrations are the result store's: only joined here."""
+
+from typing import Any
+
+from pydantic import TypeAdapter
+from sqlalchemy import select
+
+from bench_service import wall_clock
+from bench_service.jobs.errors import NotFound
+from bench_service.persistence.database import Database
+from bench_service.persistence.result_rows import TRIADS
+from bench_service.persistence.tables import BenchRow, CalibrationRow, UnitRow
+from procedures.bench import BenchDescription
+from procedures.core.unit import Unit
+
+UNIT = TypeAdapter(Unit)
+BENCH = TypeAdapter(BenchDescription)
+
+
+class SqlUnitStore:
+    """`bench_service.jobs.store.UnitStore`."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def put_unit(self, unit: Unit) -> None:
+        document = UNIT.dump_python(unit, mode="json", exclude={"calibrations"})
+        with self._database.write() as session:
+            session.merge(UnitRow(serial=unit.serial, document=document, updated_at=wall_clock.now()))
+
+    def unit(self, serial: str) -> Unit:
+        query = _UNITS.where(UnitRow.serial == serial)
+        with self._database.read() as session:
+            row = session.execute(query).one_or_none()
+        if row is None:
+            raise NotFound("unit", serial)
+        return _unit(row[0], row[1])
+
+    def units(self) -> tuple[Unit, ...]:
+        with self._database.read() as session:
+            rows = session.execute(_UNITS.order_by(UnitRow.serial)).all()
+        return tuple(_unit(row[0], row[1]) for row in rows)
+
+    def put_bench(self, bench: BenchDescription) -> None:
+        document = BENCH.dump_python(bench, mode="json")
+        with self._database.write() as session:
+            session.merge(BenchRow(id=bench.id, document=document, updated_at=wall_clock.now()))
+
+    def bench(self, bench_id: str) -> BenchDescription:
+        with self._database.read() as session:
+            row = session.get(BenchRow, bench_id)
+        if row is None:
+            raise NotFound("bench", bench_id)
+        return BENCH.validate_python(row.document)
+
+    def benches(self) -> tuple[BenchDescription, ...]:
+        with self._database.read() as session:
+            rows = session.scalars(select(BenchRow).order_by(BenchRow.id)).all()
+        return tuple(BENCH.validate_python(row.document) for row in rows)
+
+
+_UNITS = select(UnitRow.document, CalibrationRow.triads).outerjoin(
+    CalibrationRow, (CalibrationRow.unit == UnitRow.serial) & CalibrationRow.is_current
+)
+
+
+def _unit(document: dict[str, Any], triads: list[Any] | None) -> Unit:
+    return UNIT.validate_python({**document, "calibrations": TRIADS.validate_python(triads or [])})

@@ -1,0 +1,77 @@
+"""From the recordings of a multiposition calibration to the summary of a triad: means, fit, magnitudes, cross-check."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from procedures.analysis.calibration_summary import (
+    ScalarCheck,
+    TriadSummary,
+    scalar_check,
+    triad_summary,
+)
+from procedures.analysis.multiposition import TriadFit, estimator, fit_triad
+from procedures.analysis.reference import INPUT_UNITS, reference_magnitude, reference_vectors
+from procedures.analysis.scalar import fit_scalar, nominal_start, start_from_data
+from procedures.analysis.station_means import StationMeans, station_means
+from procedures.analysis.station_noise import triad_covariance
+from procedures.analysis.table_errors import TableErrors, TableUncertainty, table_errors
+from procedures.analysis.verification import magnitudes
+from procedures.core.errors import UnfitRecording
+from procedures.core.frames import Array, TableAngles
+from procedures.core.recording import Recording
+from procedures.core.site import Site
+from procedures.core.unit import TriadRecord
+
+
+def analyse_triad(
+    recordings: Sequence[Recording],
+    triad: str,
+    site: Site,
+    uncertainty: TableUncertainty,
+    record: TriadRecord | None,
+    with_scalar: bool = False,
+) -> TriadSummary:
+    """Calibrate one triad from one recording a station. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
+    means = station_means(recordings, triad)
+    angles = station_angles(means)
+    vectors = reference_vectors(triad, angles, site)
+    table = table_errors(angles, vectors, uncertainty, of_gravity=triad == "accelerometer")
+    noise, known = noise_of_means(means, record)
+    unit = INPUT_UNITS[triad]
+    fit = fit_triad(triad, means.output_unit, unit, vectors, means.outputs, noise, table, known)
+    reference = reference_magnitude(triad, site)
+    scalar = _scalar(means, reference, noise, known, fit, table, vectors) if with_scalar else None
+    after = magnitudes(means.outputs, fit.calibration(), reference, means.labels, fit.magnitude_sd)
+    return triad_summary(fit, after, means.labels, scalar)
+
+
+def noise_of_means(means: StationMeans, record: TriadRecord | None) -> tuple[Array, bool]:
+    """Covariance of the station means, (3, n, n), and whether it comes from the unit's record.
+
+    Outputs in counts have no record in their unit. Without one the scatter of batch means within each dwell stands in.
+    """
+    known = None if means.output_unit == "count" else triad_covariance(record, means.windows)
+    if known is not None:
+        return known, True
+    floor = 1e-9 * float(np.abs(means.outputs).max())
+    sd = np.maximum(means.mean_sd, floor if floor > 0.0 else 1.0)
+    return np.array([np.diag(column**2) for column in sd.T]), False
+
+
+def station_angles(means: StationMeans) -> list[TableAngles]:
+    """Commanded table angles of every station, or `UnfitRecording` where one was taken without."""
+    for label, angles in zip(means.labels, means.angles, strict=True):
+        if angles is None:
+            raise UnfitRecording(f"recording {label} has no table angles: its orientation is not known")
+    return [angles for angles in means.angles if angles is not None]
+
+
+def _scalar(
+    means: StationMeans, reference: float, noise: Array, known: bool, fit: TriadFit, table: TableErrors, vectors: Array
+) -> ScalarCheck:
+    in_counts = means.output_unit == "count"
+    start = start_from_data(means.outputs, reference) if in_counts else nominal_start()
+    scalar = fit_scalar(f"the scalar {fit.triad} parameters", means.outputs, noise, reference, start, known)
+    gain = estimator(fit.triad, vectors, noise).gain
+    return scalar_check(fit, scalar, noise, table, gain)

@@ -1,0 +1,159 @@
+"""One recording a station in, one mean output a channel out, with what the dwell itself says of its scatter."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from procedures.core.errors import UnfitRecording
+from procedures.core.frames import Array, TableAngles
+from procedures.core.recording import INCREMENTS, TRIADS, Recording, RecordingInfo
+
+BATCHES = 20
+"""Stretches a dwell is cut into; the scatter of their means allows for noise correlated over less than a stretch."""
+
+
+@dataclass(frozen=True)
+class StationMeans:
+    """Mean nominal outputs of one triad at n stations, in the unit of its channels."""
+
+    triad: str
+    output_unit: str
+    """"rad/s", "m/s^2" or "count"."""
+    outputs: Array
+    """Shape (n, 3)."""
+    scatter_sd: Array
+    """Standard deviation of single samples within the dwell, shape (n, 3)."""
+    mean_sd: Array
+    """Standard uncertainty of the mean from the scatter of batch means within the dwell, shape (n, 3)."""
+    windows: Array
+    """[start, stop] of each dwell in bench time [s], shape (n, 2)."""
+    counts: tuple[int, ...]
+    labels: tuple[str, ...]
+    angles: tuple[TableAngles | None, ...]
+
+
+@dataclass(frozen=True)
+class _Summary:
+    mean: Array
+    scatter_sd: Array
+    mean_sd: Array
+    frozen_at: tuple[float | None, ...]
+    """The raw value of a channel that never changed, else None."""
+
+
+def station_means(recordings: Sequence[Recording], triad: str) -> StationMeans:
+    """Means of a triad's three channels, one row a recording (thesis 3.3.4: expectation over the averaging time).
+
+    Raises `MissingChannel`, and `UnfitRecording` where samples are not finite, where the channels' units differ, or
+    where a channel stands still as no live one can (see `_refuse_frozen`).
+    """
+    if not recordings:
+        raise UnfitRecording("there is no recording to take means of")
+    infos = [r.info for r in recordings]
+    unit = _output_unit(infos, triad)
+    summaries = [_summary(r, triad) for r in recordings]
+    _refuse_frozen(recordings, summaries, triad)
+    return StationMeans(
+        triad,
+        unit,
+        np.array([s.mean for s in summaries]),
+        np.array([s.scatter_sd for s in summaries]),
+        np.array([s.mean_sd for s in summaries]),
+        np.array([[i.start_s, i.start_s + i.duration_s] for i in infos]),
+        tuple(i.count for i in infos),
+        tuple(i.station.label if i.station else i.id for i in infos),
+        tuple(i.station.angles if i.station else None for i in infos),
+    )
+
+
+def _output_unit(infos: Sequence[RecordingInfo], triad: str) -> str:
+    found = {info.channels[info.column(name)].rate_unit for info in infos for name in TRIADS[triad]}
+    if len(found) != 1:
+        raise UnfitRecording(f"the {triad} channels have different units: {', '.join(sorted(found))}")
+    return found.pop()
+
+
+def _summary(recording: Recording, triad: str) -> _Summary:
+    """Sums over batches, block by block, so that a long dwell costs no memory. Values are taken from the first
+    sample on.
+    """
+    info = recording.info
+    columns = [info.column(name) for name in TRIADS[triad]]
+    if info.count < BATCHES:
+        raise UnfitRecording(f"recording {info.id}: {info.count} samples are too few, at least {BATCHES} are needed")
+    sums, squares = np.zeros((BATCHES, 3)), np.zeros((BATCHES, 3))
+    low, high, first = np.full(3, np.inf), np.full(3, -np.inf), None
+    seen = 0
+    for block in recording.blocks():
+        raw = np.asarray(block)[:, columns].astype(np.float64)
+        if not len(raw):
+            continue
+        _require_finite(raw, info, triad)
+        first = raw[0] if first is None else first
+        low, high = np.minimum(low, raw.min(axis=0)), np.maximum(high, raw.max(axis=0))
+        edges, batches = _batch_edges(seen, len(raw), info.count)
+        sums[batches] += np.add.reduceat(raw - first, edges, axis=0)
+        squares[batches] += np.add.reduceat((raw - first) ** 2, edges, axis=0)
+        seen += len(raw)
+    if first is None or seen != info.count:
+        raise UnfitRecording(f"recording {info.id}: {seen} samples where {info.count} are announced")
+    frozen = tuple(float(v) if a == b else None for v, a, b in zip(first, low, high, strict=True))
+    return _in_units(info, columns, sums, squares, first, frozen)
+
+
+def _in_units(
+    info: RecordingInfo, columns: list[int], sums: Array, squares: Array, first: Array, frozen: tuple[float | None, ...]
+) -> _Summary:
+    channels = [info.channels[c] for c in columns]
+    gain = np.array([c.scale * (info.rate_hz if c.quantity in INCREMENTS else 1.0) for c in channels])
+    offset = np.array([c.offset for c in channels])
+    sizes = np.diff(np.ceil(np.arange(BATCHES + 1) * info.count / BATCHES))[:, None]
+    mean = sums.sum(axis=0) / info.count
+    variance = np.maximum(squares.sum(axis=0) / info.count - mean**2, 0.0) * info.count / (info.count - 1)
+    batch_sd = np.std(sums / sizes, axis=0, ddof=1)
+    return _Summary(
+        (first + mean - offset) * gain,
+        np.sqrt(variance) * np.abs(gain),
+        batch_sd / np.sqrt(BATCHES) * np.abs(gain),
+        frozen,
+    )
+
+
+def _batch_edges(seen: int, length: int, count: int) -> tuple[list[int], list[int]]:
+    """Where batches begin inside a block that starts at sample `seen`, and which batches they are."""
+    starts = np.ceil(np.arange(BATCHES) * count / BATCHES).astype(int) - seen
+    current = int(np.searchsorted(starts, 0, side="right")) - 1
+    batches = [current, *(b for b in range(current + 1, BATCHES) if starts[b] < length)]
+    return [0, *(int(starts[b]) for b in batches[1:])], batches
+
+
+def _require_finite(raw: Array, info: RecordingInfo, triad: str) -> None:
+    bad = np.flatnonzero(~np.all(np.isfinite(raw), axis=0))
+    if bad.size:
+        raise UnfitRecording(f"recording {info.id}: channel {TRIADS[triad][bad[0]]} holds samples that are not numbers")
+
+
+def _refuse_frozen(recordings: Sequence[Recording], summaries: Sequence[_Summary], triad: str) -> None:
+    """A channel that never changes is dead if it says the same at every one of several stations, or stuck if it stands
+    at a whole number other than zero through one station while it moves at another.
+
+    A few zeros prove nothing: a quantised gyro across the Earth's rate gives no pulse for minutes.
+    """
+    if len(recordings) < 2:
+        return
+    for c, name in enumerate(TRIADS[triad]):
+        values = [s.frozen_at[c] for s in summaries]
+        silent = values[0] == 0.0 and len(values) < 4
+        if values[0] is not None and not silent and all(v == values[0] for v in values):
+            raise UnfitRecording(
+                f"channel {name} reads {values[0]:g} throughout all {len(values)} recordings: it is dead"
+            )
+        moving = any(v is None for v in values)
+        for recording, value in zip(recordings, values, strict=True):
+            if moving and value and _is_integer(recording):
+                raise UnfitRecording(f"recording {recording.info.id}: channel {name} is stuck at {value:g}")
+
+
+def _is_integer(recording: Recording) -> bool:
+    return any(np.issubdtype(np.asarray(block).dtype, np.integer) for block in recording.blocks())

@@ -1,0 +1,55 @@
+"""What a plan of stations will cost and what it can resolve, before anything moves."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from procedures.core.frames import Array, TableAngles
+from procedures.core.recording import Station
+
+LONGEST_DWELL_S = 86_400.0
+"""A day at one station: a dwell that would have to be longer counts as out of reach."""
+
+
+def move_time_s(degrees: float, rate_deg_s: float, acceleration_deg_s2: float) -> float:
+    """Least time to turn an axis from rest to rest: triangular or trapezoidal rate [s]."""
+    distance = abs(degrees)
+    if distance * acceleration_deg_s2 < rate_deg_s**2:
+        return 2.0 * float(np.sqrt(distance / acceleration_deg_s2))
+    return distance / rate_deg_s + rate_deg_s / acceleration_deg_s2
+
+
+def windows(stations: Sequence[Station], axes: Sequence[tuple[float, float]]) -> Array:
+    """[start, stop] of each station's record since launch [s], shape (n, 2), the table starting from its zero.
+
+    `axes` are (rate_deg_s, acceleration_deg_s2) of outer, middle, inner, which turn together.
+    """
+    now, at = 0.0, TableAngles()
+    spans: list[tuple[float, float]] = []
+    for station in stations:
+        to = station.angles or at
+        turns = (to.outer_deg - at.outer_deg, to.middle_deg - at.middle_deg, to.inner_deg - at.inner_deg)
+        now += max(move_time_s(turn, *axis) for turn, axis in zip(turns, axes, strict=True)) + station.settle_s
+        spans.append((now, now + station.record_s))
+        now, at = spans[-1][1], to
+    return np.array(spans).reshape(-1, 2)
+
+
+def dwell_for(uncertainty: Callable[[float], float], limit: float, shortest_s: float) -> float | None:
+    """Shortest dwell [s] from `shortest_s` to a day at which an uncertainty comes down to its limit; None where none
+    does.
+
+    The uncertainty is taken to fall with the dwell until slow noise stops it; found to 1 % by bisection of the
+    logarithm, after a coarse search.
+    """
+    dwells = np.geomspace(shortest_s, max(LONGEST_DWELL_S, shortest_s), 16)
+    reached = next((i for i, dwell in enumerate(dwells) if uncertainty(float(dwell)) <= limit), None)
+    if reached is None:
+        return None
+    if reached == 0:
+        return float(dwells[0])
+    low, high = float(dwells[reached - 1]), float(dwells[reached])
+    while high / low > 1.01:
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if uncertainty(middle) <= limit else (middle, high)
+    return high

@@ -1,0 +1,71 @@
+"""Where a hand-turned unit stood still, found in a recording that carries no labels.
+
+After Tedaldi, Pretto and Menegatti (ICRA 2014, imu_tk): the variance in a moving window against that of a stretch at the
+beginning which is known to be still.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from procedures.core.errors import UnfitRecording
+from procedures.core.frames import Array
+
+
+@dataclass(frozen=True)
+class StillSettings:
+    """How still a pose must be, and for how long."""
+
+    initial_s: float = 20.0
+    """The unit is known to rest for this long at the beginning."""
+    window_s: float = 1.0
+    """Length of the moving window, centred."""
+    factor: float = 6.0
+    """The threshold, as a multiple of the initial variance."""
+    shortest_s: float = 1.0
+    """Shorter stretches are no pose."""
+    margin_s: float = 0.1
+    """Cut from both ends of every stretch: the hand has hardly let go."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Samples [start, stop) of a recording that stood still."""
+
+    start: int
+    stop: int
+
+
+def still_stretches(samples: Array, rate_hz: float, settings: StillSettings | None = None) -> tuple[Stretch, ...]:
+    """Stretches of (n, 3) samples during which the unit rested, in order.
+
+    Still is where ``√Σ_c var_c² < factor·√Σ_c var_c²(initial)``, the variances over the moving window, and where the mean
+    does not creep: see `moving_variance`. Raises `UnfitRecording` where the recording is shorter than its still beginning.
+    """
+    s = settings or StillSettings()
+    width = max(2, round(s.window_s * rate_hz))
+    initial = round(s.initial_s * rate_hz)
+    if initial < 2 or len(samples) < initial + width:
+        raise UnfitRecording(
+            f"{len(samples) / rate_hz:.4g} s are too short for a still beginning of {s.initial_s:g} s and one window"
+        )
+    variance = np.linalg.norm(moving_variance(samples, width), axis=1)
+    threshold = s.factor * float(np.median(variance[width // 2 : initial - width // 2]))
+    still = np.concatenate([[False], variance <= threshold, [False]])
+    edges = np.flatnonzero(still[1:] != still[:-1]).reshape(-1, 2)
+    margin = round(s.margin_s * rate_hz)
+    cut = [Stretch(int(a) + margin, int(b) - margin) for a, b in edges]
+    return tuple(c for c in cut if c.stop - c.start >= s.shortest_s * rate_hz)
+
+
+def moving_variance(samples: Array, width: int) -> Array:
+    """Sample variance in a centred window of `width` samples, shape of `samples`; at the ends of what is there."""
+    centred = samples - samples.mean(axis=0)
+    n = len(samples)
+    sums = np.vstack([np.zeros(samples.shape[1]), np.cumsum(centred, axis=0)])
+    squares = np.vstack([np.zeros(samples.shape[1]), np.cumsum(centred**2, axis=0)])
+    low = np.maximum(np.arange(n) - width // 2, 0)
+    high = np.minimum(np.arange(n) - width // 2 + width, n)
+    count = (high - low)[:, None]
+    mean = (sums[high] - sums[low]) / count
+    return np.maximum((squares[high] - squares[low]) / count - mean**2, 0.0) * count / np.maximum(count - 1, 1)

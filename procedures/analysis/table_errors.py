@@ -1,0 +1,94 @@
+"""What the table's own flaws do to the vectors that the unit really sees, to first order.
+
+A small turn ε about an axis e somewhere in the chain of gimbals changes a fixed vector, seen in the unit's axes, by
+``δv_b = −ε·(e_b × v_b)``, with e_b that axis in the unit's axes (from ``rot_rb = P·R(ε)·S``, ``e_b = Sᵀ·e``).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from procedures.core import units
+from procedures.core.frames import Array, TableAngles, table_rotation
+
+SOURCES = ("orthogonality", "level", "azimuth", "gravity", "pointing")
+X, Y, Z = np.eye(3)
+
+
+@dataclass(frozen=True)
+class TableUncertainty:
+    """Standard uncertainties of the reference that a table and a site provide; all zero is an ideal bench."""
+
+    orthogonality_sd_arcsec: float = 0.0
+    """Of each of the two right angles, constant over a job."""
+    pointing_sd_arcsec: float = 0.0
+    """Of each axis, anew at each station."""
+    level_sd_arcsec: float = 0.0
+    """Tilt of the outer axis about each horizontal direction, constant."""
+    azimuth_sd_arcsec: float = 0.0
+    """Heading of the table's zero, constant."""
+    gravity_relative_sd: float = 0.0
+    """Of the reference magnitude; concerns the accelerometers alone."""
+
+
+@dataclass(frozen=True)
+class TableErrors:
+    """Flaws p of the table, one column each: `sensitivity` ∂v_b/∂p (n, 3, P), their standard deviations, sources."""
+
+    sensitivity: Array
+    sd: Array
+    source: tuple[str, ...]
+
+    def of_outputs(self, matrix: Array) -> Array:
+        """Change of the outputs per standard deviation of each flaw, ``K·∂v/∂p·σ_p``, shape (n, 3, P)."""
+        return np.einsum("cj,njp->ncp", matrix, self.sensitivity * self.sd)
+
+    def columns(self, source: str) -> Array:
+        """Which columns belong to a source, boolean of shape (P,)."""
+        return np.array([s == source for s in self.source], dtype=bool)
+
+
+def table_errors(
+    angles: Sequence[TableAngles], vectors: Array, uncertainty: TableUncertainty, of_gravity: bool
+) -> TableErrors:
+    """The flaws of a table at n stations for input vectors (n, 3) in the unit's axes.
+
+    Columns: orthogonality outer-middle (about x between the two) and middle-inner (about y), level about x and z of the
+    reference frame, azimuth about y, the magnitude of gravity, then pointing outer, middle, inner of station after
+    station. The order depends on the number of stations alone, so columns of two triads at the same stations mean the
+    same flaw.
+    """
+    n = len(angles)
+    sensitivity = np.zeros((n, 3, 6 + 3 * n))
+    for i, (station, v) in enumerate(zip(angles, vectors, strict=True)):
+        axes = _axes_in_unit(station)
+        sensitivity[i, :, :5] = np.cross(v, axes[:5]).T
+        sensitivity[i, :, 5] = v if of_gravity else 0.0
+        sensitivity[i, :, 6 + 3 * i : 9 + 3 * i] = np.cross(v, axes[5:]).T
+    u = uncertainty
+    angular = [u.orthogonality_sd_arcsec] * 2 + [u.level_sd_arcsec] * 2 + [u.azimuth_sd_arcsec]
+    sd = np.array([*np.array(angular) * units.ARCSEC, u.gravity_relative_sd])
+    pointing = np.full(3 * n, u.pointing_sd_arcsec * units.ARCSEC)
+    source = ("orthogonality",) * 2 + ("level",) * 2 + ("azimuth", "gravity") + ("pointing",) * (3 * n)
+    return TableErrors(sensitivity, np.concatenate([sd, pointing]), source)
+
+
+def _axes_in_unit(station: TableAngles) -> Array:
+    """Axes of the eight turns in the unit's axes, (8, 3): two orthogonalities, two levels, azimuth, three pointings."""
+    whole = table_rotation(station).inv()
+    inner = Rotation.from_euler("x", station.inner_deg, degrees=True).inv()
+    beyond_outer = inner * Rotation.from_euler("z", station.middle_deg, degrees=True).inv()
+    return np.array(
+        [
+            beyond_outer.apply(X),
+            inner.apply(Y),
+            whole.apply(X),
+            whole.apply(Z),
+            whole.apply(Y),
+            whole.apply(Y),
+            inner.apply(Z),
+            X,
+        ]
+    )

@@ -1,0 +1,276 @@
+"""Bench calibration: both triads from twelve known orientations (thesis 3.3.3-3.3.6, 5.1-5.5).
+
+The unit is set to each orientation and rests there for the averaging time; least squares over the station means
+gives bias, scale factors and cross-couplings of gyros (from the Earth's rate) and accelerometers (from gravity).
+"""
+
+from collections.abc import AsyncIterator, Sequence
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from procedures import steps
+from procedures.analysis import calibration_report as pictures
+from procedures.analysis.calibration_analysis import analyse_triad
+from procedures.analysis.calibration_plan import TriadPlan, run_to_run_requirements, triad_plan, unresolved
+from procedures.analysis.calibration_summary import TriadSummary, coefficient_unit
+from procedures.analysis.reference import INPUT_UNITS, TRIAD_NAMES, site_with
+from procedures.analysis.scalar import require_scalar_determined
+from procedures.analysis.station_plan import windows
+from procedures.analysis.table_errors import TableUncertainty
+from procedures.bench import Bench
+from procedures.bench.imu import Stream
+from procedures.core import units
+from procedures.core.errors import BadParameter, Undetermined
+from procedures.core.frames import orientation_beta_gamma, orientation_gamma_beta
+from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
+from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.recording import Recording, Station
+from procedures.core.report import Report
+from procedures.core.site import Site
+from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+
+Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
+Arcsec = Annotated[float, Field(ge=0.0, le=3600.0)]
+
+ORIENTATIONS = (
+    *((0.0, -90.0), (0.0, 90.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 0.0), (180.0, 0.0)),
+    *((-90.0, -45.0), (90.0, 45.0), (180.0, -45.0), (0.0, 45.0), (135.0, 0.0), (-45.0, 0.0)),
+)
+"""(β, γ) [deg] of thesis figure 5.4."""
+
+
+class Limits(Parameters):
+    """Requirements on the unit (thesis 4.3, 5.6) and on the calibration itself (ours)."""
+
+    gyro_bias_in_run_deg_h: float = Field(0.015, gt=0.0, le=1e6)
+    gyro_bias_run_to_run_deg_h: float = Field(0.015, gt=0.0, le=1e6)
+    gyro_scale_run_to_run_ppm: float = Field(10.0, gt=0.0, le=1e6)
+    accelerometer_bias_in_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
+    accelerometer_bias_run_to_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
+    accelerometer_scale_run_to_run_ppm: float = Field(200.0, gt=0.0, le=1e6)
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the residuals' chi-square")
+    condition_max: float = Field(100.0, ge=1.0, le=1e9, description="of the column-scaled design")
+
+
+class Params(Parameters):
+    """What to do, where, and what to hold the unit to. None takes the unit's or the bench's value."""
+
+    orientations: tuple[tuple[Angle, Angle], ...] = Field(
+        ORIENTATIONS, min_length=1, max_length=200, description="(β, γ) [deg], in order"
+    )
+    rotation_order: Literal["x_after_z", "z_after_x"] = Field(
+        "x_after_z", description="x_after_z: β about x after γ about z, the order of the thesis"
+    )
+    dwell_s: float | None = Field(None, ge=1.0, le=86_400.0, description="None: the unit's averaging time")
+    settle_s: float = Field(2.0, ge=0.0, le=3600.0)
+    latitude_deg: float | None = Field(None, ge=-90.0, le=90.0)
+    gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9)
+    azimuth_deg: float | None = Field(None, ge=-360.0, le=360.0, description="heading of the table's zero")
+    azimuth_sd_arcsec: Arcsec | None = None
+    orthogonality_sd_arcsec: Arcsec | None = Field(None, description="of each of the table's two right angles")
+    pointing_sd_arcsec: Arcsec | None = Field(None, description="of each axis, anew at each station")
+    level_sd_arcsec: Arcsec | None = Field(None, description="of the outer axis about each horizontal direction")
+    scalar_check: bool = Field(True, description="cross-check with the magnitude of gravity alone")
+    limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
+
+
+class Result(Outcome):
+    """Both triads' coefficients, how well they describe the stations, and the verdict."""
+
+    triads: tuple[TriadSummary, ...]
+
+
+def resolve(params: Params, context: Context) -> Params:
+    """Dwell from the unit; site and table accuracy from the bench."""
+    site, accuracy = context.bench.site, context.bench.accuracy
+    defaults = {
+        "dwell_s": context.unit.averaging_time_s,
+        "latitude_deg": site.latitude_deg,
+        "gravity_m_s2": site.gravity_m_s2,
+        "azimuth_deg": site.azimuth_deg,
+        "azimuth_sd_arcsec": site.azimuth_sd_arcsec,
+        "orthogonality_sd_arcsec": accuracy.orthogonality_sd_arcsec,
+        "pointing_sd_arcsec": accuracy.pointing_sd_arcsec,
+        "level_sd_arcsec": accuracy.level_sd_arcsec,
+    }
+    missing = {name: value for name, value in defaults.items() if getattr(params, name) is None}
+    return params.model_copy(update=missing)
+
+
+def schedule(params: Params) -> tuple[Station, ...]:
+    """One station an orientation, in the order given."""
+    turn = orientation_beta_gamma if params.rotation_order == "x_after_z" else orientation_gamma_beta
+    if params.dwell_s is None:
+        raise BadParameter("dwell_s", None, "resolve the parameters first: the dwell comes from the unit")
+    return tuple(
+        Station(i, f"β={beta:g} γ={gamma:g}", turn(beta, gamma), None, params.settle_s, params.dwell_s)
+        for i, (beta, gamma) in enumerate(params.orientations)
+    )
+
+
+def predict(params: Params, context: Context) -> Prediction:
+    """Duration, the uncertainty of every coefficient, and the limits out of reach. Raises `Undetermined`."""
+    params = resolve(params, context)
+    stations = schedule(params)
+    plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
+    _require_scalar(params, plans[1])
+    uncertainties = tuple(u for plan in plans for u in _predicted(plan))
+    duration_s = float(windows(stations, _axes(context))[-1, 1])
+    return Prediction(duration_s, uncertainties, _warnings(params, plans))
+
+
+async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
+    """Move, settle, record, station after station."""
+    for station in stations:
+        yield await steps.record_station(bench, station)
+
+
+def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
+    """Least squares over the station means of both triads."""
+    params = resolve(params, context)
+    site, uncertainty = _site(params, context), _uncertainty(params, context)
+    plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
+    _require_scalar(params, plans[1])
+    triads = tuple(
+        analyse_triad(
+            recordings,
+            triad,
+            site,
+            uncertainty,
+            context.unit.triad(triad),
+            params.scalar_check and triad == "accelerometer",
+        )
+        for triad in TRIAD_NAMES
+    )
+    checks = tuple(c for t in triads for c in _checks(t, params.limits))
+    return Result(checks=checks, verdict=verdict(checks), warnings=_warnings(params, plans), triads=triads)
+
+
+def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
+    """One a triad."""
+    return tuple(t.calibration for t in result.triads)
+
+
+def report(result: Result) -> Report:
+    """Coefficients, checks, residuals and magnitudes (thesis Tables 5.1-5.4, figures 5.6-5.12)."""
+    magnitudes = [t.magnitudes for t in result.triads]
+    tables = [pictures.coefficient_table(t) for t in result.triads]
+    tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
+    tables += [pictures.magnitude_table(magnitudes, "Magnitudes over the orientations")]
+    figures = [
+        f for t in result.triads for f in (*pictures.magnitude_figures(t.magnitudes), pictures.residual_figure(t))
+    ]
+    stations = [pictures.station_table(m) for m in magnitudes]
+    summary = " ".join((f"Verdict: {result.verdict.value}.", *(f"{w}." for w in result.warnings)))
+    return Report(summary, (pictures.check_table(result.checks), *tables, *figures, *stations))
+
+
+def _site(params: Params, context: Context) -> Site:
+    p = params
+    return site_with(context.bench.site, p.latitude_deg, p.gravity_m_s2, p.azimuth_deg, p.azimuth_sd_arcsec)
+
+
+def _uncertainty(params: Params, context: Context) -> TableUncertainty:
+    site = _site(params, context)
+    return TableUncertainty(
+        params.orthogonality_sd_arcsec or 0.0,
+        params.pointing_sd_arcsec or 0.0,
+        params.level_sd_arcsec or 0.0,
+        site.azimuth_sd_arcsec,
+        site.gravity_sd_m_s2 / site.gravity_m_s2,
+    )
+
+
+def _axes(context: Context) -> tuple[tuple[float, float], ...]:
+    bench = context.bench
+    return tuple((axis.rate_deg_s, axis.acceleration_deg_s2) for axis in (bench.outer, bench.middle, bench.inner))
+
+
+def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
+    site, uncertainty = _site(params, context), _uncertainty(params, context)
+    return triad_plan(triad, context.unit, schedule(params), _axes(context), site, uncertainty)
+
+
+def _require_scalar(params: Params, accelerometer: TriadPlan) -> None:
+    """Refuse a set that the cross-check cannot use, and say how to go on without it."""
+    if not params.scalar_check:
+        return
+    directions = accelerometer.vectors / np.linalg.norm(accelerometer.vectors, axis=1)[:, None]
+    try:
+        require_scalar_determined("the nine scalar accelerometer parameters", directions)
+    except Undetermined as lost:
+        way_out = "scalar_check=false calibrates linearly where the linear model is determined"
+        what = f"the nine scalar accelerometer parameters ({way_out})"
+        raise Undetermined(what, lost.lost, lost.rank, lost.wanted, lost.condition) from lost
+
+
+def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
+    noise = plan.noise_covariance()
+    if noise is None:
+        plan.estimator(np.array([np.eye(len(plan.stations))] * 3))
+        return []
+    gls = plan.estimator(noise)
+    of_noise, of_table = np.sqrt(np.diagonal(gls.noise_covariance)), np.sqrt(np.diagonal(plan.share(gls).covariance))
+    unit = INPUT_UNITS[plan.triad]
+    return [
+        PredictedUncertainty(f"{plan.triad}.{name}", coefficient_unit(name, unit, unit), float(np.hypot(n, t)), n, t)
+        for name, n, t in zip(COEFFICIENT_NAMES, of_noise.tolist(), of_table.tolist(), strict=True)
+    ]
+
+
+def _warnings(params: Params, plans: Sequence[TriadPlan]) -> tuple[str, ...]:
+    """Limits that the plan cannot resolve, and triads whose noise is not known."""
+    limits = params.limits
+    requirements = run_to_run_requirements(
+        limits.gyro_bias_run_to_run_deg_h,
+        limits.gyro_scale_run_to_run_ppm,
+        limits.accelerometer_bias_run_to_run_m_s2,
+        limits.accelerometer_scale_run_to_run_ppm,
+    )
+    by_triad = {plan.triad: plan for plan in plans}
+    found = [unresolved(by_triad[r.triad], r) for r in requirements]
+    unknown = [
+        f"the noise of the {p.triad} triad is not known: its uncertainties come from the scatter within the dwells and "
+        "the residuals, which do not show noise slower than the job"
+        for p in plans
+        if p.noise_covariance() is None
+    ]
+    return tuple(w for w in (*found, *unknown) if w is not None)
+
+
+def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
+    triad, m = t.calibration.triad, t.magnitudes
+    unit, size = units.DISPLAY[m.unit]
+    gyro = triad == "gyro"
+    in_run = limits.gyro_bias_in_run_deg_h if gyro else limits.accelerometer_bias_in_run_m_s2
+    checks = [
+        check(
+            f"{triad} bias in run, δ/√3",
+            m.per_axis / size,
+            Limit(unit, maximum=in_run, source="thesis 4.3, 5.1"),
+            m.per_axis_sd / size,
+        ),
+        check(f"{triad} condition number", t.condition, Limit("1", maximum=limits.condition_max)),
+    ]
+    if t.p_value is not None:
+        limit = Limit("1", minimum=limits.residual_p_value_min)
+        checks.append(check(f"{triad} residuals, p-value of chi-square", t.p_value, limit))
+    return checks
+
+
+PROCEDURE = Procedure(
+    "calibration_12_orientations",
+    "Calibration in twelve orientations",
+    "1.0.0",
+    Params,
+    Result,
+    resolve,
+    schedule,
+    predict,
+    acquire,
+    analyse,
+    report,
+    calibrations,
+)

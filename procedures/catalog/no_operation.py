@@ -1,0 +1,50 @@
+"""No operation: no station, nothing moves, always passes. Measures the service itself."""
+
+from collections.abc import AsyncIterator, Sequence
+
+from procedures.bench import Bench
+from procedures.bench.imu import Stream
+from procedures.core.limits import Verdict
+from procedures.core.recording import Recording, Station
+from procedures.core.report import Report
+from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
+
+
+class Params(Parameters):
+    """Nothing to choose."""
+
+
+class Result(Outcome):
+    """Nothing was measured."""
+
+
+def resolve(params: Params, context: Context) -> Params:
+    return params
+
+
+def schedule(params: Params) -> tuple[Station, ...]:
+    return ()
+
+
+def predict(params: Params, context: Context) -> Prediction:
+    return Prediction()
+
+
+async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
+    """Records nothing, whatever it is given."""
+    for _ in ():
+        yield _
+
+
+def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
+    """A pass by definition: the one procedure that judges nothing and still passes."""
+    return Result(verdict=Verdict.PASS)
+
+
+def report(result: Result) -> Report:
+    return Report("Nothing was done.")
+
+
+PROCEDURE = Procedure(
+    "no_operation", "No operation", "1.0.0", Params, Result, resolve, schedule, predict, acquire, analyse, report
+)

@@ -1,0 +1,210 @@
+"""Verification of a calibration: magnitudes in nine orientations that did not make it (thesis 3.3.2, 5.1, 5.4, 5.5).
+
+The corrected magnitude of gravity and of the Earth's rate is compared with the site's; the table's angles need not be
+true for that. What should be seen follows from the calibration's covariance, the unit's stability and the noise of the
+dwell.
+"""
+
+from collections.abc import AsyncIterator, Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from procedures import steps
+from procedures.analysis import calibration_report as pictures
+from procedures.analysis.calibration_plan import TriadPlan, triad_plan
+from procedures.analysis.reference import TRIAD_NAMES, site_with
+from procedures.analysis.station_plan import windows
+from procedures.analysis.table_errors import TableUncertainty
+from procedures.analysis.verification import predicted_sd
+from procedures.analysis.verification_analysis import (
+    TriadVerification,
+    calibration_of,
+    planned_covariance,
+    verify_triad,
+)
+from procedures.bench import Bench
+from procedures.bench.imu import Stream
+from procedures.core import units
+from procedures.core.errors import BadParameter
+from procedures.core.frames import TableAngles
+from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.recording import Recording, Station
+from procedures.core.report import Report
+from procedures.core.site import Site
+from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+
+Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
+
+ORIENTATIONS = tuple((40.0 * i, 10.0 * i, 20.0 * i) for i in range(9))
+"""(inner, middle, outer) [deg], steps of 40°, 10° and 20° (thesis 3.3.2)."""
+
+
+class Limits(Parameters):
+    """Requirements on the unit (thesis 4.3, 5.6) and on its agreement with the prediction (ours)."""
+
+    gyro_bias_in_run_deg_h: float = Field(0.015, gt=0.0, le=1e6)
+    accelerometer_bias_in_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
+    prediction_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the errors' chi-square")
+
+
+class Params(Parameters):
+    """Where to look and what to hold the unit to. None takes the unit's or the bench's value."""
+
+    orientations: tuple[tuple[Angle, Angle, Angle], ...] = Field(
+        ORIENTATIONS, min_length=2, max_length=200, description="(inner, middle, outer) [deg], in order"
+    )
+    dwell_s: float | None = Field(None, ge=1.0, le=86_400.0, description="None: the unit's averaging time")
+    settle_s: float = Field(2.0, ge=0.0, le=3600.0)
+    latitude_deg: float | None = Field(None, ge=-90.0, le=90.0)
+    gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9)
+    azimuth_deg: float | None = Field(None, ge=-360.0, le=360.0, description="heading of the table's zero")
+    azimuth_sd_arcsec: float | None = Field(
+        None, ge=0.0, le=3600.0, description="kept with the result; no effect on it"
+    )
+    limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
+
+
+class Result(Outcome):
+    """Both triads' magnitudes before and after correction, and whether they are as predicted."""
+
+    triads: tuple[TriadVerification, ...]
+
+
+def resolve(params: Params, context: Context) -> Params:
+    """Dwell from the unit; site from the bench."""
+    site = context.bench.site
+    defaults = {
+        "dwell_s": context.unit.averaging_time_s,
+        "latitude_deg": site.latitude_deg,
+        "gravity_m_s2": site.gravity_m_s2,
+        "azimuth_deg": site.azimuth_deg,
+        "azimuth_sd_arcsec": site.azimuth_sd_arcsec,
+    }
+    missing = {name: value for name, value in defaults.items() if getattr(params, name) is None}
+    return params.model_copy(update=missing)
+
+
+def schedule(params: Params) -> tuple[Station, ...]:
+    """One station an orientation, in the order given."""
+    if params.dwell_s is None:
+        raise BadParameter("dwell_s", None, "resolve the parameters first: the dwell comes from the unit")
+    return tuple(
+        Station(
+            i,
+            f"inner={inner:g} middle={middle:g} outer={outer:g}",
+            TableAngles(outer, middle, inner),
+            None,
+            params.settle_s,
+            params.dwell_s,
+        )
+        for i, (inner, middle, outer) in enumerate(params.orientations)
+    )
+
+
+def predict(params: Params, context: Context) -> Prediction:
+    """Duration and the standard deviation of the magnitudes to expect. Refuses a unit without a calibration."""
+    params = resolve(params, context)
+    plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
+    uncertainties = tuple(u for plan in plans for u in _predicted(plan))
+    duration_s = float(windows(schedule(params), _axes(context))[-1, 1])
+    return Prediction(duration_s, uncertainties, _warnings(plans))
+
+
+async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
+    """Move, settle, record, station after station."""
+    for station in stations:
+        yield await steps.record_station(bench, station)
+
+
+def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
+    """Magnitudes of the corrected station means of both triads."""
+    params = resolve(params, context)
+    site = _site(params, context)
+    triads = tuple(verify_triad(recordings, triad, site, context.unit) for triad in TRIAD_NAMES)
+    checks = tuple(c for t in triads for c in _checks(t, params.limits))
+    plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
+    return Result(checks=checks, verdict=verdict(checks), warnings=_warnings(plans), triads=triads)
+
+
+def report(result: Result) -> Report:
+    """Checks, Tables 5.3 and 5.4, figures 5.6-5.12 of the thesis."""
+    magnitudes = [t.magnitudes for t in result.triads]
+    figures = [figure for m in magnitudes for figure in pictures.magnitude_figures(m)]
+    summary = " ".join((f"Verdict: {result.verdict.value}.", *(f"{w}." for w in result.warnings)))
+    tables = (pictures.check_table(result.checks), pictures.magnitude_table(magnitudes, "Verification"))
+    return Report(summary, (*tables, *figures, *(pictures.station_table(m) for m in magnitudes)))
+
+
+def _site(params: Params, context: Context) -> Site:
+    p = params
+    return site_with(context.bench.site, p.latitude_deg, p.gravity_m_s2, p.azimuth_deg, p.azimuth_sd_arcsec)
+
+
+def _axes(context: Context) -> tuple[tuple[float, float], ...]:
+    bench = context.bench
+    return tuple((axis.rate_deg_s, axis.acceleration_deg_s2) for axis in (bench.outer, bench.middle, bench.inner))
+
+
+def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
+    """Magnitudes do not see where the table really stands, so its uncertainty stays out."""
+    calibration_of(context.unit, triad)
+    site = _site(params, context)
+    return triad_plan(triad, context.unit, schedule(params), _axes(context), site, TableUncertainty())
+
+
+def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
+    covariance = planned_covariance(plan)
+    if covariance is None:
+        return []
+    unit = calibration_of(plan.unit, plan.triad).input_unit
+    errors = np.sqrt(np.diagonal(covariance)).tolist()
+    names = [f"{plan.triad}.magnitude {s.label}" for s in plan.stations]
+    spread = predicted_sd(covariance)
+    return [
+        PredictedUncertainty(f"{plan.triad}.sd after correction", unit, spread, spread),
+        *(PredictedUncertainty(name, unit, error, error) for name, error in zip(names, errors, strict=True)),
+    ]
+
+
+def _warnings(plans: Sequence[TriadPlan]) -> tuple[str, ...]:
+    found: list[str] = []
+    for plan in plans:
+        record = plan.unit.triad(plan.triad)
+        if plan.noise_covariance() is None or record is None:
+            found.append(f"the noise of the {plan.triad} triad is not known: its errors are not judged by a prediction")
+        elif record.bias_run_to_run_sd == 0.0:
+            found.append(
+                f"nothing is known of how the {plan.triad} biases change from launch to launch: the prediction holds "
+                "only for the launch of the calibration"
+            )
+    return tuple(found)
+
+
+def _checks(t: TriadVerification, limits: Limits) -> list[Check]:
+    m = t.magnitudes
+    unit, size = units.DISPLAY[m.unit]
+    maximum = limits.gyro_bias_in_run_deg_h if m.triad == "gyro" else limits.accelerometer_bias_in_run_m_s2
+    limit = Limit(unit, maximum=maximum, source="thesis 4.3, 5.1")
+    checks = [check(f"{m.triad} bias in run, δ/√3", m.per_axis / size, limit, m.per_axis_sd / size)]
+    if t.p_value is not None:
+        agreement = Limit("1", minimum=limits.prediction_p_value_min)
+        checks.append(check(f"{m.triad} errors as predicted, p-value of chi-square", t.p_value, agreement))
+    return checks
+
+
+PROCEDURE = Procedure(
+    "verification_9_orientations",
+    "Verification in nine orientations",
+    "1.0.0",
+    Params,
+    Result,
+    resolve,
+    schedule,
+    predict,
+    acquire,
+    analyse,
+    report,
+    uses_calibration=True,
+)

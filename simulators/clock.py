@@ -1,0 +1,87 @@
+"""Simulated time: whole sample intervals ("ticks"), and sleeping is what moves the world.
+
+Knows how long a tick is and whom to call when ticks pass; does not know what they do with them.
+"""
+
+from collections.abc import Awaitable, Callable, Generator
+from dataclasses import dataclass
+from math import ceil
+from types import coroutine
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.bench.errors import OutOfRange
+
+SLICE_S = 10.0
+"""At most this much bench time passes between two points where a cancellation can land."""
+REAL_TIME_SLICE_S = 0.1
+"""The same in real seconds, where the clock is asked to keep pace with real time."""
+
+Wait = Callable[[float], Awaitable[None]]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What the unit went through during some ticks, in its own axes.
+
+    Increments per tick, shape (ticks, 3), or (1, 3) where every tick is alike: `angle_rad` the integral of inertial
+    angular rate, `velocity_m_s` the integral of specific force.
+    """
+
+    ticks: int
+    angle_rad: NDArray[np.float64]
+    velocity_m_s: NDArray[np.float64]
+
+
+@coroutine
+def _let_others_run() -> Generator[None, None, None]:
+    """Suspend for no time: whoever drives the coroutine may cancel it here."""
+    yield
+
+
+class SimClock:
+    """Implements `procedures.bench.clock.Clock`. `connect` tells it what to move."""
+
+    def __init__(self, rate_hz: float, real_time_factor: float | None = None, wait: Wait | None = None) -> None:
+        """`real_time_factor`: bench seconds per real second, None: as fast as it can; `wait` waits real seconds."""
+        if real_time_factor is not None and (not 0.0 < real_time_factor < float("inf") or wait is None):
+            raise ValueError(f"real_time_factor = {real_time_factor!r} must be above zero and comes with a `wait`")
+        self.rate_hz = rate_hz
+        self.ticks = 0
+        self._factor = real_time_factor
+        self._wait = wait
+        self._advance: Callable[[int], None] = lambda _ticks: None
+
+    def connect(self, advance: Callable[[int], None]) -> None:
+        """`advance(ticks)` is called for every slice of time, before `now_s` shows it."""
+        self._advance = advance
+
+    def now_s(self) -> float:
+        """Bench time [s]."""
+        return self.ticks / self.rate_hz
+
+    def ticks_in(self, seconds: float) -> int:
+        """Whole ticks that last at least so long (up to a millionth of a tick). Raises `OutOfRange`."""
+        if not 0.0 <= seconds < float("inf"):
+            raise OutOfRange(f"seconds = {seconds!r} must be finite and not negative")
+        return ceil(seconds * self.rate_hz - 1e-6)
+
+    async def sleep(self, seconds: float) -> None:
+        """Let the world go on for so long, in slices."""
+        await self.pass_ticks(self.ticks_in(seconds))
+
+    async def pass_ticks(self, ticks: int) -> None:
+        """Let the world go on for whole ticks; between slices a cancellation can land."""
+        longest = SLICE_S if self._factor is None else min(SLICE_S, REAL_TIME_SLICE_S * self._factor)
+        longest_ticks = max(1, int(longest * self.rate_hz))
+        await _let_others_run()
+        while ticks > 0:
+            step = min(ticks, longest_ticks)
+            self._advance(step)
+            self.ticks += step
+            ticks -= step
+            if self._factor is not None and self._wait is not None:
+                await self._wait(step / self.rate_hz / self._factor)
+            else:
+                await _let_others_run()

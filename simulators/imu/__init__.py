@@ -1,0 +1,1 @@
+"""The simulated unit: from true motion to integer counts."""

@@ -1,0 +1,150 @@
+"""The unit's data link on a simulated bench: implements `procedures.bench.imu.Imu`."""
+
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.bench.errors import DeviceFault, NotPowered, OutOfRange
+from procedures.bench.imu import Stream
+from procedures.core.recording import ACCELEROMETER, GYRO, Channel, Quantity, Station
+from simulators.clock import Motion, SimClock
+from simulators.imu.sensor import TRIADS, TriadSensor
+from simulators.truth import UnitTruth
+
+BLOCK_S = 10.0
+
+Counts = NDArray[np.int32]
+
+
+def unit_channels(truth: UnitTruth) -> tuple[Channel, ...]:
+    """Six channels of increments, gyros first; the nominal scale of each is the weight of its pulse."""
+    gyros = zip(GYRO, truth.gyro.pulse, strict=True)
+    accelerometers = zip(ACCELEROMETER, truth.accelerometer.pulse, strict=True)
+    return (
+        *(Channel(name, Quantity.ANGLE_INCREMENT, "rad", scale) for name, scale in gyros),
+        *(Channel(name, Quantity.VELOCITY_INCREMENT, "m/s", scale) for name, scale in accelerometers),
+    )
+
+
+@dataclass
+class _Tape:
+    """Counts that a recording wants and has not handed on yet."""
+
+    blocks: list[Counts] = field(default_factory=list)
+    held: int = 0
+    broken: bool = False
+
+    def put(self, counts: Counts) -> None:
+        self.blocks.append(counts)
+        self.held += len(counts)
+
+    def take(self, count: int) -> Counts:
+        whole = np.concatenate(self.blocks) if len(self.blocks) != 1 else self.blocks[0]
+        self.blocks = [whole[count:]] if len(whole) > count else []
+        self.held = len(whole) - count
+        return whole[:count]
+
+
+class SimImu:
+    """A unit that counts from power-up to power-down, whether or not anybody reads it."""
+
+    def __init__(self, truth: UnitTruth, seed: int, clock: SimClock, launch: Callable[[], int]) -> None:
+        """`launch` says which power-up this is, 0 while the unit is off."""
+        self.truth = truth
+        self._seed = seed
+        self._clock = clock
+        self._launch = launch
+        self._channels = unit_channels(truth)
+        self._sensors: dict[str, TriadSensor] = {}
+        self._ticks = 0
+        self._tapes: list[_Tape] = []
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return self._channels
+
+    @property
+    def rate_hz(self) -> float:
+        return self._clock.rate_hz
+
+    def power_up(self, launch: int) -> None:
+        """Begin a launch: new run-to-run coefficients, noise from time zero."""
+        self._ticks = 0
+        self._sensors = {
+            name: TriadSensor(self.truth.triad(name), self.rate_hz, (self._seed, launch, name)) for name in TRIADS
+        }
+
+    def power_down(self) -> None:
+        """End of the launch; recordings in progress find the unit gone."""
+        self._sensors = {}
+        for tape in self._tapes:
+            tape.broken = True
+
+    def feel(self, motion: Motion) -> None:
+        """Go through some motion; nothing happens while off."""
+        if not self._sensors:
+            return
+        gyro = self._sensors["gyro"].feel(self._ticks, motion.ticks, motion.angle_rad)
+        accelerometer = self._sensors["accelerometer"].feel(self._ticks, motion.ticks, motion.velocity_m_s)
+        self._ticks += motion.ticks
+        if self._tapes:
+            counts = np.empty((motion.ticks, 6), dtype=np.int32)
+            counts[:, :3], counts[:, 3:] = gyro.T, accelerometer.T
+            for tape in self._tapes:
+                tape.put(counts)
+
+    def record(self, duration_s: float, station: Station | None = None) -> Stream:
+        """Begin a recording now; see the port. Time passes while its blocks are read."""
+        self._need_power()
+        if not 0.0 <= duration_s < float("inf"):
+            raise OutOfRange(f"duration_s = {duration_s!r} must be finite and not negative")
+        samples = round(duration_s * self.rate_hz)
+        start = self._clock.ticks
+        return Stream(self._channels, self.rate_hz, start / self.rate_hz, self._blocks(samples, start), station)
+
+    async def _blocks(self, samples: int, start: int) -> AsyncIterator[Counts]:
+        if self._clock.ticks != start:
+            raise DeviceFault("samples were lost: time passed between the recording's beginning and its first reading")
+        tape = _Tape()
+        self._tapes.append(tape)
+        try:
+            while samples > 0:
+                block = min(samples, max(1, int(BLOCK_S * self.rate_hz)))
+                if tape.held < block:
+                    self._need_power(tape)
+                    await self._clock.pass_ticks(block - tape.held)
+                if tape.held < block:
+                    self._need_power(tape)
+                    raise DeviceFault("the unit stopped sending")
+                samples -= block
+                yield tape.take(block)
+        finally:
+            self._tapes.remove(tape)
+
+    def _need_power(self, tape: _Tape | None = None) -> None:
+        if self._launch() == 0 or (tape is not None and tape.broken):
+            raise NotPowered("the unit is switched off")
+
+    def sensor(self, triad: str) -> TriadSensor:
+        """A triad of the present launch. Raises `NotPowered`."""
+        self._need_power()
+        return self._sensors[triad]
+
+    def checkpoint(self) -> dict[str, Any]:
+        """State to resume from: time since power-up, counters' phases, slow noise; empty while off."""
+        triads = {n: {"phase": s.counter.phase, "noise": s.noise.checkpoint()} for n, s in self._sensors.items()}
+        return {"ticks": self._ticks, "triads": triads}
+
+    def resume(self, launch: int, state: dict[str, Any]) -> None:
+        """Go on with a launch from a checkpoint; `launch` 0 is an unpowered unit."""
+        if launch == 0:
+            return
+        self.power_up(launch)
+        self._ticks = int(state["ticks"])
+        for name, sensor in self._sensors.items():
+            triad = state["triads"][name]
+            sensor.noise.resume(triad["noise"])
+            sensor.counter.resume(triad["phase"])

@@ -1,0 +1,31 @@
+"""What is true of the simulated world: values, the files they live in, and chance keyed by seed."""
+
+from simulators.truth.chance import keyed_generator, random_table_truth, random_unit_truth
+from simulators.truth.files import (
+    default_bench,
+    default_unit,
+    load_bench,
+    load_unit,
+    save_bench,
+    save_unit,
+)
+from simulators.truth.values import Array, BenchTruth, SiteTruth, TableTruth, TriadTruth, TruthError, UnitTruth
+
+__all__ = [
+    "Array",
+    "BenchTruth",
+    "SiteTruth",
+    "TableTruth",
+    "TriadTruth",
+    "TruthError",
+    "UnitTruth",
+    "default_bench",
+    "default_unit",
+    "keyed_generator",
+    "load_bench",
+    "load_unit",
+    "random_table_truth",
+    "random_unit_truth",
+    "save_bench",
+    "save_unit",
+]

@@ -1,0 +1,192 @@
+"""The truth of one simulated bench and one simulated unit, as frozen values.
+
+Knows numbers and their allowed ranges; knows neither files nor motion.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.bench.description import BenchDescription
+from procedures.core import units
+
+Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+class TruthError(ValueError):
+    """A truth is not allowed: names the field, its value and the allowed range."""
+
+
+def within(where: str, value: object, low: float, high: float) -> float:
+    """A number inside low … high, or `TruthError`. NaN and non-numbers are outside everything."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+        raise TruthError(f"{where} = {value!r} must be a number within {low:g} … {high:g}")
+    return float(value)
+
+
+def check_fields(where: str, record: object, ranges: Mapping[str, tuple[float, float]]) -> None:
+    """Each named field of a record inside its range."""
+    for name, (low, high) in ranges.items():
+        within(f"{where}.{name}", getattr(record, name), low, high)
+
+
+@dataclass(frozen=True)
+class SiteTruth:
+    """What gravity and the Earth's rotation really are on the bench."""
+
+    latitude_deg: float
+    gravity_m_s2: float
+    earth_rate_rad_s: float = units.EARTH_RATE
+
+    def __post_init__(self) -> None:
+        ranges = {
+            "latitude_deg": (-90.0, 90.0),
+            "gravity_m_s2": (0.0, 20.0),
+            "earth_rate_rad_s": (0.0, 1e-3),
+        }
+        check_fields("site_truth", self, ranges)
+
+
+@dataclass(frozen=True)
+class TableTruth:
+    """How the table differs from an ideal one. All angles in arcsec; all zero is the ideal table.
+
+    With ``R_a(φ)`` a right-hand turn about axis a, ``W`` the wobble of an axis and B the base, the attitude is
+    ``rot_enu_b = B · W_o·R_y(outer) · R_x(ε_om) · W_m·R_z(middle) · R_y(ε_mi) · W_i·R_x(inner)``.
+    """
+
+    outer_middle_nonorthogonality_arcsec: float = 0.0
+    """ε_om: the middle axis z is turned by it about x; its angle with the outer axis is 90° + ε_om."""
+    middle_inner_nonorthogonality_arcsec: float = 0.0
+    """ε_mi: the inner axis x is turned by it about y; its angle with the middle axis is 90° + ε_mi."""
+    base_tilt_north_arcsec: float = 0.0
+    """The outer axis leans by it to the north."""
+    base_tilt_east_arcsec: float = 0.0
+    """The outer axis leans by it to the east."""
+    azimuth_error_arcsec: float = 0.0
+    """True heading of x at zero angles minus the declared azimuth, clockwise from north."""
+    pointing_sd_arcsec: float = 0.0
+    """Each axis stops this far (standard deviation) from what its encoder says, anew at each move."""
+    outer_wobble_arcsec: float = 0.0
+    """Half-angle of the cone that the axis describes, once a turn."""
+    middle_wobble_arcsec: float = 0.0
+    inner_wobble_arcsec: float = 0.0
+
+    def __post_init__(self) -> None:
+        signed = (-36000.0, 36000.0)
+        ranges = {
+            "outer_middle_nonorthogonality_arcsec": signed,
+            "middle_inner_nonorthogonality_arcsec": signed,
+            "base_tilt_north_arcsec": signed,
+            "base_tilt_east_arcsec": signed,
+            "azimuth_error_arcsec": signed,
+            "pointing_sd_arcsec": (0.0, 3600.0),
+            "outer_wobble_arcsec": (0.0, 3600.0),
+            "middle_wobble_arcsec": (0.0, 3600.0),
+            "inner_wobble_arcsec": (0.0, 3600.0),
+        }
+        check_fields("table_truth", self, ranges)
+
+
+@dataclass(frozen=True)
+class BenchTruth:
+    """A bench: what is true of its site and table, and what its laboratory declares of them."""
+
+    site: SiteTruth
+    table: TableTruth
+    description: BenchDescription
+
+
+@dataclass(frozen=True)
+class TriadTruth:
+    """Three channels x, y, z of one kind. SI: *rate* is angular rate [rad/s] or specific force [m/s²].
+
+    With ``a = K·v``: ``U_i = b_i + a_i + ½·asymmetry_i·|a_i| + nonlinearity_i·a_i²/reference`` (both relative).
+    Noise after IEEE Std 952; `startup` is a bias that decays as ``amplitude·exp(−t/time)`` from power-up.
+    """
+
+    bias: Vector
+    """b [rate]."""
+    matrix: Matrix
+    """K, output per input, dimensionless."""
+    quantization: Vector
+    """Q [rate·s]; the counter's pulse is Q·√12."""
+    random_walk: Vector = ZERO
+    """N [rate·√s]."""
+    bias_instability: Vector = ZERO
+    """B [rate]."""
+    rate_random_walk: Vector = ZERO
+    """K_rrw [rate/√s]."""
+    rate_ramp: Vector = ZERO
+    """R [rate/s]."""
+    startup: Vector = ZERO
+    """Amplitude of the start-up transient [rate]."""
+    startup_time_s: float = 200.0
+    scale_factor_asymmetry_ppm: Vector = ZERO
+    """Scale factor for positive less that for negative input."""
+    scale_factor_nonlinearity_ppm: Vector = ZERO
+    """Quadratic term: relative change of the output at the reference input."""
+    nonlinearity_reference: float = units.STANDARD_GRAVITY
+    """The reference input [rate]."""
+    bias_run_to_run_sd: float = 0.0
+    """[rate]."""
+    scale_factor_run_to_run_sd_ppm: float = 0.0
+    flicker_band_s: tuple[float, float] = (0.5, 1.0e5)
+    """Shortest and longest relaxation time of the bias instability."""
+
+    def __post_init__(self) -> None:
+        signed = ("bias", "rate_ramp", "startup", "scale_factor_asymmetry_ppm", "scale_factor_nonlinearity_ppm")
+        positive = ("quantization", "random_walk", "bias_instability", "rate_random_walk")
+        for name in signed + positive:
+            value = getattr(self, name)
+            if len(value) != 3 or not all(isfinite(v) for v in value):
+                raise TruthError(f"{name} = {value!r} must be three finite numbers")
+            if name in positive and min(value) < 0.0:
+                raise TruthError(f"{name} = {value!r} must not be negative")
+        if min(self.quantization) <= 0.0:
+            raise TruthError(f"quantization = {self.quantization!r} must be above zero: the counter has pulses")
+        matrix = np.array(self.matrix, dtype=np.float64)
+        if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)) or abs(np.linalg.det(matrix)) < 1e-6:
+            raise TruthError(f"matrix = {self.matrix!r} must be 3×3, finite and invertible")
+        low, high = self.flicker_band_s
+        if not 0.0 < low < high < float("inf"):
+            raise TruthError(f"flicker_band_s = {self.flicker_band_s!r} must be 0 < shortest < longest")
+        limits = {
+            "startup_time_s": (1e-3, 1e7),
+            "nonlinearity_reference": (1e-12, 1e6),
+            "bias_run_to_run_sd": (0.0, 1e6),
+            "scale_factor_run_to_run_sd_ppm": (0.0, 1e5),
+        }
+        check_fields("triad", self, limits)
+
+    @property
+    def pulse(self) -> Vector:
+        """Weight of one count [rate·s]: Q·√12 for each channel."""
+        x, y, z = (q * sqrt(12.0) for q in self.quantization)
+        return x, y, z
+
+
+@dataclass(frozen=True)
+class UnitTruth:
+    """One unit: who it is, how often it sends, and its two triads (the nominal scale of a channel is its pulse)."""
+
+    serial: str
+    gyro: TriadTruth
+    accelerometer: TriadTruth
+    sample_rate_hz: float = 400.0
+
+    def __post_init__(self) -> None:
+        within("unit.sample_rate_hz", self.sample_rate_hz, 1.0, 4000.0)
+        if not self.serial:
+            raise TruthError("unit.serial must not be empty")
+
+    def triad(self, name: str) -> TriadTruth:
+        """A triad by name, "gyro" or "accelerometer"."""
+        return {"gyro": self.gyro, "accelerometer": self.accelerometer}[name]

@@ -1,0 +1,181 @@
+"""A three-axis table on a simulated bench: implements `procedures.bench.turntable.Turntable`.
+
+Time moves the table (`advance`, called by the clock); its verbs only give it profiles and let time pass. At rest it is
+locked: not stepped, its attitude constant. Angles are wrapped by whole turns at standstill, the turns kept aside.
+"""
+
+from math import ceil
+from typing import Any
+
+import numpy as np
+
+from procedures.bench.description import BenchDescription
+from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
+from procedures.core import units
+from procedures.core.frames import TableAngles
+from simulators.clock import Motion, SimClock
+from simulators.truth import Array, BenchTruth, TableTruth, keyed_generator
+from simulators.turntable.kinematics import at_rest, attitude, path_increments
+from simulators.turntable.plant import Plant
+from simulators.turntable.profile import Profile, Quintic, RampDown, deceleration_rad_s2, move_ticks
+
+SLICE_S = 0.25
+SETTLE_SLICE_S = 0.05
+SETTLED_ERROR_RAD = 1e-3 * units.ARCSEC
+SETTLED_RATE_RAD_S = 1e-6 * units.DEG_PER_HOUR
+SETTLE_S = 0.5
+"""A move is not called settled before so long after its profile ends."""
+SETTLE_TIMEOUT_S = 10.0
+
+
+def pointing_error_rad(table: TableTruth, seed: int, move: int) -> Array:
+    """True angle minus encoder of each axis after move number `move`, (3,); the table begins without, at move 0."""
+    if move == 0:
+        return np.zeros(3)
+    draw = keyed_generator(seed, "pointing", block=move).standard_normal(3)
+    return table.pointing_sd_arcsec * units.ARCSEC * draw
+
+
+class SimTurntable:
+    """Limits come before demands; a fault is kept, never reset by itself."""
+
+    def __init__(self, truth: BenchTruth, seed: int, clock: SimClock) -> None:
+        self._truth = truth
+        self._seed = seed
+        self._clock = clock
+        description: BenchDescription = truth.description
+        self._description = description
+        self._limits = (description.outer, description.middle, description.inner)
+        self._plant = Plant(truth.table, truth.site, description.site.azimuth_deg, clock.rate_hz)
+        self._turns = np.zeros(3)
+        self._pointing = np.zeros(3)
+        self._moves = 0
+        self._profile: Profile | None = None
+        self._step = 0
+        self._demand = 0
+        self._fault = ""
+        self._rest = self._at_rest()
+
+    @property
+    def locked(self) -> bool:
+        """At rest and held."""
+        return self._profile is None
+
+    async def move_to(self, angles: TableAngles) -> None:
+        """Move all axes, settle, lock; see the port."""
+        violations = self._description.violations(angles)
+        if violations:
+            raise OutOfRange("; ".join(violations))
+        if self._fault:
+            raise DeviceFault(self._fault)
+        if not self.locked:
+            raise DeviceFault("the table is moving: one demand at a time")
+        self._moves += 1
+        self._pointing = pointing_error_rad(self._truth.table, self._seed, self._moves)
+        demanded = units.DEG * np.array([angles.outer_deg, angles.middle_deg, angles.inner_deg])
+        start, end = self._plant.angles_rad, demanded + self._pointing - 2.0 * np.pi * self._turns
+        duration = move_ticks((end - start) / units.DEG, self._limits, self._clock.rate_hz) / self._clock.rate_hz
+        await self._follow(Quintic(start, end, duration))
+
+    def read_angles(self) -> TableAngles:
+        """Where the encoders say the axes are."""
+        encoders = (self._plant.angles_rad - self._pointing + 2.0 * np.pi * self._turns) / units.DEG
+        outer, middle, inner = encoders.tolist()
+        return TableAngles(outer, middle, inner)
+
+    def read_rates_deg_s(self) -> Array:
+        """Rates of the axes, (3,): for tests and displays."""
+        return self._plant.rates_rad_s / units.DEG
+
+    async def make_safe(self) -> None:
+        """Ramp down to rest and lock, whatever it was doing. Raises `DeviceFault` where the plant has failed."""
+        if self._fault:
+            raise DeviceFault(self._fault)
+        if self.locked:
+            return
+        await self._follow(RampDown(self._plant.angles_rad, self._plant.rates_rad_s, deceleration_rad_s2(self._limits)))
+
+    async def _follow(self, profile: Profile) -> None:
+        """Give the axes a profile and let time pass until they rest; a later demand takes over and stops this one."""
+        self._demand += 1
+        demand = self._demand
+        self._profile, self._step = profile, 0
+        moving = ceil(profile.duration_s * self._clock.rate_hz - 1e-6)
+        longest = max(1, int(SLICE_S * self._clock.rate_hz))
+        while moving > 0:
+            await self._pass(min(moving, longest), demand)
+            moving -= longest
+        await self._settle(profile, demand)
+        self._lock()
+
+    async def _pass(self, ticks: int, demand: int) -> None:
+        await self._clock.pass_ticks(ticks)
+        if demand != self._demand:
+            raise Stopped("the table was stopped by another demand")
+
+    async def _settle(self, profile: Profile, demand: int) -> None:
+        target = profile.at(np.array([profile.duration_s + 1.0]))[0][0]
+        ticks = max(1, int(SETTLE_SLICE_S * self._clock.rate_hz))
+        waited = 0.0
+        while waited < SETTLE_TIMEOUT_S:
+            await self._pass(ticks, demand)
+            waited += ticks / self._clock.rate_hz
+            error = np.max(np.abs(self._plant.angles_rad - target))
+            at_rest = np.max(np.abs(self._plant.rates_rad_s)) < SETTLED_RATE_RAD_S
+            if waited > SETTLE_S - 1e-9 and error < SETTLED_ERROR_RAD and at_rest:
+                return
+        raise NotSettled(f"the table did not come to rest within {SETTLE_TIMEOUT_S:g} s of its move")
+
+    def _lock(self) -> None:
+        """Hold the axes where they are, and bring each angle to within half a turn."""
+        here = self._plant.angles_rad
+        turns = np.rint(here / (2.0 * np.pi))
+        self._turns = self._turns + turns
+        self._plant.put(here - 2.0 * np.pi * turns)
+        self._profile = None
+        self._rest = self._at_rest()
+
+    def _at_rest(self) -> tuple[Array, Array]:
+        return at_rest(self._plant.attitude()[None], self._truth.site)
+
+    def rest_truth(self) -> tuple[Array, Array]:
+        """True angular rate [rad/s] and specific force [m/s²] in the unit's axes while locked, each (3,)."""
+        return self._rest[0][0], self._rest[1][0]
+
+    def advance(self, ticks: int) -> Motion:
+        """Let the table live through some ticks. A plant that fails leaves the table faulted."""
+        tick_s = 1.0 / self._clock.rate_hz
+        if self._profile is None or self._fault:
+            return Motion(ticks, self._rest[0] * tick_s, self._rest[1] * tick_s)
+        steps = ticks * self._plant.steps_per_tick
+        try:
+            path = self._plant.run(self._profile, self._step, steps)
+        except DeviceFault as fault:
+            self._fault = str(fault)
+            raise
+        self._step += steps
+        rotation = attitude(path, self._truth.table, self._description.site.azimuth_deg)
+        angle, velocity = path_increments(rotation, self._plant.steps_per_tick, tick_s, self._truth.site)
+        return Motion(ticks, angle, velocity)
+
+    def checkpoint(self) -> dict[str, Any]:
+        """State to resume from. Only a locked table has one."""
+        if not self.locked:
+            raise DeviceFault("a moving table has no checkpoint")
+        return {
+            "angles_rad": self._plant.angles_rad.tolist(),
+            "integral": self._plant.integral.tolist(),
+            "turns": self._turns.tolist(),
+            "pointing_rad": self._pointing.tolist(),
+            "moves": self._moves,
+            "fault": self._fault,
+        }
+
+    def resume(self, state: dict[str, Any]) -> None:
+        """Stand, locked, where a checkpoint says."""
+        self._turns = np.array(state["turns"], dtype=np.float64)
+        self._pointing = np.array(state["pointing_rad"], dtype=np.float64)
+        self._moves = int(state["moves"])
+        self._fault = str(state["fault"])
+        self._plant.put(np.array(state["angles_rad"], dtype=np.float64), np.array(state["integral"], dtype=np.float64))
+        self._rest = self._at_rest()

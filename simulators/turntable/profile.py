@@ -1,0 +1,82 @@
+"""Where the axes are asked to be while they move: reference positions and rates over time."""
+
+from dataclasses import dataclass
+from math import ceil, sqrt
+from typing import Protocol
+
+import numpy as np
+
+from procedures.bench.description import AxisLimits
+from procedures.core import units
+from simulators.truth import Array
+
+PEAK_RATE = 15.0 / 8.0
+"""Largest rate of a quintic move, in units of distance/duration."""
+PEAK_ACCELERATION = 10.0 / sqrt(3.0)
+"""Largest acceleration of a quintic move, in units of distance/duration²."""
+MARGIN = 0.98
+"""Share of an axis' limits that a profile uses, so that the servo's transients stay inside."""
+
+
+class Profile(Protocol):
+    """A demand on the three axes (outer, middle, inner) over time from its beginning."""
+
+    @property
+    def duration_s(self) -> float: ...
+
+    def at(self, time_s: Array) -> tuple[Array, Array]:
+        """Positions [rad] and rates [rad/s] at some times, each (n, 3)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Quintic:
+    """All axes from rest to rest together: ``q = q₀ + Δ·(10s³ − 15s⁴ + 6s⁵)``, s = t/T."""
+
+    start_rad: Array
+    end_rad: Array
+    duration_s: float
+
+    def at(self, time_s: Array) -> tuple[Array, Array]:
+        """See `Profile`; at rest after the end."""
+        s = np.clip(time_s / max(self.duration_s, 1e-9), 0.0, 1.0)[:, None]
+        distance = self.end_rad - self.start_rad
+        position = self.start_rad + distance * (s**3 * (10.0 + s * (6.0 * s - 15.0)))
+        position = np.where(s >= 1.0, self.end_rad, position)
+        return position, distance * (30.0 * (s * (1.0 - s)) ** 2) / max(self.duration_s, 1e-9)
+
+
+@dataclass(frozen=True)
+class RampDown:
+    """Every axis from its present rate to rest at its own constant deceleration."""
+
+    start_rad: Array
+    rate_rad_s: Array
+    deceleration_rad_s2: Array
+
+    @property
+    def duration_s(self) -> float:
+        """Until the last axis rests."""
+        return float(np.max(np.abs(self.rate_rad_s) / self.deceleration_rad_s2))
+
+    def at(self, time_s: Array) -> tuple[Array, Array]:
+        """See `Profile`."""
+        sign = np.sign(self.rate_rad_s)
+        passed = np.minimum(time_s[:, None], np.abs(self.rate_rad_s) / self.deceleration_rad_s2)
+        rate = self.rate_rad_s - sign * self.deceleration_rad_s2 * passed
+        return self.start_rad + 0.5 * (self.rate_rad_s + rate) * passed, rate
+
+
+def move_ticks(distance_deg: Array, limits: tuple[AxisLimits, ...], rate_hz: float) -> int:
+    """Whole ticks that a quintic move of all axes together needs within every axis' rate and acceleration."""
+    longest = 0.0
+    for distance, limit in zip(np.abs(distance_deg).tolist(), limits, strict=True):
+        by_rate = PEAK_RATE * distance / (MARGIN * limit.rate_deg_s)
+        by_acceleration = sqrt(PEAK_ACCELERATION * distance / (MARGIN * limit.acceleration_deg_s2))
+        longest = max(longest, by_rate, by_acceleration)
+    return ceil(longest * rate_hz)
+
+
+def deceleration_rad_s2(limits: tuple[AxisLimits, ...]) -> Array:
+    """Deceleration of a stop, (3,): the axes' limits."""
+    return MARGIN * units.DEG * np.array([limit.acceleration_deg_s2 for limit in limits])

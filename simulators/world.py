@@ -1,0 +1,194 @@
+"""The door: a whole simulated bench from its truth, a seed, and perhaps a checkpoint.
+
+Knows how clock, table, supply and unit are wired; knows none of their physics.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from procedures.bench import Bench
+from procedures.core import units
+from procedures.core.frames import TableAngles
+from procedures.core.noise import NoiseCoefficients
+from procedures.core.recording import Station
+from procedures.core.unit import TriadRecord, Unit
+from simulators.clock import SimClock, Wait
+from simulators.imu.device import SimImu, unit_channels
+from simulators.imu.sensor import TRIADS, Coefficients, launch_coefficients, station_means
+from simulators.supply.device import SimSupply
+from simulators.truth import Array, BenchTruth, TriadTruth, UnitTruth, default_bench, default_unit
+from simulators.turntable.device import SETTLE_S, SimTurntable, pointing_error_rad
+from simulators.turntable.kinematics import at_rest, attitude
+from simulators.turntable.profile import move_ticks
+
+CHECKPOINT_VERSION = 1
+
+
+@dataclass(frozen=True)
+class WorldConfig:
+    """What makes a world: two truths, a seed, and how fast time may pass (None: as fast as it can)."""
+
+    unit: UnitTruth = field(default_factory=default_unit)
+    bench: BenchTruth = field(default_factory=default_bench)
+    seed: int = 1
+    sample_rate_hz: float | None = None
+    """Instead of the unit's own rate."""
+    real_time_factor: float | None = None
+    """Bench seconds per real second."""
+    wait: Wait | None = field(default=None, repr=False)
+    """Waits real seconds; needed with a real-time factor."""
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples per second, also the clock's ticks."""
+        return self.unit.sample_rate_hz if self.sample_rate_hz is None else self.sample_rate_hz
+
+
+@dataclass
+class SimulatedBench(Bench):
+    """A bench whose truth can be asked, and which can be frozen and woken."""
+
+    config: WorldConfig = field(kw_only=True)
+    clock: SimClock  # pyright: ignore[reportIncompatibleVariableOverride]
+    turntable: SimTurntable  # pyright: ignore[reportIncompatibleVariableOverride]
+    imu: SimImu  # pyright: ignore[reportIncompatibleVariableOverride]
+    supply: SimSupply  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What `build` needs to go on from here, JSON-ready. Raises `DeviceFault` while the table moves."""
+        return {
+            "version": CHECKPOINT_VERSION,
+            "seed": self.config.seed,
+            "rate_hz": self.config.rate_hz,
+            "ticks": self.clock.ticks,
+            "turntable": self.turntable.checkpoint(),
+            "supply": self.supply.checkpoint(),
+            "imu": self.imu.checkpoint(),
+        }
+
+    def true_calibration(self) -> dict[str, tuple[Array, Array]]:
+        """Triad -> (bias (3,) [rate], K (3, 3)) of the present launch, of the first one before any."""
+        return launch_truth(self.config, max(1, self.supply.launches))
+
+
+def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> SimulatedBench:
+    """A bench with the table at zero and the unit off, or as a checkpoint of the same seed and rate left it."""
+    clock = SimClock(config.rate_hz, config.real_time_factor, config.wait)
+    table = SimTurntable(config.bench, config.seed, clock)
+    supply = SimSupply()
+    imu = SimImu(config.unit, config.seed, clock, supply.launch)
+    supply.connect(imu.power_up, imu.power_down)
+    clock.connect(lambda ticks: imu.feel(table.advance(ticks)))
+    if checkpoint is not None:
+        made_with = (checkpoint["version"], checkpoint["seed"], checkpoint["rate_hz"])
+        if made_with != (CHECKPOINT_VERSION, config.seed, config.rate_hz):
+            raise ValueError(f"the checkpoint was made with (version, seed, rate_hz) = {made_with!r}")
+        clock.ticks = int(checkpoint["ticks"])
+        table.resume(checkpoint["turntable"])
+        supply.resume(checkpoint["supply"])
+        imu.resume(supply.launch(), checkpoint["imu"])
+    return SimulatedBench(config.bench.description, clock, table, imu, supply, config=config)
+
+
+def launch_coefficients_of(config: WorldConfig, launch: int = 1) -> dict[str, Coefficients]:
+    """Triad -> everything that is true of it during a launch, the even terms included."""
+    return {name: launch_coefficients(config.unit.triad(name), config.seed, launch, name) for name in TRIADS}
+
+
+def launch_truth(config: WorldConfig, launch: int = 1) -> dict[str, tuple[Array, Array]]:
+    """Triad -> (bias (3,) [rad/s or m/s²], K (3, 3)) of a launch, without running anything."""
+    return {name: (c.bias, c.matrix) for name, c in launch_coefficients_of(config, launch).items()}
+
+
+def declared_unit(truth: UnitTruth, averaging_time_s: float = 70.0, sample_rate_hz: float | None = None) -> Unit:
+    """The unit's data sheet: channels, noise coefficients and run-to-run stability as they truly are."""
+
+    def record(triad: TriadTruth) -> TriadRecord:
+        columns = zip(
+            triad.quantization,
+            triad.random_walk,
+            triad.bias_instability,
+            triad.rate_random_walk,
+            [abs(r) for r in triad.rate_ramp],
+            strict=True,
+        )
+        x, y, z = (NoiseCoefficients(*column, flicker_band_s=triad.flicker_band_s) for column in columns)
+        return TriadRecord((x, y, z), triad.bias_run_to_run_sd, triad.scale_factor_run_to_run_sd_ppm * units.PPM)
+
+    return Unit(
+        truth.serial,
+        truth.sample_rate_hz if sample_rate_hz is None else sample_rate_hz,
+        unit_channels(truth),
+        record(truth.gyro),
+        record(truth.accelerometer),
+        averaging_time_s,
+    )
+
+
+@dataclass(frozen=True)
+class DwellMeans:
+    """Station means made without samples, each (n, 3) in the unit's axes: nominal outputs, and the true inputs."""
+
+    gyro: Array
+    """[rad/s]"""
+    accelerometer: Array
+    """[m/s²]"""
+    rate_b: Array
+    """True angular rate [rad/s]."""
+    specific_force_b: Array
+    """True specific force [m/s²]."""
+
+
+def true_inputs(
+    config: WorldConfig, angles: Sequence[TableAngles], moves: Sequence[int] | None = None
+) -> tuple[Array, Array]:
+    """True angular rate and specific force at commanded angles, each (n, 3), pointing errors of the moves included.
+
+    Pure numpy. `moves`: number of the move to each of the angles since the bench was opened; 1, 2, … if not told.
+    """
+    table = config.bench.table
+    numbers = range(1, len(angles) + 1) if moves is None else moves
+    errors = np.array([pointing_error_rad(table, config.seed, move) for move in numbers]).reshape(-1, 3)
+    axes = _axes_rad(angles) + errors
+    return at_rest(attitude(axes, table, config.bench.description.site.azimuth_deg), config.bench.site)
+
+
+def _axes_rad(angles: Sequence[TableAngles]) -> Array:
+    return units.DEG * np.array([(a.outer_deg, a.middle_deg, a.inner_deg) for a in angles]).reshape(-1, 3)
+
+
+def dwell_means(config: WorldConfig, stations: Sequence[Station], launch: int = 1) -> DwellMeans:
+    """What the means of the stations' recordings would be, in milliseconds, for Monte Carlo.
+
+    The unit is switched on with the table at zero and the stations follow as in a procedure: move, settle, record. See
+    `simulators.imu.sensor.station_means` for what is equal to a full run and what only has the same distribution.
+    Start times differ from those of a full run by what the servo needs to settle beyond half a second.
+    """
+    angles: list[TableAngles] = []
+    moves: list[int] = []
+    ticks: list[tuple[int, int]] = []
+    now, move, here, rate = 0, 0, TableAngles(), config.rate_hz
+    description = config.bench.description
+    limits = (description.outer, description.middle, description.inner)
+    for station in stations:
+        if round(station.record_s * rate) < 1:
+            raise ValueError(f"station {station.label!r}: record_s = {station.record_s!r} holds no sample")
+        if station.angles is not None:
+            distance_rad = (_axes_rad([station.angles]) - _axes_rad([here]))[0]
+            now += move_ticks(distance_rad / units.DEG, limits, rate) + round(SETTLE_S * rate)
+            move, here = move + 1, station.angles
+        now += round(station.settle_s * rate)
+        ticks.append((now, now + round(station.record_s * rate)))
+        now = ticks[-1][1]
+        angles.append(here)
+        moves.append(move)
+    rate_b, force_b = true_inputs(config, angles, moves)
+    spans = np.array(ticks, dtype=np.float64).reshape(-1, 2)
+    means = {
+        name: station_means(config.unit.triad(name), rate, (config.seed, launch, name), spans, v)
+        for name, v in (("gyro", rate_b), ("accelerometer", force_b))
+    }
+    return DwellMeans(means["gyro"], means["accelerometer"], rate_b, force_b)
