@@ -6,6 +6,7 @@ from importlib.metadata import version
 
 from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
+from threadpoolctl import threadpool_limits
 
 from bench_service.api import analyses, benches, errors, health, jobs, procedures, recordings, units
 from bench_service.drivers.simulated import SimulatedDriver
@@ -28,6 +29,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     With `drive` it holds the bench's lease and runs jobs; without, it reads and analyses beside a process that does.
     Raises `BenchBusy`, `StorageFailure`, `NotMounted`.
     """
+    threadpool_limits(1)  # our matrices have at most 72 rows: BLAS threads would only spin against the bench's own
     driver = SimulatedDriver(settings.bench_id, settings.unit_truth, settings.bench_truth, settings.real_time_factor)
     stores, database = open_stores(settings.database_url)
     closing.callback(database.dispose)

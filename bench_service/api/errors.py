@@ -21,7 +21,6 @@ from bench_service.jobs.errors import (
     ServiceError,
     StorageFailure,
     StorageFull,
-    UnreadableFile,
 )
 from procedures.bench.errors import BenchError
 from procedures.core.errors import BadParameter, DomainError, Undetermined
@@ -33,7 +32,6 @@ STATUS: dict[type[Exception], int] = {
     BenchBusy: 409,
     NotDriving: 503,
     NotMounted: 422,
-    UnreadableFile: 422,
     DomainError: 422,
     BenchError: 502,
     StorageFull: 507,

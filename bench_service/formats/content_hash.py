@@ -29,7 +29,7 @@ class ContentHash:
 
     def update(self, samples: RawArray) -> None:
         """Add samples, shape (n, channels), of the type that was announced."""
-        self._sha.update(memoryview(np.ascontiguousarray(samples, dtype=self._dtype)).cast("B"))
+        self._sha.update(np.ascontiguousarray(samples, dtype=self._dtype).tobytes())
 
     def copy(self) -> "ContentHash":
         """An independent continuation."""

@@ -7,7 +7,6 @@ ServiceError
 ├── BenchBusy            another process drives this bench
 ├── NotDriving           this process drives no bench
 ├── NotMounted           this bench does not have that unit
-├── UnreadableFile       an imported file is not what it says
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
 """
@@ -44,10 +43,6 @@ class NotDriving(ServiceError):
 
 class NotMounted(ServiceError):
     """This bench does not have that unit."""
-
-
-class UnreadableFile(ServiceError):
-    """An imported file is not what it says."""
 
 
 class StorageFull(ServiceError):

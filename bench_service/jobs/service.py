@@ -2,27 +2,32 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import timedelta
 from random import SystemRandom
 from typing import Any
 
+from bench_service.formats.description import ImportDescription
+from bench_service.formats.import_file import ImportFile, read_import
 from bench_service.jobs.driver import BenchDriver, TrueTriad
 from bench_service.jobs.engine import Engine
 from bench_service.jobs.errors import IllegalTransition, NotDriving, NotFound
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.planning import CONTEXT, Plan, Planner
 from bench_service.jobs.runner import JobRunner, analysed
-from bench_service.jobs.store import Idempotency, RecordingState, StoredResult, Stores
+from bench_service.jobs.store import Idempotency, NewRecording, RecordingState, StoredResult, Stores
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.recording import Recording
+from procedures.core.recording import Recording, RecordingInfo
 from procedures.core.report import Report
 from procedures.core.unit import Unit
 from procedures.procedure import DatedCalibration, Evidence, Method, Outcome, Parameters
 
 AnyMethod = Method[Parameters, Outcome]
 SEEDS = SystemRandom()
+CRASHED_IMPORT = timedelta(hours=1)
+"""An import that is not sealed after this long will never be: its process is gone."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +77,7 @@ class BenchService:
     def start(self) -> None:
         """Register the bench and its units, then begin to work. The bench's lease must be held."""
         self.stores.units.put_bench(self.driver.description)
+        self.stores.recordings.discard_open_imports(now() - CRASHED_IMPORT)
         for unit in self.driver.mounted():
             self._register(unit)
         if self._engine is not None:
@@ -173,6 +179,40 @@ class BenchService:
         )
         idempotency = None if key is None else Idempotency(f"analyses:{key}", fingerprint(request))
         return self.stores.results.add(stored, method.calibrations(outcome), False, idempotency)
+
+    def import_recording(
+        self, files: Sequence[ImportFile], description: ImportDescription, key: str | None = None
+    ) -> RecordingInfo:
+        """Store recorded files as one recording of a unit, which is registered where it is new.
+
+        Raises `DomainError` naming file and row, `StorageFull`; then nothing of the recording remains.
+        """
+        imported = read_import(files, description)
+        idempotency = None if key is None else Idempotency(f"recordings:{key}", fingerprint(imported.source))
+        recordings = self.stores.recordings
+        first = recordings.made_before(idempotency)
+        if first is not None:
+            return first
+        self._register(Unit(description.unit, imported.rate_hz, imported.channels))
+        writer = recordings.open(
+            NewRecording(
+                unit=description.unit,
+                channels=imported.channels,
+                rate_hz=imported.rate_hz,
+                start_s=description.start_s,
+                simulated=description.simulated,
+                dtype=imported.dtype,
+                source=imported.source,
+                idempotency=idempotency,
+            )
+        )
+        try:
+            for block in imported.blocks():
+                writer.write(block)
+            return writer.seal()
+        except BaseException:
+            writer.abandon()
+            raise
 
     def method(self, name: str) -> AnyMethod:
         """Raises `NotFound`."""

@@ -49,6 +49,8 @@ class StoredRecording:
     bench: str | None = None
     stored_bytes: int = 0
     chunks: int = 0
+    dtype: str = "int32"
+    """Of its samples: "int32" or "float64"."""
     source: dict[str, Any] = field(default_factory=dict[str, Any])
     """Of an imported recording: file name, its SHA-256, reader, declared reference values."""
 
@@ -67,6 +69,8 @@ class NewRecording:
     bench: str | None = None
     station: Station | None = None
     source: dict[str, Any] = field(default_factory=dict[str, Any])
+    idempotency: "Idempotency | None" = None
+    """A client's key, remembered when the recording is sealed."""
 
 
 class RecordingWriter(Protocol):
@@ -89,6 +93,10 @@ class RecordingStore(Protocol):
     """Raw samples."""
 
     def open(self, new: NewRecording) -> RecordingWriter: ...
+
+    def made_before(self, idempotency: "Idempotency | None") -> RecordingInfo | None:
+        """The recording that a client's key made. Raises `IdempotencyConflict` for a key of another request."""
+        ...
 
     def get(self, recording_id: str) -> StoredRecording:
         """Raises `NotFound`."""
@@ -114,6 +122,10 @@ class RecordingStore(Protocol):
 
     def checkpoint(self, job_id: str) -> dict[str, Any] | None:
         """What the world was after the job's last complete recording."""
+        ...
+
+    def discard_open_imports(self, before: datetime) -> int:
+        """After a crash: remove imports that were begun before a moment and never sealed. How many there were."""
         ...
 
     def interrupt_open(self, job_id: str) -> int:

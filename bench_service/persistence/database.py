@@ -7,7 +7,7 @@ Writers begin with ``BEGIN IMMEDIATE``, so two processes queue for the lock inst
 
 import json
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -39,19 +39,19 @@ class Database:
         self._writing_engine = engine.execution_options(bench_write=True)
 
     @contextmanager
-    def read(self) -> Iterator[Session]:
+    def read(self) -> Generator[Session, None, None]:
         """A transaction that only reads."""
         with storage_errors(), Session(self.engine) as session:
             yield session
 
     @contextmanager
-    def write(self) -> Iterator[Session]:
+    def write(self) -> Generator[Session, None, None]:
         """A transaction that commits at the end, or leaves nothing behind. Raises `StorageFull`, `StorageFailure`."""
         with storage_errors(), Session(self._writing_engine, expire_on_commit=False) as session, session.begin():
             yield session
 
     @contextmanager
-    def write_connection(self) -> Iterator[Connection]:
+    def write_connection(self) -> Generator[Connection, None, None]:
         """The same for work below the tables: migrations."""
         with storage_errors(), self._writing_engine.begin() as connection:
             yield connection
@@ -126,7 +126,7 @@ def _switch_to_wal(engine: Engine) -> None:
 
 
 @contextmanager
-def storage_errors() -> Iterator[None]:
+def storage_errors() -> Generator[None, None, None]:
     """Every error of the database, or of its driver, as `StorageFull`, `Conflict` or `StorageFailure`."""
     try:
         yield

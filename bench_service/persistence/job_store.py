@@ -161,7 +161,7 @@ def _move(
     before = JobState(row.state)
     if to not in LEGAL[before]:
         raise IllegalTransition(f"job {row.id} is {before.value}; it cannot become {to.value}")
-    if verdict is None and to in (JobState.FAILED, JobState.CANCELLED):
+    if verdict is None and to is JobState.FAILED:
         verdict = Verdict.ERROR
     row.state = to.value
     data: dict[str, Any] = {"state": to.value, "before": before.value}

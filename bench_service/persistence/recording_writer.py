@@ -23,6 +23,7 @@ from bench_service.formats.content_hash import ContentHash
 from bench_service.jobs.errors import StorageFailure, StorageFull
 from bench_service.jobs.store import NewRecording, RecordingState
 from bench_service.persistence.database import Conflict, Database
+from bench_service.persistence.idempotency import remember
 from bench_service.persistence.recording_rows import fill_row, info_of_row
 from bench_service.persistence.tables import ChunkRow, RecordingRow
 from procedures.core.errors import BadParameter, UnfitRecording
@@ -123,6 +124,7 @@ class SqlRecordingWriter:
             row.content_hash = rest.hexdigest()
             row.checkpoint = checkpoint
             row.state = RecordingState.COMPLETE.value
+            remember(session, self._new.idempotency, "recording", self.id, self._created_at)
             session.flush()
             return info_of_row(row)
 

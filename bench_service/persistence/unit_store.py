@@ -24,7 +24,7 @@ class SqlUnitStore:
         self._database = database
 
     def put_unit(self, unit: Unit) -> None:
-        document = UNIT.dump_python(unit, mode="json", exclude={"calibrations"})
+        document = UNIT.dump_python(unit, mode="json", exclude={"calibrations", "calibration_id"})
         with self._database.write() as session:
             session.merge(UnitRow(serial=unit.serial, document=document, updated_at=wall_clock.now()))
 
@@ -34,12 +34,12 @@ class SqlUnitStore:
             row = session.execute(query).one_or_none()
         if row is None:
             raise NotFound("unit", serial)
-        return _unit(row[0], row[1])
+        return _unit(*row)
 
     def units(self) -> tuple[Unit, ...]:
         with self._database.read() as session:
             rows = session.execute(_UNITS.order_by(UnitRow.serial)).all()
-        return tuple(_unit(row[0], row[1]) for row in rows)
+        return tuple(_unit(*row) for row in rows)
 
     def put_bench(self, bench: BenchDescription) -> None:
         document = BENCH.dump_python(bench, mode="json")
@@ -59,10 +59,11 @@ class SqlUnitStore:
         return tuple(BENCH.validate_python(row.document) for row in rows)
 
 
-_UNITS = select(UnitRow.document, CalibrationRow.triads).outerjoin(
+_UNITS = select(UnitRow.document, CalibrationRow.triads, CalibrationRow.id).outerjoin(
     CalibrationRow, (CalibrationRow.unit == UnitRow.serial) & CalibrationRow.is_current
 )
 
 
-def _unit(document: dict[str, Any], triads: list[Any] | None) -> Unit:
-    return UNIT.validate_python({**document, "calibrations": TRIADS.validate_python(triads or [])})
+def _unit(document: dict[str, Any], triads: list[Any] | None, calibration_id: str | None) -> Unit:
+    calibrations = TRIADS.validate_python(triads or [])
+    return UNIT.validate_python({**document, "calibrations": calibrations, "calibration_id": calibration_id})

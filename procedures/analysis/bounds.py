@@ -1,10 +1,11 @@
 """The least uncertainty that any unbiased estimator could have from a plan: the measure of the estimators in use."""
 
 import numpy as np
-from scipy.linalg import block_diag, cholesky, solve_triangular
+from scipy.linalg import block_diag
 
 from procedures.analysis.multiposition import estimator
 from procedures.analysis.table_errors import TableErrors
+from procedures.analysis.whitening import whitener
 from procedures.core.frames import Array
 
 
@@ -34,9 +35,7 @@ def bayesian_bound(
         noise += list(c)
         flaws.append(errors.of_outputs(matrix).transpose(1, 0, 2).reshape(3 * len(v), -1))
     total = block_diag(*noise) + np.vstack(flaws) @ np.vstack(flaws).T
-    size = np.sqrt(np.diagonal(total))
-    design = block_diag(*designs) / size[:, None]
-    scale = np.linalg.norm(design, axis=0)
-    root = cholesky(total / np.outer(size, size), lower=True)
-    inverse = np.linalg.pinv(solve_triangular(root, design / scale, lower=True)) / scale[:, None]
+    whitened = whitener(total) @ block_diag(*designs)
+    scale = np.linalg.norm(whitened, axis=0)
+    inverse = np.linalg.pinv(whitened / scale) / scale[:, None]
     return inverse @ inverse.T

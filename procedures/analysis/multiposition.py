@@ -7,11 +7,12 @@ of the station means. The uncertainty has two parts: the unit's noise, and the t
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky, null_space, solve_triangular
+from scipy.linalg import null_space
 from scipy.stats import chi2
 
 from procedures.analysis.determination import require_full_rank
 from procedures.analysis.table_errors import SOURCES, TableErrors
+from procedures.analysis.whitening import whitener
 from procedures.core.frames import Array
 from procedures.core.imu_model import TriadCalibration, triad_calibration
 
@@ -109,9 +110,9 @@ def estimator(what: str, vectors: Array, noise_covariance: Array) -> Estimator:
     scale = np.linalg.norm(design, axis=0)
     gains, covariance = [], np.zeros((12, 12))
     for channel, c in enumerate(noise_covariance):
-        root = cholesky(c, lower=True)
-        pseudo_inverse = np.linalg.pinv(solve_triangular(root, design / scale, lower=True)) / scale[:, None]
-        gains.append(solve_triangular(root, pseudo_inverse.T, lower=True, trans="T").T)
+        weights = whitener(c)
+        pseudo_inverse = np.linalg.pinv(weights @ design / scale) / scale[:, None]
+        gains.append(pseudo_inverse @ weights)
         covariance[4 * channel : 4 * channel + 4, 4 * channel : 4 * channel + 4] = pseudo_inverse @ pseudo_inverse.T
     return Estimator(design, np.array(gains), covariance, condition)
 
@@ -179,7 +180,7 @@ def _chi_square(design: Array, outputs: Array, noise_covariance: Array, of_table
     k = free.shape[1]
     for channel, c in enumerate(noise_covariance):
         covariance[channel * k : channel * k + k, channel * k : channel * k + k] += free.T @ c @ free
-    whitened = solve_triangular(cholesky(covariance, lower=True), y, lower=True)
+    whitened = whitener(covariance) @ y
     return float(whitened @ whitened), degrees
 
 

@@ -27,7 +27,11 @@ class Scatter:
     high: float
     """95 % interval of the true standard deviation, from chi-square with n − 1 degrees of freedom."""
     expected_from_measurement: float
-    """What the calibrations' own uncertainties would give if the unit did not change at all."""
+    """What the calibrations' own uncertainties would give if the unit did not change at all; an upper figure, since the
+    constant flaws of one table repeat."""
+    values: tuple[float, ...] = ()
+    """The coefficient in each calibration, and its standard uncertainty."""
+    value_sds: tuple[float, ...] = ()
 
     def resolves(self, limit: float) -> bool:
         """Whether the measurement is finer than a limit on the standard deviation."""
@@ -53,16 +57,18 @@ def run_to_run(calibrations: Sequence[TriadCalibration]) -> tuple[Scatter, ...]:
     for kind, unit, columns in (("bias", first.output_unit, (0, 4, 8)), ("scale factor", "1", (1, 6, 11))):
         for axis, column in zip("xyz", columns, strict=True):
             size = 1.0 if kind == "bias" else float(np.mean(coefficients[:, column]))
-            scatter = _scatter(coefficients[:, column], variances[:, column], size)
-            scatters.append(Scatter(first.triad, f"{kind} {axis}", unit, *scatter))
+            values, sds = coefficients[:, column], np.sqrt(variances[:, column])
+            scatter = _scatter(values, sds, size)
+            each = (tuple(values.tolist()), tuple(sds.tolist()))
+            scatters.append(Scatter(first.triad, f"{kind} {axis}", unit, *scatter, *each))
     return tuple(scatters)
 
 
-def _scatter(values: Array, variances: Array, size: float) -> tuple[float, float, float, float, float]:
+def _scatter(values: Array, sds: Array, size: float) -> tuple[float, float, float, float, float]:
     """Mean, sd, its 95 % interval, and the sd that measurement alone would give; all but the mean divided by |size|."""
     sd = float(np.std(values, ddof=1)) / abs(size)
     low, high = sd_interval(sd, len(values))
-    return float(np.mean(values)), sd, low, high, float(np.sqrt(np.mean(variances))) / abs(size)
+    return float(np.mean(values)), sd, low, high, float(np.sqrt(np.mean(sds**2))) / abs(size)
 
 
 def sd_interval(sd: float, n: int, confidence: float = 0.95) -> tuple[float, float]:

@@ -10,11 +10,11 @@ magnitude, because real units have scale errors far beyond its first order.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from procedures.analysis.determination import RANK_TOLERANCE, require_full_rank
+from procedures.analysis.whitening import whitener
 from procedures.core.frames import Array
 from procedures.core.imu_model import TriadCalibration, triad_calibration
 
@@ -153,16 +153,16 @@ def fit_scalar(
     condition = require_scalar_determined(what, directions / np.linalg.norm(directions, axis=1)[:, None])
     parameters = start
     for _ in range(_PASSES):
-        root = cholesky(_magnitude_covariance(parameters, outputs, noise_covariance), lower=True)
-        parameters = _solve(parameters, outputs, reference, root)
+        weights = whitener(_magnitude_covariance(parameters, outputs, noise_covariance))
+        parameters = _solve(parameters, outputs, reference, weights)
     covariance_f = _magnitude_covariance(parameters, outputs, noise_covariance)
-    root = cholesky(covariance_f, lower=True)
+    weights = whitener(covariance_f)
     jacobian = _jacobian(parameters, outputs)
     units = _steps(parameters, reference)
-    inverse = units[:, None] * np.linalg.pinv(solve_triangular(root, jacobian * units, lower=True))
-    solve = solve_triangular(root, inverse.T, lower=True, trans="T").T
+    inverse = units[:, None] * np.linalg.pinv(weights @ jacobian * units)
+    solve = inverse @ weights
     residuals = _magnitudes(parameters, outputs) - reference
-    whitened = solve_triangular(root, residuals, lower=True)
+    whitened = weights @ residuals
     chi_square, degrees = float(whitened @ whitened), len(outputs) - 9
     factor = 1.0 if noise_known or degrees == 0 else max(1.0, chi_square / degrees)
     remaining = np.eye(len(outputs)) - jacobian @ solve
@@ -194,14 +194,14 @@ def start_from_data(outputs: Array, reference: float) -> Array:
     return np.array([*(0.5 * (low + high)), *(2.0 * reference / span), 0.0, 0.0, 0.0])
 
 
-def _solve(start: Array, outputs: Array, reference: float, root: Array) -> Array:
+def _solve(start: Array, outputs: Array, reference: float, weights: Array) -> Array:
     units = _steps(start, reference)
 
     def whitened(p: Array) -> Array:
-        return solve_triangular(root, _magnitudes(start + p * units, outputs) - reference, lower=True)
+        return weights @ (_magnitudes(start + p * units, outputs) - reference)
 
     def derivative(p: Array) -> Array:
-        return solve_triangular(root, _jacobian(start + p * units, outputs) * units, lower=True)
+        return weights @ _jacobian(start + p * units, outputs) * units
 
     found = least_squares(whitened, np.zeros(9), jac=derivative, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
     return start + found.x * units

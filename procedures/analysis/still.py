@@ -1,7 +1,7 @@
 """Where a hand-turned unit stood still, found in a recording that carries no labels.
 
-After Tedaldi, Pretto and Menegatti (ICRA 2014, imu_tk): the variance in a moving window against that of a stretch at the
-beginning which is known to be still.
+After Tedaldi, Pretto and Menegatti (ICRA 2014, imu_tk): the variance in a moving window against that of a stretch at
+the beginning which is known to be still.
 """
 
 from dataclasses import dataclass
@@ -20,11 +20,11 @@ class StillSettings:
     """The unit is known to rest for this long at the beginning."""
     window_s: float = 1.0
     """Length of the moving window, centred."""
-    factor: float = 6.0
+    factor: float = 10.0
     """The threshold, as a multiple of the initial variance."""
     shortest_s: float = 1.0
     """Shorter stretches are no pose."""
-    margin_s: float = 0.1
+    margin_s: float = 0.25
     """Cut from both ends of every stretch: the hand has hardly let go."""
 
 
@@ -39,8 +39,8 @@ class Stretch:
 def still_stretches(samples: Array, rate_hz: float, settings: StillSettings | None = None) -> tuple[Stretch, ...]:
     """Stretches of (n, 3) samples during which the unit rested, in order.
 
-    Still is where ``√Σ_c var_c² < factor·√Σ_c var_c²(initial)``, the variances over the moving window, and where the mean
-    does not creep: see `moving_variance`. Raises `UnfitRecording` where the recording is shorter than its still beginning.
+    Still is where ``√Σ_c var_c² ≤ factor·√Σ_c var_c²(initial)``, the variances over the moving window. Raises
+    `UnfitRecording` where the recording is shorter than its still beginning.
     """
     s = settings or StillSettings()
     width = max(2, round(s.window_s * rate_hz))
@@ -69,3 +69,18 @@ def moving_variance(samples: Array, width: int) -> Array:
     count = (high - low)[:, None]
     mean = (sums[high] - sums[low]) / count
     return np.maximum((squares[high] - squares[low]) / count - mean**2, 0.0) * count / np.maximum(count - 1, 1)
+
+
+def pose_means(samples: Array, stretches: tuple[Stretch, ...], batches: int = 10) -> tuple[Array, Array]:
+    """Mean of every stretch and its standard uncertainty, both (poses, 3).
+
+    The uncertainty is the scatter of the means of `batches` equal parts of the stretch, over √batches: it allows for
+    noise correlated over less than a part, and for a hand that creeps.
+    """
+    means, sds = [], []
+    for stretch in stretches:
+        pose = samples[stretch.start : stretch.stop]
+        parts = np.array([part.mean(axis=0) for part in np.array_split(pose, batches)])
+        means.append(pose.mean(axis=0))
+        sds.append(parts.std(axis=0, ddof=1) / np.sqrt(batches))
+    return np.array(means).reshape(-1, 3), np.array(sds).reshape(-1, 3)

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag, cholesky, solve_triangular
+from scipy.linalg import block_diag
 from scipy.stats import chi2
 
+from procedures.analysis.whitening import whitener
 from procedures.core.frames import Array
 from procedures.core.imu_model import TriadCalibration, correct
 
@@ -126,8 +127,6 @@ def predicted_sd(covariance: Array) -> float:
 
 def chi_square_p(errors: Array, covariance: Array) -> tuple[float, float]:
     """``χ² = eᵀC⁻¹e`` with n degrees of freedom, and the chance of one at least as large."""
-    size = np.sqrt(np.diagonal(covariance))
-    root = cholesky(covariance / np.outer(size, size), lower=True)
-    whitened = solve_triangular(root, errors / size, lower=True)
+    whitened = whitener(covariance) @ errors
     statistic = float(whitened @ whitened)
     return statistic, float(chi2.sf(statistic, len(errors)))

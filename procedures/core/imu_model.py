@@ -99,5 +99,5 @@ def triad_calibration(
 def correct(output: Array, calibration: TriadCalibration) -> Array:
     """Corrected vectors ``v̂ = K⁻¹(U − b)``, shape of `output`, (3,) or (n, 3) (thesis 3.36, 3.37)."""
     centred = np.atleast_2d(output) - calibration.bias_array
-    corrected: Array = np.linalg.solve(calibration.matrix_array, centred.T).T
+    corrected = np.asarray(np.linalg.solve(calibration.matrix_array, centred.T).T, dtype=np.float64)
     return corrected.reshape(output.shape)

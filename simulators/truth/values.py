@@ -75,7 +75,7 @@ class TableTruth:
     pointing_sd_arcsec: float = 0.0
     """Each axis stops this far (standard deviation) from what its encoder says, anew at each move."""
     outer_wobble_arcsec: float = 0.0
-    """Half-angle of the cone that the axis describes, once a turn."""
+    """The axis sways in its bearing by amplitude·sin(angle): outer about z, middle about x, inner about y."""
     middle_wobble_arcsec: float = 0.0
     inner_wobble_arcsec: float = 0.0
 

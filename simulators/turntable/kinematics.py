@@ -2,8 +2,8 @@
 
 ``rot_enu_b = B · W_o·R_y(outer) · R_x(ε_om) · W_m·R_z(middle) · R_y(ε_mi) · W_i·R_x(inner)`` (see `TableTruth`).
 World axes are east, north, up. The base B is ``Tilt · R_up(−azimuth) · M``, where M lays the unit's x, y, z at zero
-angles along north, up, east. Wobble of axis a is a small turn by ``amplitude·(e₁ cos θ + e₂ sin θ)``, (a, e₁, e₂)
-cyclic. Nothing here is shared with `procedures.core.frames`.
+angles along north, up, east. Wobble W of an axis is a small turn by ``amplitude·sin θ`` about the coordinate
+axis that follows its own in the order x, y, z. Nothing here is shared with `procedures.core.frames`.
 """
 
 import numpy as np
@@ -45,8 +45,7 @@ def small_turn(vector_rad: Array) -> Array:
 def wobble_vector(axis: int, amplitude_arcsec: float, angle_rad: Array) -> Array:
     """Rotation vector of an axis' wobble at its angle, (n, 3) [rad]."""
     vector = np.zeros((len(angle_rad), 3))
-    vector[:, (axis + 1) % 3] = amplitude_arcsec * units.ARCSEC * np.cos(angle_rad)
-    vector[:, (axis + 2) % 3] = amplitude_arcsec * units.ARCSEC * np.sin(angle_rad)
+    vector[:, (axis + 1) % 3] = amplitude_arcsec * units.ARCSEC * np.sin(angle_rad)
     return vector
 
 

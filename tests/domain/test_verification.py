@@ -1,0 +1,61 @@
+"""Magnitudes after correction: by hand, and against the prediction over many units."""
+
+import numpy as np
+import pytest
+
+from procedures.analysis.reference import reference_vectors
+from procedures.analysis.station_noise import mean_covariance
+from procedures.analysis.verification import chi_square_p, error_covariance, magnitudes, predicted_sd
+from procedures.core.frames import TableAngles
+from procedures.core.imu_model import triad_calibration
+from tests.domain.forward_model import ACCELEROMETER_NOISE, B_ACCELEROMETER, K_ACCELEROMETER, SITE
+
+ANGLES = [TableAngles(20.0 * i, 10.0 * i, 40.0 * i) for i in range(9)]
+VECTORS = reference_vectors("accelerometer", ANGLES, SITE)
+TRUTH = np.column_stack([B_ACCELEROMETER, K_ACCELEROMETER]).ravel()
+NOISE = np.array([mean_covariance(ACCELEROMETER_NOISE, [[80.0 * i, 80.0 * i + 70] for i in range(9)])] * 3)
+
+
+def test_statistics_by_hand():
+    identity = triad_calibration("accelerometer", "m/s^2", "m/s^2", np.eye(3, 4, 1).ravel(), np.zeros((12, 12)))
+    found = magnitudes(np.array([[10.0, 0, 0], [0, 9.0, 0], [0, 0, 11.0]]), identity, 9.5, "abc")
+    assert found.after == pytest.approx((10.0, 9.0, 11.0))
+    assert found.mean_error_after == pytest.approx(0.5)
+    assert found.sd_after == pytest.approx(1.0)
+    assert found.per_axis == pytest.approx(1 / np.sqrt(3))  # thesis 5.1
+    assert found.before == pytest.approx(found.after)
+
+
+def test_outputs_in_counts_have_no_magnitude_before():
+    scale = np.column_stack([np.zeros(3), np.eye(3) * 100.0]).ravel()
+    counts = triad_calibration("accelerometer", "count", "m/s^2", scale, np.zeros((12, 12)))
+    found = magnitudes(np.eye(3) * 981.0, counts, 9.81, "abc")
+    assert found.before is None
+    assert found.after == pytest.approx((9.81,) * 3)
+
+
+def test_the_predicted_covariance_over_many_units():
+    rng, n, bias_sd, scale_sd = np.random.default_rng(21), 1000, 2e-5, 3e-6
+    spread = np.tile([1e-5, 1e-6, 2e-6, 2e-6], 3)
+    calibration_covariance = np.diag(spread**2)
+    errors, p_values = np.zeros((n, 9)), np.zeros(n)
+    for k in range(n):
+        launch = [rng.normal(size=3) * bias_sd for _ in range(2)], [rng.normal(size=3) * scale_sd for _ in range(2)]
+        measured = np.column_stack(
+            [B_ACCELEROMETER + launch[0][0], K_ACCELEROMETER * (1 + launch[1][0])[:, None]]
+        ).ravel() + spread * rng.normal(size=12)
+        calibration = triad_calibration("accelerometer", "m/s^2", "m/s^2", measured, calibration_covariance)
+        means = B_ACCELEROMETER + launch[0][1] + VECTORS @ (K_ACCELEROMETER * (1 + launch[1][1])[:, None]).T
+        means += np.array([np.linalg.cholesky(c) @ rng.normal(size=9) for c in NOISE]).T
+        covariance = error_covariance(VECTORS, calibration, NOISE, bias_sd, scale_sd)
+        errors[k] = magnitudes(means, calibration, SITE.gravity_m_s2, ANGLES_LABELS).errors
+        p_values[k] = chi_square_p(errors[k], covariance)[1]
+    # Nine standard deviations of n values each: relative error 1/√(2n); four of them, and a little for nine at once.
+    assert errors.std(axis=0) / np.sqrt(np.diagonal(covariance)) == pytest.approx(np.ones(9), abs=4.5 / np.sqrt(2 * n))
+    assert p_values.mean() == pytest.approx(0.5, abs=4 * 0.289 / np.sqrt(n))
+    # The mean sample variance over stations; its own relative error is at most that of one station.
+    expected = predicted_sd(covariance)
+    assert np.sqrt(np.mean(errors.var(axis=1, ddof=1))) == pytest.approx(expected, rel=4.5 / np.sqrt(2 * n))
+
+
+ANGLES_LABELS = tuple(str(i) for i in range(9))

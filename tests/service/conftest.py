@@ -1,0 +1,31 @@
+"""A real service over a real HTTP client, on SQLite and on Postgres."""
+
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+
+from bench_service.cli.client import connect
+from bench_service.settings import Settings
+from tests.service.client import Client
+
+
+@pytest.fixture(scope="module", params=["sqlite", "postgres"])
+def database_url(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> str:
+    if request.param == "sqlite":
+        return f"sqlite:///{tmp_path_factory.mktemp('service') / 'bench.sqlite'}"
+    return request.getfixturevalue("new_postgres_database")()
+
+
+@pytest.fixture(scope="module")
+def client(database_url: str) -> Generator[Client]:
+    with connect(Settings(database_url=database_url), None, drive=True) as http:
+        yield Client(http)
+
+
+@pytest.fixture(scope="module")
+def sqlite_client(tmp_path_factory: pytest.TempPathFactory) -> Generator[Client]:
+    """Where the database makes no difference."""
+    url = f"sqlite:///{Path(tmp_path_factory.mktemp('service')) / 'bench.sqlite'}"
+    with connect(Settings(database_url=url), None, drive=True) as http:
+        yield Client(http)
