@@ -11,9 +11,9 @@ import numpy as np
 
 from procedures.bench import Bench
 from procedures.core import units
-from procedures.core.frames import TableAngles
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import Station
+from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
 from simulators.clock import SimClock, Wait
 from simulators.imu.device import SimImu, unit_channels

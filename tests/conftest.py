@@ -9,8 +9,8 @@ from uuid import uuid4
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: two xdist workers on two cores
 
-import pytest  # noqa: E402
-import sqlalchemy as sa  # noqa: E402
+import pytest
+import sqlalchemy as sa
 
 from bench_service.persistence import open_stores
 

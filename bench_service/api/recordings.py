@@ -58,7 +58,7 @@ def read_data(
     recordings = service.stores.recordings
     stored = recordings.get(recording_id)
     names = None if channels is None else channels.split(",")
-    part = extract(stored.info, stored.dtype, names, start_s, stop_s)
+    part = extract(stored.info, names, start_s, stop_s)
     blocks = recordings.read(recording_id, [c.name for c in part.info.channels], part.start, part.stop)
     file_name = f"{recording_id}.{form.value}"
     return StreamingResponse(

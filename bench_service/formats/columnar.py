@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 
 from bench_service.formats.description import Column
 from bench_service.formats.errors import UnreadableFile
-from procedures.core.frames import Array
+from procedures.core.arrays import Array
 
 _BLOCK_ROWS = 65_536
 

@@ -17,7 +17,7 @@ from pyarrow import csv
 
 from bench_service.formats.description import DELIMITERS, Column, ImportDescription
 from bench_service.formats.errors import UnreadableFile
-from procedures.core.frames import Array
+from procedures.core.arrays import Array
 
 _BLOCK_BYTES = 4 * 1024 * 1024
 _LONGEST_LINE_BYTES = 1024 * 1024

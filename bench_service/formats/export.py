@@ -8,7 +8,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -46,10 +45,13 @@ class Extract:
     """Of the whole recording, its channels those that go out."""
     start: int
     stop: int
+    dtype: str
+    """"int32" or "float64"."""
 
 
 def extract(
     info: RecordingInfo,
+    dtype: str,
     channels: Iterable[str] | None = None,
     start_s: float | None = None,
     stop_s: float | None = None,
@@ -66,7 +68,7 @@ def extract(
     last = info.count if stop_s is None else _sample(info, "stop_s", stop_s)
     if last < first:
         raise BadParameter("stop_s", stop_s, f"not before start_s = {start_s}")
-    return Extract(replace(info, channels=chosen), first, last)
+    return Extract(replace(info, channels=chosen), first, last, dtype)
 
 
 def _sample(info: RecordingInfo, field: str, moment_s: float) -> int:
@@ -84,13 +86,6 @@ def export(part: Extract, blocks: Iterable[RawArray], form: ExportFormat) -> Ite
         ExportFormat.CSV: _csv,
     }
     return writers[form](part, blocks)
-
-
-def _typed(blocks: Iterable[RawArray]) -> tuple[str, Iterator[RawArray]]:
-    """The type of the samples, from the first block, and all blocks; an empty part has integers, none of them."""
-    rest = iter(blocks)
-    first = next(rest, None)
-    return ("int32", rest) if first is None else (first.dtype.name, chain([first], rest))
 
 
 class _Outbox:
@@ -132,8 +127,8 @@ def describe(part: Extract) -> dict[str, str]:
     }
 
 
-def _schema(part: Extract, dtype: str) -> Any:
-    kind = pa.from_numpy_dtype(sample_type(dtype))
+def _schema(part: Extract) -> Any:
+    kind = pa.from_numpy_dtype(sample_type(part.dtype))
     fields = [
         pa.field(
             channel.name,
@@ -158,8 +153,7 @@ def _batches(schema: Any, blocks: Iterable[RawArray]) -> Iterator[Any]:
 
 
 def _arrow(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
-    dtype, blocks = _typed(blocks)
-    outbox, schema = _Outbox(), _schema(part, dtype)
+    outbox, schema = _Outbox(), _schema(part)
     with pa.ipc.new_stream(pa.PythonFile(outbox, mode="w"), schema) as writer:
         for batch in _batches(schema, blocks):
             writer.write_batch(batch)
@@ -168,14 +162,15 @@ def _arrow(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
 
 
 def _parquet(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
-    dtype, blocks = _typed(blocks)
-    outbox, schema = _Outbox(), _schema(part, dtype)
+    outbox, schema = _Outbox(), _schema(part)
     with pq.ParquetWriter(
         pa.PythonFile(outbox, mode="w"),
         schema,
         compression="zstd",
         use_dictionary=False,
-        column_encoding=dict.fromkeys(schema.names, "DELTA_BINARY_PACKED" if dtype == "int32" else "BYTE_STREAM_SPLIT"),
+        column_encoding=dict.fromkeys(
+            schema.names, "DELTA_BINARY_PACKED" if part.dtype == "int32" else "BYTE_STREAM_SPLIT"
+        ),
     ) as writer:
         for batch in _batches(schema, blocks):
             writer.write_batch(batch)

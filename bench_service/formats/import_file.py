@@ -16,8 +16,8 @@ from bench_service.formats.delimited import text_columns
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.time_steps import TimeSteps
+from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.frames import Array
 from procedures.core.recording import Channel, RawArray
 
 _INT32 = np.iinfo(np.int32)

@@ -3,8 +3,8 @@
 import numpy as np
 
 from bench_service.formats.errors import UnreadableFile
+from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
-from procedures.core.frames import Array
 
 
 class TimeSteps:

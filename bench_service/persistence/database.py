@@ -140,8 +140,8 @@ def storage_errors() -> Generator[None, None, None]:
         raise StorageFailure(f"the database failed: {error}") from error
     except sqlite3.Error as error:
         raise StorageFailure(f"the database failed: {error}") from error
-    except OverflowError as error:
-        raise StorageFailure(f"a number does not fit its column: {error}") from error
+    except (ValueError, OverflowError) as error:
+        raise StorageFailure(f"a value cannot be stored, or not be read again: {error}") from error
 
 
 def is_full(error: BaseException | None) -> bool:

@@ -41,7 +41,6 @@ def stored_of_row(row: RecordingRow) -> StoredRecording:
         bench=row.bench,
         stored_bytes=row.stored_bytes,
         chunks=row.chunks,
-        dtype=row.sample_type,
         source=row.source,
     )
 

@@ -4,7 +4,8 @@ Knows when something is committed and what remains when it cannot be. Must not k
 
 * Before the first full chunk nothing is in the database. A short dwell is one transaction, at `seal`.
 * With the first chunk comes the row, `open`, which no list shows.
-* After a failed `write` the writer can only be abandoned: what was committed is then kept as interrupted.
+* After a failed `write` the writer can only be abandoned: what a job had committed is then kept as interrupted, an
+  import leaves nothing.
 * A failed `seal` may be tried again.
 """
 
@@ -23,7 +24,7 @@ from bench_service.formats.content_hash import ContentHash
 from bench_service.jobs.errors import StorageFailure, StorageFull
 from bench_service.jobs.store import NewRecording, RecordingState
 from bench_service.persistence.database import Conflict, Database
-from bench_service.persistence.idempotency import remember
+from bench_service.persistence.idempotency import made_before, remember
 from bench_service.persistence.recording_rows import fill_row, info_of_row
 from bench_service.persistence.tables import ChunkRow, RecordingRow
 from procedures.core.errors import BadParameter, UnfitRecording
@@ -101,9 +102,12 @@ class SqlRecordingWriter:
         if not self._chunks:
             return
         try:
-            self._interrupt()
+            if self._new.job_id is None:
+                self._discard()
+            else:
+                self._interrupt()
         except (StorageFull, StorageFailure) as error:
-            log.warning("recording %s stays open until its job is taken up again: %s", self.id, error)
+            log.warning("recording %s stays open, and unlisted, until it is cleared away: %s", self.id, error)
 
     def _commit_chunk(self) -> None:
         with self._database.write() as session:
@@ -167,7 +171,12 @@ class SqlRecordingWriter:
         row.stored_bytes += len(payload)
 
     def _complete_before(self) -> RecordingInfo | None:
-        """The complete recording of the same job and station, if there is one."""
+        """The complete recording of the same key, or of the same job and station, if there is one."""
+        with self._database.read() as session:
+            made = made_before(session, self._new.idempotency, "recording")
+            row = None if made is None else session.get(RecordingRow, made)
+            if row is not None:
+                return info_of_row(row)
         if self._new.job_id is None or self._new.station is None:
             return None
         query = select(RecordingRow).where(

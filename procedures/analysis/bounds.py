@@ -6,7 +6,7 @@ from scipy.linalg import block_diag
 from procedures.analysis.multiposition import estimator
 from procedures.analysis.table_errors import TableErrors
 from procedures.analysis.whitening import whitener
-from procedures.core.frames import Array
+from procedures.core.arrays import Array
 
 
 def cramer_rao_bound(vectors: Array, noise_covariance: Array) -> Array:

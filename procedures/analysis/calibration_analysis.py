@@ -17,10 +17,11 @@ from procedures.analysis.station_means import StationMeans, station_means
 from procedures.analysis.station_noise import triad_covariance
 from procedures.analysis.table_errors import TableErrors, TableUncertainty, table_errors
 from procedures.analysis.verification import magnitudes
+from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
-from procedures.core.frames import Array, TableAngles
 from procedures.core.recording import Recording
 from procedures.core.site import Site
+from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord
 
 

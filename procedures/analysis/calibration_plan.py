@@ -10,8 +10,9 @@ from procedures.analysis.reference import reference_vectors
 from procedures.analysis.station_noise import triad_covariance
 from procedures.analysis.station_plan import dwell_for, windows
 from procedures.analysis.table_errors import TableErrors, TableUncertainty, table_errors
+from procedures.analysis.verification import magnitude_sensitivity, predicted_sd
 from procedures.core import units
-from procedures.core.frames import Array
+from procedures.core.arrays import Array
 from procedures.core.recording import Station
 from procedures.core.site import Site
 from procedures.core.unit import Unit
@@ -127,6 +128,21 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
     return (
         f"{r.triad} {r.name} run to run: the limit of {r.limit / r.display_size:g} {r.display} cannot be resolved, "
         f"the plan's standard uncertainty is {expected / r.display_size:.3g} {r.display}; {way_out}{turns}"
+    )
+
+
+def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size: float) -> str | None:
+    """A sentence where the noise of the dwells alone makes a per-axis figure δ/√3 (thesis 5.1) beyond its limit [SI]."""
+    noise = plan.noise_covariance()
+    if noise is None:
+        return None
+    weights, _ = magnitude_sensitivity(plan.vectors, plan.matrix)
+    expected = predicted_sd(np.einsum("ic,cij,jc->ij", weights, noise, weights)) / float(np.sqrt(3.0))
+    if expected <= limit:
+        return None
+    return (
+        f"{plan.triad} bias in run: the limit of {limit / display_size:g} {display} cannot be resolved, the noise of the "
+        f"dwells alone makes δ/√3 about {expected / display_size:.3g} {display}"
     )
 
 

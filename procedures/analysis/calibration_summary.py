@@ -9,7 +9,7 @@ from procedures.analysis.multiposition import TriadFit
 from procedures.analysis.scalar import PARAMETERS, ScalarFit, observable_derivative, scalar_parameters
 from procedures.analysis.table_errors import TableErrors
 from procedures.analysis.verification import Magnitudes
-from procedures.core.frames import Array
+from procedures.core.arrays import Array
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
 
 

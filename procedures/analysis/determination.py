@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from procedures.core.arrays import Array
 from procedures.core.errors import Undetermined
-from procedures.core.frames import Array
 
 RANK_TOLERANCE = 1e-9
 """Singular values beneath this part of the largest count as zero (columns scaled to unit length)."""

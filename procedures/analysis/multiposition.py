@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from procedures.analysis.determination import require_full_rank
 from procedures.analysis.table_errors import SOURCES, TableErrors
 from procedures.analysis.whitening import whitener
-from procedures.core.frames import Array
+from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration, triad_calibration
 
 

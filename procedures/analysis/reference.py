@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from procedures.core.frames import Array, TableAngles, earth_rate_b, specific_force_b
+from procedures.core.arrays import Array
+from procedures.core.frames import earth_rate_b, specific_force_b
 from procedures.core.site import Site
+from procedures.core.table_angles import TableAngles
 
 TRIAD_NAMES = ("gyro", "accelerometer")
 INPUT_UNITS = {"gyro": "rad/s", "accelerometer": "m/s^2"}

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
-from procedures.core.frames import Array
 from procedures.core.imu_model import TriadCalibration
 
 

@@ -15,7 +15,7 @@ from scipy.stats import chi2
 
 from procedures.analysis.determination import RANK_TOLERANCE, require_full_rank
 from procedures.analysis.whitening import whitener
-from procedures.core.frames import Array
+from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration, triad_calibration
 
 PARAMETERS = ("b_x", "b_y", "b_z", "s_x", "s_y", "s_z", "t_xy", "t_xz", "t_yz")

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
-from procedures.core.frames import Array, TableAngles
 from procedures.core.recording import INCREMENTS, TRIADS, Recording, RecordingInfo
+from procedures.core.table_angles import TableAngles
 
 BATCHES = 20
 """Stretches a dwell is cut into; the scatter of their means allows for noise correlated over less than a stretch."""

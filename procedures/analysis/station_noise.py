@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from procedures.core.frames import Array
+from procedures.core.arrays import Array
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.unit import TriadRecord
 

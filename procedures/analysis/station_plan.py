@@ -4,8 +4,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from procedures.core.frames import Array, TableAngles
+from procedures.core.arrays import Array
 from procedures.core.recording import Station
+from procedures.core.table_angles import TableAngles
 
 LONGEST_DWELL_S = 86_400.0
 """A day at one station: a dwell that would have to be longer counts as out of reach."""
@@ -42,7 +43,7 @@ def dwell_for(uncertainty: Callable[[float], float], limit: float, shortest_s: f
     The uncertainty is taken to fall with the dwell until slow noise stops it; found to 1 % by bisection of the
     logarithm, after a coarse search.
     """
-    dwells = np.geomspace(shortest_s, max(LONGEST_DWELL_S, shortest_s), 16)
+    dwells = np.geomspace(shortest_s, max(LONGEST_DWELL_S, shortest_s), 9)
     reached = next((i for i, dwell in enumerate(dwells) if uncertainty(float(dwell)) <= limit), None)
     if reached is None:
         return None

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
-from procedures.core.frames import Array
 
 
 @dataclass(frozen=True)

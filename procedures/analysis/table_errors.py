@@ -11,7 +11,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from procedures.core import units
-from procedures.core.frames import Array, TableAngles, table_rotation
+from procedures.core.arrays import Array
+from procedures.core.frames import table_rotation
+from procedures.core.table_angles import TableAngles
 
 SOURCES = ("orthogonality", "level", "azimuth", "gravity", "pointing")
 X, Y, Z = np.eye(3)

@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from scipy.stats import chi2
 
 from procedures.analysis.whitening import whitener
-from procedures.core.frames import Array
+from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration, correct
 
 

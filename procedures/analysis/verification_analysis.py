@@ -12,8 +12,8 @@ from procedures.analysis.reference import reference_magnitude, reference_vectors
 from procedures.analysis.station_means import station_means
 from procedures.analysis.station_noise import triad_covariance
 from procedures.analysis.verification import Magnitudes, chi_square_p, error_covariance, magnitudes
+from procedures.core.arrays import Array
 from procedures.core.errors import DomainError, UnfitRecording
-from procedures.core.frames import Array
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Recording
 from procedures.core.site import Site

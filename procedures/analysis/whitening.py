@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.linalg import cholesky
 
-from procedures.core.frames import Array
+from procedures.core.arrays import Array
 
 
 def whitener(covariance: Array) -> Array:

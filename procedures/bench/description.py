@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from procedures.core.frames import TableAngles
 from procedures.core.site import Site
+from procedures.core.table_angles import TableAngles
 
 
 @dataclass(frozen=True)

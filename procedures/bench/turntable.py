@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from procedures.core.frames import TableAngles
+from procedures.core.table_angles import TableAngles
 
 
 class Turntable(Protocol):

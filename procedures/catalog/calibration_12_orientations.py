@@ -13,7 +13,13 @@ from pydantic import Field
 from procedures import steps
 from procedures.analysis import calibration_report as pictures
 from procedures.analysis.calibration_analysis import analyse_triad
-from procedures.analysis.calibration_plan import TriadPlan, run_to_run_requirements, triad_plan, unresolved
+from procedures.analysis.calibration_plan import (
+    TriadPlan,
+    in_run_unresolved,
+    run_to_run_requirements,
+    triad_plan,
+    unresolved,
+)
 from procedures.analysis.calibration_summary import TriadSummary, coefficient_unit
 from procedures.analysis.reference import INPUT_UNITS, TRIAD_NAMES, site_with
 from procedures.analysis.scalar import require_scalar_determined
@@ -231,6 +237,11 @@ def _warnings(params: Params, plans: Sequence[TriadPlan]) -> tuple[str, ...]:
     )
     by_triad = {plan.triad: plan for plan in plans}
     found = [unresolved(by_triad[r.triad], r) for r in requirements]
+    deg_h = units.DEG_PER_HOUR
+    found += [
+        in_run_unresolved(by_triad["gyro"], limits.gyro_bias_in_run_deg_h * deg_h, "deg/h", deg_h),
+        in_run_unresolved(by_triad["accelerometer"], limits.accelerometer_bias_in_run_m_s2, "m/s^2", 1.0),
+    ]
     unknown = [
         f"the noise of the {p.triad} triad is not known: its uncertainties come from the scatter within the dwells and "
         "the residuals, which do not show noise slower than the job"

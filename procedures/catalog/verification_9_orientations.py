@@ -13,7 +13,7 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis import calibration_report as pictures
-from procedures.analysis.calibration_plan import TriadPlan, triad_plan
+from procedures.analysis.calibration_plan import TriadPlan, in_run_unresolved, triad_plan
 from procedures.analysis.reference import TRIAD_NAMES, site_with
 from procedures.analysis.station_plan import windows
 from procedures.analysis.table_errors import TableUncertainty
@@ -28,11 +28,11 @@ from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter
-from procedures.core.frames import TableAngles
 from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.site import Site
+from procedures.core.table_angles import TableAngles
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
@@ -109,7 +109,7 @@ def predict(params: Params, context: Context) -> Prediction:
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     uncertainties = tuple(u for plan in plans for u in _predicted(plan))
     duration_s = float(windows(schedule(params), _axes(context))[-1, 1])
-    return Prediction(duration_s, uncertainties, _warnings(plans))
+    return Prediction(duration_s, uncertainties, _warnings(plans, params.limits))
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
@@ -125,7 +125,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     triads = tuple(verify_triad(recordings, triad, site, context.unit) for triad in TRIAD_NAMES)
     checks = tuple(c for t in triads for c in _checks(t, params.limits))
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
-    return Result(checks=checks, verdict=verdict(checks), warnings=_warnings(plans), triads=triads)
+    return Result(checks=checks, verdict=verdict(checks), warnings=_warnings(plans, params.limits), triads=triads)
 
 
 def report(result: Result) -> Report:
@@ -168,8 +168,14 @@ def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
     ]
 
 
-def _warnings(plans: Sequence[TriadPlan]) -> tuple[str, ...]:
-    found: list[str] = []
+def _warnings(plans: Sequence[TriadPlan], limits: Limits) -> tuple[str, ...]:
+    deg_h = units.DEG_PER_HOUR
+    gyro, accelerometer = plans
+    in_run = (
+        in_run_unresolved(gyro, limits.gyro_bias_in_run_deg_h * deg_h, "deg/h", deg_h),
+        in_run_unresolved(accelerometer, limits.accelerometer_bias_in_run_m_s2, "m/s^2", 1.0),
+    )
+    found = [w for w in in_run if w is not None]
     for plan in plans:
         record = plan.unit.triad(plan.triad)
         if plan.noise_covariance() is None or record is None:

@@ -4,25 +4,13 @@ This is the *judge's* geometry: commanded angles through ideal, orthogonal axes.
 has its own kinematics (MuJoCo bodies) and shares nothing with this file.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from procedures.core import units
+from procedures.core.arrays import Array
 from procedures.core.site import Site
-
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class TableAngles:
-    """The three table angles [deg]: outer about the vertical, middle about z, inner about the unit's x."""
-
-    outer_deg: float = 0.0
-    middle_deg: float = 0.0
-    inner_deg: float = 0.0
+from procedures.core.table_angles import TableAngles
 
 
 def table_rotation(angles: TableAngles) -> Rotation:

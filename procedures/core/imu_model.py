@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from procedures.core.frames import Array
+from procedures.core.arrays import Array
 
 Vector = tuple[float, ...]
 Matrix = tuple[tuple[float, ...], ...]

@@ -13,8 +13,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from procedures.core.arrays import Array
 from procedures.core.errors import MissingChannel
-from procedures.core.frames import Array, TableAngles
+from procedures.core.table_angles import TableAngles
 
 RawArray = NDArray[np.int32] | NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from procedures.analysis.station_means import station_means
 from procedures.analysis.station_noise import triad_covariance
 from procedures.analysis.still import StillSettings, pose_means, still_stretches
 from procedures.core import units
+from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
-from procedures.core.frames import Array
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import TRIADS, Recording, rates

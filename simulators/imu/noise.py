@@ -6,10 +6,10 @@ second, exactly those of the continuous process, held through the cell; their ca
 is carried from one to the next is the state at its start.
 
 Bias instability is a bank of M Gauss-Markov processes, two a decade, relaxation times at the middles of M equal
-log-intervals of the flicker band, each of variance ``(B²/π)·ln(τ₂/τ₁)/M`` and started stationary (`procedures.core.
-noise` defines the process). With ``h = (τ/Δ)·tanh(Δ/2τ)`` the mean over a cell from x₀ to x₁ is ``h·(x₀+x₁)`` plus an
-independent normal residue; for the rate random walk ``h = ½`` and the residue's variance is ``K²Δ/12``. The residues
-of all processes of a channel are one draw.
+log-intervals of the flicker band, each of variance ``(B²/π)·ln(τ₂/τ₁)/M`` and started stationary
+(`procedures.core.noise` defines the process). With ``h = (τ/Δ)·tanh(Δ/2τ)`` the mean over a cell from x₀ to x₁ is
+``h·(x₀+x₁)`` plus an independent normal residue; for the rate random walk ``h = ½`` and the residue's variance is
+``K²Δ/12``. The residues of all processes of a channel are one draw.
 """
 
 from dataclasses import dataclass

@@ -15,7 +15,7 @@ def keyed_generator(seed: int, *labels: object, block: int = 0) -> np.random.Gen
     Philox-4x64: the key is a hash of seed and labels, the block number stands in the highest word of the counter,
     so that 2^192 draws lie between two blocks.
     """
-    digest = blake2b(repr((seed, *labels)).encode(), digest_size=16).digest()
+    digest = blake2b(repr((int(seed), *map(str, labels))).encode(), digest_size=16).digest()
     key = np.frombuffer(digest, dtype=np.uint64)
     return np.random.Generator(np.random.Philox(key=key, counter=np.array([0, 0, 0, block], dtype=np.uint64)))
 

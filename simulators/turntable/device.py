@@ -12,7 +12,7 @@ import numpy as np
 from procedures.bench.description import BenchDescription
 from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
 from procedures.core import units
-from procedures.core.frames import TableAngles
+from procedures.core.table_angles import TableAngles
 from simulators.clock import Motion, SimClock
 from simulators.truth import Array, BenchTruth, TableTruth, keyed_generator
 from simulators.turntable.kinematics import at_rest, attitude, path_increments

@@ -25,6 +25,9 @@ TORQUE_LIMIT_N_M = 450.0
 INERTIA_KG_M2 = {"outer": 12.0, "middle": 5.0, "inner": 1.5}
 UNBALANCE_KG, UNBALANCE_M = 0.5, 0.15
 
+# MuJoCo would write its warnings to a file in the working directory; `Plant.run` reads their numbers instead.
+mujoco.set_mju_user_warning(lambda _text: None)  # pyright: ignore[reportAttributeAccessIssue]
+
 Quaternion = tuple[float, float, float, float]
 
 

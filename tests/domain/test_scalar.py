@@ -14,7 +14,8 @@ from procedures.analysis.scalar import (
     start_from_data,
 )
 from procedures.core.errors import Undetermined
-from procedures.core.frames import TableAngles, orientation_beta_gamma, orientation_gamma_beta
+from procedures.core.frames import orientation_beta_gamma, orientation_gamma_beta
+from procedures.core.table_angles import TableAngles
 from tests.domain.forward_model import B_ACCELEROMETER, K_ACCELEROMETER, SITE
 from tests.domain.test_multiposition import BETA_GAMMA
 

@@ -6,8 +6,8 @@ import pytest
 from procedures.analysis.reference import reference_vectors
 from procedures.analysis.table_errors import TableUncertainty, table_errors
 from procedures.core import units
-from procedures.core.frames import TableAngles
 from procedures.core.recording import Station
+from procedures.core.table_angles import TableAngles
 from tests.domain.forward_model import SITE, Table
 
 ANGLES = [TableAngles(20.0, -50.0, 110.0), TableAngles(-75.0, 33.0, 5.0)]

@@ -98,5 +98,6 @@ def test_a_job_survives_a_killed_service(
         expected = {k: r["content_hash"] for k, r in service.recordings(undisturbed).items()}
         assert {k: r["content_hash"] for k, r in after.items()} == expected
     finally:
+        service.client.close()
         service.process.terminate()
         assert service.process.wait(30) in (0, -signal.SIGTERM), service.log.read_text()

@@ -110,9 +110,7 @@ def test_jobs_of_smaller_priority_number_run_first(client: Client) -> None:
 def test_analysing_again_needs_no_bench_and_leaves_the_first_result(client: Client) -> None:
     job = client.wait(client.submit(seed=3)["id"])
     first = client.http.get(f"/api/v1/jobs/{job['id']}/result").json()
-    again = client.http.post(
-        f"/api/v1/jobs/{job['id']}/analyses", json={"parameters": {"gravity_m_s2": 9.8}}
-    )
+    again = client.http.post(f"/api/v1/jobs/{job['id']}/analyses", json={"parameters": {"gravity_m_s2": 9.8}})
     assert again.status_code == 201, again.text
     assert again.json()["document"] != first["document"]
     assert client.http.get(f"/api/v1/jobs/{job['id']}/result").json() == first

@@ -6,8 +6,8 @@ from math import log, pi, sqrt
 import numpy as np
 import pytest
 
-from procedures.core.frames import TableAngles
 from procedures.core.recording import Station
+from procedures.core.table_angles import TableAngles
 from simulators.imu.sensor import TriadSensor, launch_coefficients, station_means
 from simulators.truth import TriadTruth
 from simulators.world import WorldConfig, build, dwell_means

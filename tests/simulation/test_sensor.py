@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from procedures.bench.errors import DeviceFault
-from procedures.core.frames import TableAngles
 from procedures.core.recording import Station
+from procedures.core.table_angles import TableAngles
 from simulators.imu.sensor import Counter, launch_coefficients
 from simulators.world import WorldConfig, build, launch_truth
 

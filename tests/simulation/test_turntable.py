@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
-from procedures.core.frames import TableAngles
+from procedures.core.table_angles import TableAngles
 from simulators.truth import TableTruth, default_bench, random_table_truth
 from simulators.turntable.device import pointing_error_rad
 from simulators.turntable.kinematics import at_rest, attitude

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from procedures.bench.errors import DeviceFault, NotPowered, OutOfRange
-from procedures.core.frames import TableAngles
 from procedures.core.recording import Quantity, Station
+from procedures.core.table_angles import TableAngles
 from procedures.core.units import DEG, EARTH_RATE
 from simulators.clock import Motion, SimClock
 from simulators.truth import default_unit

@@ -10,9 +10,9 @@ from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.store import NewRecording, StoredResult, Stores
 from bench_service.persistence import Database, open_stores
 from bench_service.wall_clock import new_id
-from procedures.core.frames import TableAngles
 from procedures.core.limits import Verdict
 from procedures.core.recording import ACCELEROMETER, GYRO, Channel, Quantity, RawArray, Station
+from procedures.core.table_angles import TableAngles
 
 NOW = datetime(2031, 5, 6, 7, 8, 9, 123456, tzinfo=UTC)
 CHANNELS = tuple(Channel(name, Quantity.ANGLE_INCREMENT, "rad", 6.545e-6, 0.5) for name in GYRO) + tuple(

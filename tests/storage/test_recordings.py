@@ -9,9 +9,9 @@ import sqlalchemy as sa
 
 from bench_service.formats import chunk
 from bench_service.formats.content_hash import content_hash
-from bench_service.jobs.errors import NotFound, StorageFailure
+from bench_service.jobs.errors import IdempotencyConflict, NotFound, StorageFailure
 from bench_service.jobs.job import Job
-from bench_service.jobs.store import NewRecording, RecordingState, Stores
+from bench_service.jobs.store import Idempotency, NewRecording, RecordingState, Stores
 from bench_service.persistence import Database
 from bench_service.persistence.recording_store import SqlRecordingStore
 from bench_service.persistence.tables import ChunkRow, RecordingRow
@@ -131,14 +131,16 @@ def test_nothing_is_seen_before_the_seal(
 
 
 def test_what_is_abandoned_is_kept_only_where_a_chunk_was(
-    stores: Stores, database: Database, new_recording: New, samples: Samples
+    stores: Stores, database: Database, new_recording: New, new_job: Callable[..., Job], samples: Samples
 ) -> None:
-    short = stores.recordings.open(new_recording())
+    job = stores.jobs.add(new_job())
+    new = new_recording(job_id=job.id, station=job.stations[0])
+    short = stores.recordings.open(new)
     short.write(samples(ROWS - 1))
     short.abandon()
     assert _count(database, RecordingRow) == 0
     raw = samples(3 * ROWS - 1)
-    long = stores.recordings.open(new_recording())
+    long = stores.recordings.open(new)
     long.write(raw)
     long.abandon()
     (kept,) = stores.recordings.list().items
@@ -146,6 +148,15 @@ def test_what_is_abandoned_is_kept_only_where_a_chunk_was(
     assert kept.info.count == 2 * ROWS
     assert kept.info.content_hash == content_hash(kept.info.channels, 400.0, raw[: 2 * ROWS])
     np.testing.assert_array_equal(_whole(stores.recordings.load(kept.info.id).blocks()), raw[: 2 * ROWS])
+
+
+def test_an_abandoned_import_leaves_nothing(
+    stores: Stores, database: Database, new_recording: New, samples: Samples
+) -> None:
+    writer = stores.recordings.open(new_recording())
+    writer.write(samples(2 * ROWS))
+    writer.abandon()
+    assert (_count(database, RecordingRow), _count(database, ChunkRow)) == (0, 0)
 
 
 def test_after_a_crash_an_open_recording_becomes_interrupted(
@@ -214,6 +225,23 @@ def test_a_recording_of_no_job_there_is_is_refused(stores: Stores, new_recording
     with pytest.raises(StorageFailure):
         writer.seal()
     assert stores.recordings.list().items == ()
+
+
+def test_a_key_makes_one_recording(stores: Stores, database: Database, new_recording: New, samples: Samples) -> None:
+    key = Idempotency("k", "f")
+    assert stores.recordings.made_before(key) is None
+    rivals = [stores.recordings.open(new_recording(idempotency=key)) for _ in range(2)]
+    for rival in rivals:
+        rival.write(samples(2 * ROWS + 1))
+    first = rivals[0].seal()
+    assert rivals[1].seal() == first
+    assert stores.recordings.made_before(key) == first
+    assert (_count(database, RecordingRow), _count(database, ChunkRow)) == (1, 3)
+    late = stores.recordings.open(new_recording(idempotency=Idempotency("k", "g")))
+    late.write(samples(5))
+    with pytest.raises(IdempotencyConflict):
+        late.seal()
+    assert _count(database, RecordingRow) == 1
 
 
 def test_recordings_are_listed_newest_first_page_by_page(stores: Stores, new_recording: New, samples: Samples) -> None:

@@ -148,7 +148,9 @@ def test_a_unit_comes_back_with_its_current_calibration(
     assert stores.units.unit("U-1") == unit, "the calibrations of the record are not stored"
     stores.results.add(new_result(), [_triad("gyro", 4)])
     stores.results.add(new_result(), [_triad("gyro", 5)])
-    assert stores.units.unit("U-1") == replace(unit, calibrations=(_triad("gyro", 5),))
+    current = stores.results.current_calibration("U-1")
+    assert current is not None
+    assert stores.units.unit("U-1") == replace(unit, calibrations=(_triad("gyro", 5),), calibration_id=current.id)
     other = replace(unit, serial="A-1", gyro=None)
     stores.units.put_unit(other)
     assert stores.units.units() == (other, stores.units.unit("U-1"))
