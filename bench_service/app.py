@@ -60,6 +60,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         summary="Test bench for inertial navigation units",
         version=version("bench-service"),
         lifespan=lifespan,
+        generate_unique_id_function=lambda route: route.name,
     )
     app.state.service = service
     app.state.max_import_bytes = max_import_bytes

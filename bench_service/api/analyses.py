@@ -5,14 +5,17 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from bench_service.api.dependencies import After, IdempotencyKey, Limit, Service
-from bench_service.api.errors import problems
-from bench_service.api.schemas import AnalysisSubmission, ResultPage, ResultView
+from bench_service.api.errors import made, problems
+from bench_service.api.requests import AnalysisSubmission
+from bench_service.api.schemas import ResultPage, ResultView
 from bench_service.jobs.service import AnalysisRequest
 
 router = APIRouter(prefix="/api/v1", tags=["analyses"])
 
 
-@router.post("/analyses", status_code=201, responses=problems(404, 409, 507))
+@router.post(
+    "/analyses", status_code=201, responses={**problems(404, 409, 507), **made(201, "result_id", "read_result_by_id")}
+)
 def run_method(
     body: AnalysisSubmission, service: Service, response: Response, key: IdempotencyKey = None
 ) -> ResultView:
@@ -33,6 +36,6 @@ def list_results(
 
 
 @router.get("/results/{result_id}", responses=problems(404))
-def read_result(result_id: str, service: Service) -> ResultView:
+def read_result_by_id(result_id: str, service: Service) -> ResultView:
     """One result with its lineage."""
     return ResultView.of(service.stores.results.get(result_id))

@@ -62,8 +62,8 @@ class Problem(BaseModel):
 
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """The `responses` of a route: these statuses answer with a problem document; 422 and 503 always can."""
-    wanted = sorted({*statuses, 422, 503})
+    """The `responses` of a route: these statuses answer with a problem document; 400, 422 and 503 always can."""
+    wanted = sorted({*statuses, 400, 422, 503})
     return {
         status: {
             "description": HTTPStatus(status).phrase,
@@ -71,6 +71,15 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
         }
         for status in wanted
     }
+
+
+def made(status: int, parameter: str, *operations: str) -> dict[int | str, dict[str, Any]]:
+    """The good answer of a create, with OpenAPI links from the new thing's id to the operations that take it."""
+    link = {
+        operation: {"operationId": operation, "parameters": {parameter: "$response.body#/id"}}
+        for operation in operations
+    }
+    return {status: {"description": HTTPStatus(status).phrase, "links": link}}
 
 
 def install(app: FastAPI) -> None:

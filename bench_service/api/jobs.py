@@ -8,17 +8,9 @@ from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
 from bench_service.api.dependencies import After, IdempotencyKey, Limit, Service
-from bench_service.api.errors import problems
-from bench_service.api.schemas import (
-    EventView,
-    JobPage,
-    JobSubmission,
-    JobView,
-    Reanalysis,
-    ResultPage,
-    ResultView,
-    Truth,
-)
+from bench_service.api.errors import made, problems
+from bench_service.api.requests import JobSubmission, Reanalysis
+from bench_service.api.schemas import EventView, JobPage, JobView, ResultPage, ResultView, Truth
 from bench_service.jobs.job import FINAL, JobState
 from bench_service.jobs.service import BenchService, JobRequest
 from bench_service.wall_clock import pause_async
@@ -37,7 +29,14 @@ EVENT_STREAM: dict[int | str, dict[str, object]] = {
 }
 
 
-@router.post("", status_code=202, responses=problems(404, 409, 507))
+@router.post(
+    "",
+    status_code=202,
+    responses={
+        **problems(404, 409, 507),
+        **made(202, "job_id", "read_job", "cancel", "events", "read_result", "read_truth", "analyse_again"),
+    },
+)
 def submit(body: JobSubmission, service: Service, response: Response, key: IdempotencyKey = None) -> JobView:
     """Queue a job. The same `Idempotency-Key` with the same body gives the job that the first one made."""
     job = service.submit(

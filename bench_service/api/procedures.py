@@ -4,7 +4,8 @@ from fastapi import APIRouter
 
 from bench_service.api.dependencies import Service
 from bench_service.api.errors import problems
-from bench_service.api.schemas import Preview, PreviewRequest, ProcedureView
+from bench_service.api.requests import PreviewRequest
+from bench_service.api.schemas import Preview, ProcedureView
 from procedures.procedure import Method, Outcome, Parameters, Procedure
 
 router = APIRouter(prefix="/api/v1", tags=["procedures"])

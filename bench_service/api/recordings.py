@@ -8,7 +8,7 @@ from fastapi.responses import StreamingResponse
 from pydantic import ValidationError
 
 from bench_service.api.dependencies import After, IdempotencyKey, Limit, Service
-from bench_service.api.errors import problems
+from bench_service.api.errors import made, problems
 from bench_service.api.schemas import RecordingPage, RecordingView
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.export import ExportFormat, export, extract
@@ -58,7 +58,7 @@ def read_data(
     recordings = service.stores.recordings
     stored = recordings.get(recording_id)
     names = None if channels is None else channels.split(",")
-    part = extract(stored.info, names, start_s, stop_s)
+    part = extract(stored.info, stored.dtype, names, start_s, stop_s)
     blocks = recordings.read(recording_id, [c.name for c in part.info.channels], part.start, part.stop)
     file_name = f"{recording_id}.{form.value}"
     return StreamingResponse(
@@ -68,7 +68,9 @@ def read_data(
     )
 
 
-@router.post("", status_code=201, responses=problems(409, 413, 507))
+@router.post(
+    "", status_code=201, responses={**problems(409, 507), **made(201, "recording_id", "read_recording", "read_data")}
+)
 def import_recording(
     request: Request,
     response: Response,

@@ -6,7 +6,8 @@ from fastapi import APIRouter, Path
 
 from bench_service.api.dependencies import After, Limit, Service
 from bench_service.api.errors import problems
-from bench_service.api.schemas import CalibrationPage, CalibrationView, UnitDeclaration, UnitView
+from bench_service.api.requests import UnitDeclaration
+from bench_service.api.schemas import CalibrationPage, CalibrationView, UnitView
 from procedures.core.unit import Unit
 
 router = APIRouter(prefix="/api/v1/units", tags=["units"])

@@ -9,10 +9,10 @@ from procedures.core.units import DISPLAY
 
 
 def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]] | None) -> tuple[Table, float]:
-    """Estimate ± standard uncertainty, truth, error in sigmas; and the largest error in sigmas (0 without truth)."""
+    """Estimate ± standard uncertainty σ, truth, error in sigmas; and the largest error in sigmas (0 without truth)."""
     table = Table(title="Coefficients, U = b + K·v")
-    for column in ("triad", "coefficient", "estimate", "± standard uncertainty", "truth", "error / σ", "unit"):
-        table.add_column(column, justify="left" if column in ("triad", "coefficient", "unit") else "right")
+    for column in ("coefficient", "unit", "estimate", "± σ", "truth", "error / σ"):
+        table.add_column(column, justify="left" if column in ("coefficient", "unit") else "right", no_wrap=True)
     true_by_triad = {t["triad"]: t for t in truths or []}
     worst = 0.0
     for triad in triads:
@@ -23,11 +23,11 @@ def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]]
             scale, unit = (size, name) if column == 0 else (1.0, "1")
             estimate = _entry(triad, channel, column)
             sd = triad["covariance"][index][index] ** 0.5
-            cells = [triad["triad"], coefficient, f"{estimate / scale:.7f}", f"{sd / scale:.2g}", "–", "–", unit]
+            cells = [f"{triad['triad']} {coefficient}", unit, f"{estimate / scale:.7f}", f"{sd / scale:.2g}", "–", "–"]
             if true is not None:
                 error = (estimate - _entry(true, channel, column)) / sd
                 worst = max(worst, abs(error))
-                cells[4:6] = [f"{_entry(true, channel, column) / scale:.7f}", f"{error:+.2f}"]
+                cells[4:] = [f"{_entry(true, channel, column) / scale:.7f}", f"{error:+.2f}"]
             table.add_row(*cells, end_section=index == len(COEFFICIENT_NAMES) - 1)
     return table, worst
 

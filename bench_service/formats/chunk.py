@@ -21,7 +21,8 @@ RAW_BYTES = 2 * 1024 * 1024
 SampleType = np.dtype[np.int32] | np.dtype[np.float64]
 """What a sample may be: counts, or values that a unit computed itself."""
 
-_ENCODINGS = {"int32": "DELTA_BINARY_PACKED", "float64": "BYTE_STREAM_SPLIT"}
+ENCODINGS = {"int32": "DELTA_BINARY_PACKED", "float64": "BYTE_STREAM_SPLIT"}
+"""How Parquet lays out a column, by the type of the samples."""
 
 
 class UnreadableChunk(Exception):
@@ -49,7 +50,7 @@ def rows_per_chunk(channels: int, dtype: SampleType) -> int:
 
 def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> bytes:
     """Samples, shape (n, channels), as Parquet with one column a channel."""
-    encoding = _ENCODINGS[samples.dtype.name]
+    encoding = ENCODINGS[samples.dtype.name]
     schema = pa.schema(
         [pa.field(name, pa.from_numpy_dtype(samples.dtype), nullable=False) for name in names],
         metadata={

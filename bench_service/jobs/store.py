@@ -49,6 +49,8 @@ class StoredRecording:
     bench: str | None = None
     stored_bytes: int = 0
     chunks: int = 0
+    dtype: str = "int32"
+    """Of its samples: "int32" or "float64"."""
     source: dict[str, Any] = field(default_factory=dict[str, Any])
     """Of an imported recording: file name, its SHA-256, reader, declared reference values."""
 

@@ -41,6 +41,7 @@ def stored_of_row(row: RecordingRow) -> StoredRecording:
         bench=row.bench,
         stored_bytes=row.stored_bytes,
         chunks=row.chunks,
+        dtype=row.sample_type,
         source=row.source,
     )
 

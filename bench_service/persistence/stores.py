@@ -12,7 +12,11 @@ from bench_service.persistence.unit_store import SqlUnitStore
 def open_stores(database_url: str) -> tuple[Stores, Database]:
     """All memory behind a URL, brought to the newest form; `Database.dispose` closes it. Raises `StorageFailure`."""
     database = connect(database_url)
-    upgrade_to_head(database)
+    try:
+        upgrade_to_head(database)
+    except BaseException:
+        database.dispose()
+        raise
     return stores_of(database), database
 
 

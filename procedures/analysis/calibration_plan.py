@@ -132,7 +132,7 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
 
 
 def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size: float) -> str | None:
-    """A sentence where the noise of the dwells alone makes a per-axis figure δ/√3 (thesis 5.1) beyond its limit [SI]."""
+    """A sentence where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit [SI]."""
     noise = plan.noise_covariance()
     if noise is None:
         return None
@@ -141,8 +141,8 @@ def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size:
     if expected <= limit:
         return None
     return (
-        f"{plan.triad} bias in run: the limit of {limit / display_size:g} {display} cannot be resolved, the noise of the "
-        f"dwells alone makes δ/√3 about {expected / display_size:.3g} {display}"
+        f"{plan.triad} bias in run: the limit of {limit / display_size:g} {display} cannot be resolved, the noise of "
+        f"the dwells alone makes δ/√3 about {expected / display_size:.3g} {display}"
     )
 
 

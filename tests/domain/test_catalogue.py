@@ -121,7 +121,7 @@ def test_an_in_run_limit_beneath_the_noise_of_the_dwell_is_told(context: Context
         dwell_s=5.0, limits={"gyro_scale_run_to_run_ppm": 1e5, "gyro_bias_run_to_run_deg_h": 1.0}
     )
     (warning,) = CALIBRATION.predict(params, context).warnings
-    # 5 s: √(2·0.39²/25 + 0.0014²·3600/5·…) ≈ 0.12 deg/h of a station, over √3: far above 0.015.
+    # 5 s: √2·0.39″/5 s is 0.11 deg/h, 0.0014 deg/√h over √(5 s) is 0.04 deg/h; over √3: far above 0.015.
     assert "gyro bias in run: the limit of 0.015 deg/h" in warning
 
 

@@ -3,12 +3,14 @@
 import io
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from bench_service.formats.content_hash import content_hash
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.export import ExportFormat, export, extract
 from bench_service.formats.import_file import ImportFile, read_import
@@ -129,7 +131,7 @@ def test_what_is_not_there_is_refused(info: RecordingInfo) -> None:
 def test_neighbouring_parts_share_no_sample_and_miss_none(info: RecordingInfo) -> None:
     odd = replace(info, rate_hz=100.0 / 3.0, count=997)
     cuts = [0.0, 0.03, 0.1, 3.333, 7.77, 12.0, odd.duration_s]
-    parts = [extract(odd, "int32", None, a, b) for a, b in zip(cuts, cuts[1:], strict=False)]
+    parts = [extract(odd, "int32", None, a, b) for a, b in pairwise(cuts)]
     assert [p.start for p in parts[1:]] == [p.stop for p in parts[:-1]]
     assert (parts[0].start, parts[-1].stop) == (0, 997)
 
@@ -153,3 +155,17 @@ def test_bytes_leave_while_blocks_arrive(info: RecordingInfo, samples: Samples) 
             left.append(asked)
         assert sent > 0
         assert len([n for n in left if n < 50]) >= 40, form
+
+
+def test_the_hash_knows_samples_rate_and_channels(new_recording: New, samples: Samples) -> None:
+    raw, channels = samples(10), new_recording().channels
+    other = raw.copy()
+    other[9, 5] += 1
+    hashes = {
+        content_hash(channels, 400.0, raw),
+        content_hash(channels, 400.0, other),
+        content_hash(channels, 100.0, raw),
+        content_hash(channels[::-1], 400.0, raw),
+        content_hash(channels, 400.0, raw.astype(np.float64)),
+    }
+    assert len(hashes) == 5

@@ -10,13 +10,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from pydantic import ValidationError
 
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.import_file import ImportedRecording, ImportFile, read_import
 from bench_service.jobs.store import NewRecording, Stores
-from procedures.core.errors import BadParameter, DomainError, UnfitRecording
+from procedures.core.errors import BadParameter, UnfitRecording
 
 GYRO_X = {"name": "gyro_x", "column": "x", "quantity": "angular_rate", "unit": "rad/s"}
 GYRO_Y = {**GYRO_X, "name": "gyro_y", "column": "y"}
@@ -103,68 +102,6 @@ def test_an_empty_cell_of_a_columnar_file_is_named() -> None:
     pq.write_table(pa.table({"x": [1.0, None, 3.0], "y": [1, 2, 3]}), sink)
     with pytest.raises(UnreadableFile, match="row 2, column 'x'"):
         _read(sink.getvalue())
-
-
-Refusal = tuple[str | bytes, dict[str, Any], type[DomainError], str]
-HEAD = "x,y\n"
-REFUSALS: dict[str, Refusal] = {
-    "empty file": ("", {}, UnreadableFile, "line 1 is empty"),
-    "nothing but a header": (HEAD, {}, UnreadableFile, "no rows"),
-    "shorter than its header": ("a\nb\n", {"header_lines": 5}, UnreadableFile, "line 6 is empty"),
-    "unknown column": ("x,z\n1,2\n", {}, UnreadableFile, "not one column 'y'; the columns are x, z"),
-    "column twice": ("x,y,y\n1,2,3\n", {}, UnreadableFile, "not one column 'y'"),
-    "index too large": ("1,2\n", {"header": False, "channels": [{**GYRO_X, "column": 2}]}, UnreadableFile, "no column 2"),
-    "name without header": ("1,2\n", {"header": False}, UnreadableFile, "not one column 'x'; the columns are 0 … 1"),
-    "word": (HEAD + "1,2\n3,four\n", {}, UnreadableFile, "line 3, column 'y': 'four' where a finite number"),
-    "nan": (HEAD + "1,2\nnan,4\n", {}, UnreadableFile, "line 3, column 'x': 'nan' where a finite number"),
-    "infinity": (HEAD + "1,2\n3,-inf\n", {}, UnreadableFile, "line 3, column 'y': '-inf' where a finite number"),
-    "empty cell": (HEAD + "1,2\n3,\n", {}, UnreadableFile, "line 3, column 'y': '' where a finite number"),
-    "line cut off": (HEAD + "1,2\n3", {}, UnreadableFile, "line 3 has 1 columns, 2 were expected; the file seems to be cut"),
-    "line too long": (HEAD + "1,2\n3,4,5\n6,7\n", {}, UnreadableFile, "line 3 has 3 columns, 2 were expected"),
-    "bad line after blank ones": (HEAD + "\n\n1,2\n3\n", {}, UnreadableFile, "line 5 has 1 columns"),
-    "whitespace, cut": ("1 2\n3", {"header": False, "delimiter": "whitespace", "channels": [{**GYRO_X, "column": 1}]}, UnreadableFile, "line 2 has 1 columns"),
-    "gzip cut off": (gzip.compress(HEAD.encode() + b"1,2\n" * 9999)[:-20], {}, UnreadableFile, "compressed file is cut off"),
-    "gzip damaged": (gzip.compress(HEAD.encode() + b"1,2\n" * 99)[:-8] + b"\0" * 8, {}, UnreadableFile, "compressed file"),
-    "too large for 32 bits": (HEAD + "1,2\n3,2147483648\n", {}, UnfitRecording, "row 2, channel 'gyro_y': 2147483648 does not fit"),
-    "time stands still": (_timed([0, 0.01, 0.01, 0.02]), {"time_column": "t"}, UnfitRecording, "does not grow: 0.01 s in row 2, 0.01 s in row 3"),
-    "time goes back": (_timed([0, 0.01, 0.02, 0.015]), {"time_column": "t"}, UnfitRecording, "row 3, 0.015 s in row 4"),
-    "gap": (_timed([0, 0.01, 0.02, 0.05, 0.06]), {"time_column": "t"}, UnfitRecording, "gap between rows 3 and 4: the step is 0.03 s where 0.01 s"),
-    "another rate": (_timed([0, 0.01, 0.02]), {"time_column": "t", "rate_hz": 400.0}, BadParameter, "rate_hz = 400.0: the time column of a.csv says 100 Hz"),
-    "one row": (_timed([0]), {"time_column": "t", "rate_hz": None}, UnreadableFile, "fewer than two rows"),
-    "wrong unit of time": (_timed([0, 10, 20]), {"time_column": "t", "time_unit": "us"}, BadParameter, "says 100000 Hz"),
-    "binary": (bytes(range(256)) * 9, {}, UnreadableFile, "a.csv"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", REFUSALS)
-def test_what_does_not_fit_is_refused_in_words(case: str) -> None:
-    data, changes, error, words = REFUSALS[case]
-    with pytest.raises(error) as refusal:
-        _read(data, **changes)
-    assert words in str(refusal.value)
-    assert "a.csv" in str(refusal.value)
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"channels": [{k: v for k, v in GYRO_X.items() if k != "unit"}]}, "Field required"),
-        ({"channels": [{**GYRO_X, "unit": "deg/s"}]}, "'deg/s' is none of rad/s, count"),
-        ({"channels": [{**GYRO_X, "scale": 0.0}]}, "the scale not zero"),
-        ({"channels": [{**GYRO_X, "scale": float("nan")}]}, "finite number"),
-        ({"channels": [{**GYRO_X, "colour": "red"}]}, "Extra inputs"),
-        ({"channels": [GYRO_X, GYRO_X]}, "each needs its own name"),
-        ({"channels": []}, "at least 1"),
-        ({"rate_hz": None}, "give rate_hz, or time_column, or both"),
-        ({"rate_hz": float("inf")}, "finite number"),
-        ({"rate_hz": -1.0}, "greater than 0"),
-        ({"sampling": 1}, "Extra inputs"),
-    ],
-)
-def test_a_description_that_leaves_something_open_is_refused(changes: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValidationError) as refusal:
-        _description(**changes)
-    assert words in str(refusal.value)
 
 
 def test_jitter_within_the_tolerance_is_no_gap() -> None:

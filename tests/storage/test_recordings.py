@@ -40,21 +40,21 @@ def _whole(blocks: Iterable[RawArray]) -> RawArray:
     return np.concatenate(list(blocks))
 
 
-@pytest.mark.parametrize("count", [1, ROWS - 1, ROWS, ROWS + 1, 2 * ROWS, 4321])
-def test_samples_come_back_bit_for_bit(stores: Stores, new_recording: New, samples: Samples, count: int) -> None:
-    raw = samples(count)
-    info = _store(stores, new_recording(), raw)
-    recording = stores.recordings.load(info.id)
-    assert recording.info == info
-    assert info.count == count
-    for _ in range(2):
-        back = _whole(recording.blocks())
-        assert back.dtype == np.int32
-        np.testing.assert_array_equal(back, raw)
-    stored = stores.recordings.get(info.id)
-    assert stored.chunks == -(-count // ROWS)
-    assert stored.state is RecordingState.COMPLETE
-    assert stored.stored_bytes > 0
+def test_samples_come_back_bit_for_bit(stores: Stores, new_recording: New, samples: Samples) -> None:
+    for count in (1, ROWS - 1, ROWS, ROWS + 1, 2 * ROWS, 4321):
+        raw = samples(count)
+        info = _store(stores, new_recording(), raw)
+        recording = stores.recordings.load(info.id)
+        assert recording.info == info
+        assert info.count == count
+        for _ in range(2):
+            back = _whole(recording.blocks())
+            assert back.dtype == np.int32
+            np.testing.assert_array_equal(back, raw)
+        stored = stores.recordings.get(info.id)
+        assert stored.chunks == -(-count // ROWS)
+        assert stored.state is RecordingState.COMPLETE
+        assert stored.stored_bytes > 0
 
 
 def test_floating_point_samples_keep_every_bit(stores: Stores, new_recording: New) -> None:
@@ -64,18 +64,14 @@ def test_floating_point_samples_keep_every_bit(stores: Stores, new_recording: Ne
     assert _whole(stores.recordings.load(info.id).blocks()).tobytes() == raw.tobytes()
 
 
-@pytest.mark.parametrize(
-    ("start", "stop"), [(0, 1), (499, 501), (500, 1000), (123, 1999), (1999, 2000), (7, 7), (-5, 9999)]
-)
-def test_any_part_can_be_read_alone(
-    stores: Stores, new_recording: New, samples: Samples, start: int, stop: int
-) -> None:
+def test_any_part_can_be_read_alone(stores: Stores, new_recording: New, samples: Samples) -> None:
     raw = samples(2000)
     info = _store(stores, new_recording(), raw)
     names = ["accelerometer_z", "gyro_x"]
-    blocks = list(stores.recordings.read(info.id, names, start, stop))
-    back = np.concatenate([np.empty((0, 2), np.int32), *blocks])
-    np.testing.assert_array_equal(back, raw[max(0, start) : stop][:, [5, 0]])
+    for start, stop in ((0, 1), (499, 501), (500, 1000), (123, 1999), (1999, 2000), (7, 7), (-5, 9999)):
+        blocks = list(stores.recordings.read(info.id, names, start, stop))
+        back = np.concatenate([np.empty((0, 2), np.int32), *blocks])
+        np.testing.assert_array_equal(back, raw[max(0, start) : stop][:, [5, 0]])
 
 
 def test_an_unknown_channel_or_recording_is_refused_at_once(
@@ -98,20 +94,6 @@ def test_the_hash_does_not_know_chunks_or_blocks(
         monkeypatch.setattr(chunk, "RAW_BYTES", rows * 24)
         hashes.add(_store(stores, new_recording(), raw, step).content_hash)
     assert hashes == {content_hash(new_recording().channels, 400.0, raw)}
-
-
-def test_the_hash_knows_samples_rate_and_channels(new_recording: New, samples: Samples) -> None:
-    raw, channels = samples(10), new_recording().channels
-    other = raw.copy()
-    other[9, 5] += 1
-    hashes = {
-        content_hash(channels, 400.0, raw),
-        content_hash(channels, 400.0, other),
-        content_hash(channels, 100.0, raw),
-        content_hash(channels[::-1], 400.0, raw),
-        content_hash(channels, 400.0, raw.astype(np.float64)),
-    }
-    assert len(hashes) == 5
 
 
 def test_nothing_is_seen_before_the_seal(

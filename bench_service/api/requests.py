@@ -1,0 +1,59 @@
+"""What a client may send: request bodies, every field bounded, unknown ones refused. Units are in the field names."""
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from procedures.core.recording import Channel
+from procedures.core.unit import TriadRecord
+
+Labels = dict[str, str]
+NAME = Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f]+$")
+
+
+class Request(BaseModel):
+    """Base of request bodies: unknown fields are refused."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class PreviewRequest(Request):
+    """What a plan would be worth."""
+
+    unit: str = NAME
+    bench: str | None = Field(None, min_length=1, max_length=100)
+    parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+
+
+class JobSubmission(PreviewRequest):
+    """A job to be done."""
+
+    procedure: str = NAME
+    priority: int = Field(10, ge=1, le=1000, description="Smaller runs first")
+    labels: Labels = Field(default_factory=Labels, max_length=50)
+    seed: int | None = Field(None, ge=0, lt=2**48, description="Of a simulated bench: same seed, same bytes")
+
+
+class AnalysisSubmission(Request):
+    """A method and what it is to work on."""
+
+    method: str = NAME
+    recordings: list[str] = Field(default_factory=list[str], max_length=1000)
+    calibrations: list[str] = Field(default_factory=list[str], max_length=1000)
+    parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+
+
+class Reanalysis(Request):
+    """Other parameters for a job's recordings; those left out stay as they were requested."""
+
+    parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+
+
+class UnitDeclaration(Request):
+    """What is declared of a unit (its data sheet), without its serial, which the address has."""
+
+    sample_rate_hz: float = Field(gt=0, le=1e6, allow_inf_nan=False)
+    channels: list[Channel] = Field(default_factory=list[Channel], max_length=64)
+    gyro: TriadRecord | None = None
+    accelerometer: TriadRecord | None = None
+    averaging_time_s: float = Field(70.0, gt=0, le=1e6, allow_inf_nan=False)
