@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 
 from bench_service.jobs.driver import TrueTriad
 from bench_service.jobs.job import Event, Failure, Job, JobState
-from bench_service.jobs.store import RecordingState, StoredCalibration, StoredRecording, StoredResult
+from bench_service.jobs.stored import RecordingState, StoredCalibration, StoredRecording, StoredResult
 from procedures.bench import BenchDescription
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict

@@ -160,7 +160,7 @@ def _opened(stream: BinaryIO) -> BinaryIO:
     packed = stream.read(2) == b"\x1f\x8b"
     stream.seek(0)
     return (
-        cast(BinaryIO, gzip.GzipFile(fileobj=stream))
+        cast(BinaryIO, gzip.GzipFile(fileobj=stream, mode="rb"))
         if packed
         else cast(BinaryIO, io.BufferedReader(cast(Any, _Kept(stream))))
     )

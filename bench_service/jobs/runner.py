@@ -9,7 +9,8 @@ from bench_service.jobs.errors import ServiceError
 from bench_service.jobs.job import FINAL, Failure, Job, JobState
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
 from bench_service.jobs.session import BenchSession
-from bench_service.jobs.store import Idempotency, StoredResult, Stores
+from bench_service.jobs.store import Stores
+from bench_service.jobs.stored import Idempotency, StoredResult
 from bench_service.wall_clock import new_id, now
 from procedures.bench.errors import BenchError, Stopped
 from procedures.core.errors import DomainError

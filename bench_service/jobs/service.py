@@ -16,7 +16,8 @@ from bench_service.jobs.errors import IllegalTransition, NotDriving, NotFound
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.planning import CONTEXT, Plan, Planner
 from bench_service.jobs.runner import JobRunner, analysed
-from bench_service.jobs.store import Idempotency, NewRecording, RecordingState, StoredResult, Stores
+from bench_service.jobs.store import Stores
+from bench_service.jobs.stored import Idempotency, NewRecording, RecordingState, StoredResult
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.recording import Recording, RecordingInfo

@@ -8,7 +8,8 @@ from contextlib import aclosing
 from typing import Any, TypeVar
 
 from bench_service.jobs.job import Job
-from bench_service.jobs.store import NewRecording, RecordingStore
+from bench_service.jobs.store import RecordingStore
+from bench_service.jobs.stored import NewRecording
 from procedures.bench import Bench
 from procedures.bench.errors import BenchError, Stopped
 from procedures.bench.imu import Stream

@@ -4,73 +4,20 @@ Every method is one transaction: it commits, or it raises and nothing of it rema
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime
-from enum import StrEnum
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench_service.jobs.job import Event, Failure, Job, JobState
+from bench_service.jobs.stored import Idempotency, NewRecording, Page, StoredCalibration, StoredRecording, StoredResult
 from procedures.bench import BenchDescription
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
-from procedures.core.recording import Channel, RawArray, Recording, RecordingInfo, Station
+from procedures.core.recording import RawArray, Recording, RecordingInfo
 from procedures.core.unit import Unit
-
-T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Page(Generic[T]):
-    """A page of a list, newest first; `next` is the cursor of the following page or None."""
-
-    items: tuple[T, ...]
-    next: str | None = None
-
-
-class RecordingState(StrEnum):
-    """`open` while samples arrive (never listed), `complete`, or `interrupted`: kept, but not for analysis."""
-
-    OPEN = "open"
-    COMPLETE = "complete"
-    INTERRUPTED = "interrupted"
-
-
-@dataclass(frozen=True)
-class StoredRecording:
-    """A recording's row: what it is, where it came from, what it weighs."""
-
-    info: RecordingInfo
-    state: RecordingState
-    created_at: datetime
-    job_id: str | None = None
-    bench: str | None = None
-    stored_bytes: int = 0
-    chunks: int = 0
-    dtype: str = "int32"
-    """Of its samples: "int32" or "float64"."""
-    source: dict[str, Any] = field(default_factory=dict[str, Any])
-    """Of an imported recording: file name, its SHA-256, reader, declared reference values."""
-
-
-@dataclass(frozen=True)
-class NewRecording:
-    """What must be known before the first sample."""
-
-    unit: str
-    channels: tuple[Channel, ...]
-    rate_hz: float
-    start_s: float
-    simulated: bool
-    dtype: type[np.int32] | type[np.float64] = np.int32
-    job_id: str | None = None
-    bench: str | None = None
-    station: Station | None = None
-    source: dict[str, Any] = field(default_factory=dict[str, Any])
-    idempotency: "Idempotency | None" = None
-    """A client's key, remembered when the recording is sealed."""
 
 
 class RecordingWriter(Protocol):
@@ -85,7 +32,8 @@ class RecordingWriter(Protocol):
         ...
 
     def abandon(self) -> None:
-        """End without sealing: kept as interrupted if a chunk was committed, else nothing remains."""
+        """End without sealing; never raises. Whole chunks of a job's recording are kept as interrupted; an import, or
+        a recording without a committed chunk, leaves nothing."""
         ...
 
 
@@ -94,7 +42,7 @@ class RecordingStore(Protocol):
 
     def open(self, new: NewRecording) -> RecordingWriter: ...
 
-    def made_before(self, idempotency: "Idempotency | None") -> RecordingInfo | None:
+    def made_before(self, idempotency: Idempotency | None) -> RecordingInfo | None:
         """The recording that a client's key made. Raises `IdempotencyConflict` for a key of another request."""
         ...
 
@@ -136,7 +84,7 @@ class RecordingStore(Protocol):
 class JobStore(Protocol):
     """Jobs and their events. Every change of state appends an event in the same transaction."""
 
-    def add(self, job: Job, idempotency: "Idempotency | None" = None) -> Job:
+    def add(self, job: Job, idempotency: Idempotency | None = None) -> Job:
         """Store a new job; or, where the key is known with the same fingerprint, return the job it made.
 
         Raises `IdempotencyConflict`.
@@ -200,53 +148,6 @@ class JobStore(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Idempotency:
-    """A client's key and the fingerprint of what it asked."""
-
-    key: str
-    fingerprint: str
-
-
-@dataclass(frozen=True)
-class StoredResult:
-    """What an analysis said, and everything that made it."""
-
-    id: str
-    kind: str
-    """"procedure" or "method"."""
-    name: str
-    version: str
-    parameters: dict[str, Any]
-    document: dict[str, Any]
-    """The result model as JSON."""
-    verdict: Verdict
-    recordings: tuple[tuple[str, str], ...]
-    """(id, content hash) of each recording used, in order."""
-    calibrations: tuple[str, ...]
-    """Ids of calibrations used."""
-    code_version: str
-    simulated: bool
-    created_at: datetime
-    unit: str | None = None
-    job_id: str | None = None
-    seed: int | None = None
-    context: dict[str, Any] = field(default_factory=dict[str, Any])
-
-
-@dataclass(frozen=True)
-class StoredCalibration:
-    """A calibration in a unit's history."""
-
-    id: str
-    unit: str
-    result_id: str
-    made_at: datetime
-    current: bool
-    triads: tuple[TriadCalibration, ...]
-    simulated: bool
-
-
 class ResultStore(Protocol):
     """Results, calibrations and lineage."""
 
@@ -255,7 +156,7 @@ class ResultStore(Protocol):
         result: StoredResult,
         calibrations: Sequence[TriadCalibration] = (),
         make_current: bool = True,
-        idempotency: "Idempotency | None" = None,
+        idempotency: Idempotency | None = None,
     ) -> StoredResult:
         """Store a result with its lineage, and its calibrations as the unit's current ones, in one transaction.
 

@@ -7,7 +7,7 @@ from typing import TypeVar
 from sqlalchemy.orm import Session
 
 from bench_service.jobs.errors import IdempotencyConflict
-from bench_service.jobs.store import Idempotency
+from bench_service.jobs.stored import Idempotency
 from bench_service.persistence.database import Conflict
 from bench_service.persistence.tables import IdempotencyKeyRow
 

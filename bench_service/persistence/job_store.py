@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 
 from bench_service.jobs.errors import IllegalTransition, NotFound
 from bench_service.jobs.job import FINAL, LEGAL, Event, Failure, Job, JobState
-from bench_service.jobs.store import Idempotency, Page
+from bench_service.jobs.stored import Idempotency, Page
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.job_rows import event_of_row, failure_document, job_of_row, row_of_job

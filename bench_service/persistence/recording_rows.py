@@ -3,7 +3,7 @@
 import numpy as np
 from pydantic import TypeAdapter
 
-from bench_service.jobs.store import NewRecording, RecordingState, StoredRecording
+from bench_service.jobs.stored import NewRecording, RecordingState, StoredRecording
 from bench_service.persistence.tables import RecordingRow
 from procedures.core.recording import Channel, RecordingInfo, Station
 

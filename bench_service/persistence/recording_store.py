@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 from bench_service.formats.chunk import sample_type
 from bench_service.formats.content_hash import ContentHash
 from bench_service.jobs.errors import NotFound
-from bench_service.jobs.store import Idempotency, NewRecording, Page, RecordingState, StoredRecording
+from bench_service.jobs.stored import Idempotency, NewRecording, Page, RecordingState, StoredRecording
 from bench_service.persistence.chunk_reader import ChunkReader
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import made_before

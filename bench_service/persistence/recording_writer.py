@@ -22,7 +22,7 @@ from bench_service import wall_clock
 from bench_service.formats.chunk import ChunkPlace, SampleType, encode_chunk, rows_per_chunk, sample_type
 from bench_service.formats.content_hash import ContentHash
 from bench_service.jobs.errors import StorageFailure, StorageFull
-from bench_service.jobs.store import NewRecording, RecordingState
+from bench_service.jobs.stored import NewRecording, RecordingState
 from bench_service.persistence.database import Conflict, Database
 from bench_service.persistence.idempotency import made_before, remember
 from bench_service.persistence.recording_rows import fill_row, info_of_row

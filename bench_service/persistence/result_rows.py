@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from pydantic import TypeAdapter
 
-from bench_service.jobs.store import StoredCalibration, StoredResult
+from bench_service.jobs.stored import StoredCalibration, StoredResult
 from bench_service.persistence.tables import CalibrationRow, ResultCalibrationRow, ResultRecordingRow, ResultRow
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict

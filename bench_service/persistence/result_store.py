@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from bench_service import wall_clock
 from bench_service.jobs.errors import NotFound
-from bench_service.jobs.store import Idempotency, Page, StoredCalibration, StoredResult
+from bench_service.jobs.stored import Idempotency, Page, StoredCalibration, StoredResult
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.pages import page

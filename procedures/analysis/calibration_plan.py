@@ -120,9 +120,9 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
     r = requirement
     dwell = dwell_for(uncertainty, r.limit, max(s.record_s for s in plan.stations))
     way_out = (
-        f"a dwell of about {dwell / 3600.0:.2g} h at each station would be needed"
+        f"a dwell of about {_length(dwell)} at each station would be needed{_alone(r)}"
         if dwell is not None
-        else f"no dwell up to a day at each station gets there{_alone(r)}"
+        else f"no dwell gets there{_alone(r)}"
     )
     turns = f"; {_TURNS}" if r.triad == "gyro" and r.name == "scale factor" else ""
     return (
@@ -144,6 +144,12 @@ def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size:
         f"{plan.triad} bias in run: the limit of {limit / display_size:g} {display} cannot be resolved, the noise of "
         f"the dwells alone makes δ/√3 about {expected / display_size:.3g} {display}"
     )
+
+
+def _length(dwell_s: float) -> str:
+    """A dwell in the unit that a person would plan it in."""
+    hours = dwell_s / units.HOUR
+    return f"{hours:.2g} h" if hours < 48.0 else f"{hours / 24.0:.0f} days"
 
 
 def _alone(requirement: Requirement) -> str:

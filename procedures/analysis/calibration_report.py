@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from procedures.analysis.calibration_summary import Coefficient, TriadSummary
 from procedures.analysis.verification import Magnitudes
 from procedures.core import units
-from procedures.core.limits import Check
 from procedures.core.report import Figure, Series, Table
 
 SYMBOL = {"gyro": "|ω|", "accelerometer": "|g|"}
@@ -130,25 +129,6 @@ def scalar_table(summary: TriadSummary) -> Table | None:
     columns = ("parameter", "unit", "scalar", "± standard uncertainty", "linear", "difference, σ")
     note = f"From the magnitude alone; no angle of the table enters. Condition {summary.scalar.condition:.3g}."
     return Table(f"Scalar cross-check of the {summary.calibration.triad} triad", columns, rows, note)
-
-
-def check_table(checks: Sequence[Check]) -> Table:
-    """Every value against its limit."""
-    rows = tuple(
-        (
-            c.name,
-            c.value,
-            c.standard_uncertainty,
-            c.limit.minimum,
-            c.limit.maximum,
-            c.limit.unit,
-            "pass" if c.passed else "fail",
-            c.note or c.limit.source,
-        )
-        for c in checks
-    )
-    columns = ("check", "value", "± standard uncertainty", "at least", "at most", "unit", "outcome", "note")
-    return Table("Checks", columns, rows)
 
 
 def _stations(m: Magnitudes) -> tuple[float, ...]:

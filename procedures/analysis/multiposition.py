@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import null_space
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from procedures.analysis.determination import require_full_rank
 from procedures.analysis.table_errors import SOURCES, TableErrors
@@ -93,7 +93,7 @@ class TriadFit:
         """Chance of a chi-square at least as large, where it can be judged."""
         if not self.noise_known or self.degrees_of_freedom == 0:
             return None
-        return float(chi2.sf(self.chi_square, self.degrees_of_freedom))
+        return float(chdtrc(self.degrees_of_freedom, self.chi_square))
 
     def calibration(self) -> TriadCalibration:
         """The coefficients with their total covariance, ready to correct with."""

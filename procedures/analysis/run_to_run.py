@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
@@ -74,5 +74,5 @@ def _scatter(values: Array, sds: Array, size: float) -> tuple[float, float, floa
 def sd_interval(sd: float, n: int, confidence: float = 0.95) -> tuple[float, float]:
     """Interval of the true standard deviation given that of n Gaussian values, ``s·√((n − 1)/χ²)``."""
     tail = 0.5 * (1.0 - confidence)
-    low, high = float(chi2.ppf(1.0 - tail, n - 1)), float(chi2.ppf(tail, n - 1))
+    low, high = float(chdtri(n - 1, tail)), float(chdtri(n - 1, 1.0 - tail))
     return sd * float(np.sqrt((n - 1) / low)), sd * float(np.sqrt((n - 1) / high))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from procedures.analysis.determination import RANK_TOLERANCE, require_full_rank
 from procedures.analysis.whitening import whitener
@@ -70,7 +70,7 @@ class ScalarFit:
         """Chance of a chi-square at least as large, where it can be judged."""
         if not self.noise_known or self.degrees_of_freedom == 0:
             return None
-        return float(chi2.sf(self.chi_square, self.degrees_of_freedom))
+        return float(chdtrc(self.degrees_of_freedom, self.chi_square))
 
     def calibration(self, triad: str, output_unit: str, input_unit: str) -> TriadCalibration:
         """As ``U = b + K·v`` with K upper triangular; its lower triangle is fixed and has no variance."""

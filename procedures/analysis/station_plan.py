@@ -8,8 +8,8 @@ from procedures.core.arrays import Array
 from procedures.core.recording import Station
 from procedures.core.table_angles import TableAngles
 
-LONGEST_DWELL_S = 86_400.0
-"""A day at one station: a dwell that would have to be longer counts as out of reach."""
+LONGEST_DWELL_S = 10.0 * 365.25 * 86_400.0
+"""Ten years at one station: a dwell that would have to be longer counts as none at all."""
 
 
 def move_time_s(degrees: float, rate_deg_s: float, acceleration_deg_s2: float) -> float:
@@ -37,8 +37,8 @@ def windows(stations: Sequence[Station], axes: Sequence[tuple[float, float]]) ->
 
 
 def dwell_for(uncertainty: Callable[[float], float], limit: float, shortest_s: float) -> float | None:
-    """Shortest dwell [s] from `shortest_s` to a day at which an uncertainty comes down to its limit; None where none
-    does.
+    """Shortest dwell [s] of at least `shortest_s` at which an uncertainty comes down to its limit; None where even
+    `LONGEST_DWELL_S` is too short.
 
     The uncertainty is taken to fall with the dwell until slow noise stops it; found to 1 % by bisection of the
     logarithm, after a coarse search.

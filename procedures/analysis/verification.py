@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from procedures.analysis.whitening import whitener
 from procedures.core.arrays import Array
@@ -129,4 +129,4 @@ def chi_square_p(errors: Array, covariance: Array) -> tuple[float, float]:
     """``χ² = eᵀC⁻¹e`` with n degrees of freedom, and the chance of one at least as large."""
     whitened = whitener(covariance) @ errors
     statistic = float(whitened @ whitened)
-    return statistic, float(chi2.sf(statistic, len(errors)))
+    return statistic, float(chdtrc(len(errors), statistic))

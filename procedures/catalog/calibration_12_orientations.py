@@ -169,8 +169,7 @@ def report(result: Result) -> Report:
         f for t in result.triads for f in (*pictures.magnitude_figures(t.magnitudes), pictures.residual_figure(t))
     ]
     stations = [pictures.station_table(m) for m in magnitudes]
-    summary = " ".join((f"Verdict: {result.verdict.value}.", *(f"{w}." for w in result.warnings)))
-    return Report(summary, (pictures.check_table(result.checks), *tables, *figures, *stations))
+    return Report(sections=(*tables, *figures, *stations))
 
 
 def _site(params: Params, context: Context) -> Site:

@@ -132,9 +132,8 @@ def report(result: Result) -> Report:
     """Checks, Tables 5.3 and 5.4, figures 5.6-5.12 of the thesis."""
     magnitudes = [t.magnitudes for t in result.triads]
     figures = [figure for m in magnitudes for figure in pictures.magnitude_figures(m)]
-    summary = " ".join((f"Verdict: {result.verdict.value}.", *(f"{w}." for w in result.warnings)))
-    tables = (pictures.check_table(result.checks), pictures.magnitude_table(magnitudes, "Verification"))
-    return Report(summary, (*tables, *figures, *(pictures.station_table(m) for m in magnitudes)))
+    table = pictures.magnitude_table(magnitudes, "Verification")
+    return Report(sections=(table, *figures, *(pictures.station_table(m) for m in magnitudes)))
 
 
 def _site(params: Params, context: Context) -> Site:

@@ -42,7 +42,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Report:
-    """Sections in the order a reader meets them; `summary` is the first paragraph."""
+    """Sections in the order a reader meets them, after verdict, checks and warnings; `summary` stands before them."""
 
     summary: str = ""
     sections: tuple[Table | Figure, ...] = field(default=())

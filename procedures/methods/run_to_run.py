@@ -4,7 +4,6 @@ from math import sqrt
 
 from pydantic import Field
 
-from procedures.analysis.calibration_report import check_table
 from procedures.analysis.run_to_run import Scatter, run_to_run
 from procedures.core import units
 from procedures.core.errors import BadParameter
@@ -70,8 +69,7 @@ def report(result: Result) -> Report:
     )
     columns = ("triad", "coefficient", "unit", "mean", "sd", "95 % from", "95 % to", "of measurement alone")
     table = Table("Scatter between calibrations", columns, rows, "Sample standard deviation with n − 1.")
-    summary = " ".join((f"Verdict: {result.verdict.value}.", *(f"{w}." for w in result.warnings)))
-    return Report(summary, (check_table(result.checks), table, *(_figure(s) for s in result.scatters)))
+    return Report(sections=(table, *(_figure(s) for s in result.scatters)))
 
 
 def _figure(s: Scatter) -> Figure:

@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from procedures.analysis.calibration_analysis import noise_of_means
-from procedures.analysis.calibration_report import check_table
 from procedures.analysis.reference import INPUT_UNITS
 from procedures.analysis.scalar import PARAMETERS, ScalarFit, fit_scalar, nominal_start, start_from_data
 from procedures.analysis.station_means import station_means
@@ -118,8 +117,7 @@ def report(result: Result) -> Report:
     points = Series("residual", x, tuple(r / size for r in result.residuals), errors)
     zero = Series("zero", x, (0.0,) * len(x), style="reference")
     figure = Figure("Magnitude at each pose", "pose", f"|v̂| − reference, {unit}", (points, zero))
-    summary = " ".join((f"{result.poses} poses.", *(f"{w}." for w in result.warnings)))
-    return Report(summary, (check_table(result.checks), table, figure))
+    return Report(f"{result.poses} poses.", (table, figure))
 
 
 def _reference(params: Params) -> float:

@@ -17,7 +17,6 @@ from math import ceil, log, log10, pi, sqrt
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
 from simulators.truth import Array, TriadTruth, keyed_generator
 
@@ -188,6 +187,8 @@ class TriadNoise:
 
     def _bank_cells(self, state: SlowState) -> tuple[Array, Array]:
         """Sum over the bank of ``h·(x₀+x₁)`` in each cell, shape (cells, 3), and the bank's state at the end."""
+        from scipy.signal import lfilter  # half a second to import: a service that starts does not wait for it
+
         bank = self._bank
         draws = self._draws("flicker", (len(bank.times_s), CELLS_PER_SLOW_BLOCK), state.block)
         sums = np.zeros((CELLS_PER_SLOW_BLOCK, 3))

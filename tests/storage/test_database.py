@@ -18,7 +18,8 @@ from alembic.migration import MigrationContext
 
 from bench_service.jobs.errors import StorageFailure, StorageFull
 from bench_service.jobs.job import Job
-from bench_service.jobs.store import NewRecording, RecordingState, RecordingWriter, Stores
+from bench_service.jobs.store import RecordingWriter, Stores
+from bench_service.jobs.stored import NewRecording, RecordingState
 from bench_service.persistence import Database, open_stores
 from bench_service.persistence.database import connect
 from bench_service.persistence.tables import ChunkRow, RecordingRow, Table
@@ -83,7 +84,7 @@ def test_sqlite_survives_a_power_cut_by_its_settings(sqlite_url: str) -> None:
 CRASH = """
 import os, signal, sys
 import numpy as np
-from bench_service.jobs.store import NewRecording
+from bench_service.jobs.stored import NewRecording
 from bench_service.persistence import open_stores
 from procedures.core.recording import Channel, Quantity
 stores, _ = open_stores(sys.argv[1])

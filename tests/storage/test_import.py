@@ -14,7 +14,8 @@ import pytest
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.import_file import ImportedRecording, ImportFile, read_import
-from bench_service.jobs.store import NewRecording, Stores
+from bench_service.jobs.store import Stores
+from bench_service.jobs.stored import NewRecording
 from procedures.core.errors import BadParameter, UnfitRecording
 
 GYRO_X = {"name": "gyro_x", "column": "x", "quantity": "angular_rate", "unit": "rad/s"}

@@ -10,7 +10,8 @@ import pytest
 
 from bench_service.jobs.errors import IdempotencyConflict, IllegalTransition, NotFound, StorageFailure
 from bench_service.jobs.job import LEGAL, Failure, Job, JobState
-from bench_service.jobs.store import Idempotency, Stores
+from bench_service.jobs.store import Stores
+from bench_service.jobs.stored import Idempotency
 from bench_service.persistence import Database
 from bench_service.persistence.stores import stores_of
 from bench_service.wall_clock import new_id, now

@@ -11,7 +11,8 @@ from bench_service.formats import chunk
 from bench_service.formats.content_hash import content_hash
 from bench_service.jobs.errors import IdempotencyConflict, NotFound, StorageFailure
 from bench_service.jobs.job import Job
-from bench_service.jobs.store import Idempotency, NewRecording, RecordingState, Stores
+from bench_service.jobs.store import Stores
+from bench_service.jobs.stored import Idempotency, NewRecording, RecordingState
 from bench_service.persistence import Database
 from bench_service.persistence.recording_store import SqlRecordingStore
 from bench_service.persistence.tables import ChunkRow, RecordingRow

@@ -9,7 +9,8 @@ import pytest
 
 from bench_service.jobs.errors import IdempotencyConflict, NotFound
 from bench_service.jobs.job import Job
-from bench_service.jobs.store import Idempotency, NewRecording, StoredResult, Stores
+from bench_service.jobs.store import Stores
+from bench_service.jobs.stored import Idempotency, NewRecording, StoredResult
 from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
 from procedures.core.imu_model import TriadCalibration, triad_calibration
 from procedures.core.noise import NoiseCoefficients

@@ -1,0 +1,192 @@
+"""Many simulated units, each calibrated and then verified at another launch by the procedures' own analysis."""
+
+import multiprocessing
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, fields, replace
+from functools import cache, partial
+
+import numpy as np
+
+from procedures.analysis.calibration_analysis import analyse_triad
+from procedures.analysis.calibration_plan import TriadPlan, triad_plan
+from procedures.analysis.reference import TRIAD_NAMES
+from procedures.analysis.station_means import BATCHES
+from procedures.analysis.table_errors import TableUncertainty
+from procedures.analysis.verification import predicted_sd
+from procedures.analysis.verification_analysis import planned_covariance, verify_triad
+from procedures.bench.description import BenchDescription, TableAccuracy
+from procedures.catalog import discover
+from procedures.core.recording import ACCELEROMETER, GYRO, Channel, MemoryRecording, Quantity, RecordingInfo, Station
+from procedures.core.unit import Unit
+from procedures.procedure import Context
+from simulators.truth import Array, BenchTruth, TableTruth, default_bench, random_table_truth, random_unit_truth
+from simulators.world import DwellMeans, WorldConfig, declared_unit, dwell_means, launch_truth
+from tests.validation.theory import Reference, bounds, dwell_covariance, dwell_windows, reference
+
+CALIBRATION = discover()["calibration_12_orientations"]
+VERIFICATION = discover()["verification_9_orientations"]
+CHANNELS = (
+    *(Channel(name, Quantity.ANGULAR_RATE, "rad/s") for name in GYRO),
+    *(Channel(name, Quantity.SPECIFIC_FORCE, "m/s^2") for name in ACCELEROMETER),
+)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A kind of table: the spreads its laboratory declares, from which each unit's table is drawn [arcsec]."""
+
+    title: str
+    first_seed: int
+    orthogonality: float = 0.0
+    azimuth: float = 0.0
+    pointing: float = 0.0
+    level: float = 0.0
+
+    def bench(self, seed: int | None = None) -> BenchTruth:
+        """The declared bench with a table drawn from its own accuracy, or with an ideal one."""
+        site = replace(default_bench().description.site, azimuth_sd_arcsec=self.azimuth)
+        accuracy = TableAccuracy(self.orthogonality, self.pointing, self.level)
+        description = replace(default_bench().description, site=site, accuracy=accuracy)
+        flaws = (self.orthogonality, self.azimuth, self.pointing, self.level)
+        table = TableTruth() if seed is None else random_table_truth(seed, *flaws)
+        return BenchTruth(default_bench().site, table, description)
+
+
+SCENARIOS = (
+    Scenario("ideal table", 1_000_000),
+    Scenario("axes 3″, azimuth 5″", 2_000_000, orthogonality=3.0, azimuth=5.0),
+    Scenario("axes 3″, azimuth 5″, pointing 1″, level 1″", 3_000_000, 3.0, 5.0, 1.0, 1.0),
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one unit, or of many with one more axis in front. 24: coefficients of both triads; 2: triads."""
+
+    errors: Array
+    """Estimates minus the launch's truth, (24,)."""
+    claimed: Array
+    """Standard uncertainties of the result, (24,)."""
+    noise_bound: Array
+    weighted_bound: Array
+    joint_bound: Array
+    preview: Array
+    """Predicted for the unit as it is once it has a calibration, (24,)."""
+    first_preview: Array
+    """Predicted for the same unit never calibrated before: K is taken for the identity, (24,)."""
+    chi_square: Array
+    """Of the calibration's residuals over their degrees of freedom, (2,)."""
+    p_value: Array
+    verification_chi_square: Array
+    """Of the verification's errors over their number, (2,)."""
+    verification_p_value: Array
+    spread: Array
+    """Sample variance of the corrected magnitudes over its prediction, (2,)."""
+    spread_degrees: Array
+    """Degrees of freedom of a chi-square with the variance that this ratio should have, (2,)."""
+
+
+@cache
+def plans(scenario: Scenario) -> tuple[tuple[Station, ...], tuple[Station, ...], Reference]:
+    """Stations of calibration and verification, and what is seen at the former. The same for every unit."""
+    bench = scenario.bench()
+    context = Context(declared_unit(random_unit_truth(0)), bench.description)
+    stations = [p.schedule(p.resolve(p.params(), context)) for p in (CALIBRATION, VERIFICATION)]
+    return stations[0], stations[1], reference(bench, stations[0])
+
+
+def one_unit(scenario: Scenario, index: int) -> Outcome:
+    """Draw a unit and a table, calibrate in launch 1, verify in launch 2."""
+    seed = scenario.first_seed + index
+    truth, bench = random_unit_truth(seed), scenario.bench(seed)
+    config, declared = WorldConfig(truth, bench, seed), declared_unit(truth)
+    calibration, verification, seen = plans(scenario)
+    site, uncertainty = bench.description.site, table_uncertainty(bench.description)
+
+    taken = recordings(config, calibration, 1)
+    fits = [analyse_triad(taken, name, site, uncertainty, declared.triad(name)) for name in TRIAD_NAMES]
+    known = replace(declared, calibrations=tuple(f.calibration for f in fits))
+    taken = recordings(config, verification, 2)
+    verified = [verify_triad(taken, name, site, known) for name in TRIAD_NAMES]
+    expected = [planned_covariance(plan) for plan in _plans(known, verification, bench.description, TableUncertainty())]
+
+    windows = dwell_windows(bench, calibration, config.rate_hz)
+    true = [launch_truth(config, 1)[name] for name in TRIAD_NAMES]
+    noise = (dwell_covariance(truth.gyro, windows), dwell_covariance(truth.accelerometer, windows))
+    allowed = bounds(seen, noise, (true[0][1], true[1][1]))
+    first = _plans(declared, calibration, bench.description, uncertainty)
+    again = [replace(p, matrix=f.calibration.matrix_array) for p, f in zip(first, fits, strict=True)]
+    coefficients = np.concatenate([np.column_stack(pair).ravel() for pair in true])
+    spread = [v.magnitudes.sd_after**2 / predicted_sd(c) ** 2 for v, c in zip(verified, expected, strict=True)]
+    return Outcome(
+        np.concatenate([f.calibration.coefficients for f in fits]) - coefficients,
+        np.concatenate([f.calibration.standard_uncertainties for f in fits]),
+        allowed.noise,
+        allowed.weighted,
+        allowed.joint,
+        np.concatenate([preview(plan) for plan in again]),
+        np.concatenate([preview(plan) for plan in first]),
+        np.array([f.chi_square / f.degrees_of_freedom for f in fits]),
+        np.array([f.p_value for f in fits], dtype=np.float64),
+        np.array([v.chi_square / len(verification) for v in verified]),
+        np.array([v.p_value for v in verified], dtype=np.float64),
+        np.array(spread),
+        np.array([spread_degrees(c) for c in expected]),
+    )
+
+
+def recordings(config: WorldConfig, stations: Sequence[Station], launch: int) -> list[MemoryRecording]:
+    """Stations' means as the shortest recordings that have them: every sample of a station is its mean."""
+    means: DwellMeans = dwell_means(config, stations, launch)
+    starts = dwell_windows(config.bench, stations, config.rate_hz)[:, 0].tolist()
+    rows = np.column_stack([means.gyro, means.accelerometer])
+    return [
+        MemoryRecording(
+            RecordingInfo(s.label, config.unit.serial, CHANNELS, BATCHES / s.record_s, BATCHES, start, s),
+            np.tile(row, (BATCHES, 1)),
+        )
+        for s, start, row in zip(stations, starts, rows, strict=True)
+    ]
+
+
+def table_uncertainty(bench: BenchDescription) -> TableUncertainty:
+    """What a bench declares, as the analysis takes it."""
+    a = bench.accuracy
+    sds = (a.orthogonality_sd_arcsec, a.pointing_sd_arcsec, a.level_sd_arcsec, bench.site.azimuth_sd_arcsec)
+    return TableUncertainty(*sds, bench.site.gravity_sd_m_s2 / bench.site.gravity_m_s2)
+
+
+def _plans(
+    unit: Unit, stations: Sequence[Station], bench: BenchDescription, uncertainty: TableUncertainty
+) -> list[TriadPlan]:
+    axes = [(axis.rate_deg_s, axis.acceleration_deg_s2) for axis in (bench.outer, bench.middle, bench.inner)]
+    return [triad_plan(name, unit, stations, axes, bench.site, uncertainty) for name in TRIAD_NAMES]
+
+
+def preview(plan: TriadPlan) -> Array:
+    """Predicted standard uncertainties of a triad's coefficients, (12,)."""
+    noise = plan.noise_covariance()
+    assert noise is not None
+    gls = plan.estimator(noise)
+    return np.sqrt(np.diagonal(gls.noise_covariance + plan.share(gls).covariance))
+
+
+def spread_degrees(covariance: Array) -> float:
+    """``(tr MC)²/tr(MC)²``, M the projection off the mean: the effective degrees of freedom of a sample variance."""
+    centred = covariance - covariance.mean(axis=0)
+    return float(np.trace(centred) ** 2 / np.trace(centred @ centred))
+
+
+def population(scenario: Scenario, units: int, workers: int = 1) -> Iterator[Outcome]:
+    """Unit after unit, the same whatever the number of workers."""
+    if workers == 1:
+        yield from map(partial(one_unit, scenario), range(units))
+        return
+    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(partial(one_unit, scenario), range(units), chunksize=5)
+
+
+def stacked(outcomes: Sequence[Outcome]) -> Outcome:
+    """All of them, units first."""
+    return Outcome(*(np.array([getattr(o, f.name) for o in outcomes]) for f in fields(Outcome)))
