@@ -18,7 +18,6 @@ from bench_service.jobs.service import BenchService
 from bench_service.pages import routes
 from bench_service.persistence import acquire_lease, engine_database_url, open_stores
 from bench_service.settings import Settings
-from procedures import catalog, methods
 
 ROUTERS = (procedures, jobs, recordings, analyses, units, benches, health)
 
@@ -33,13 +32,13 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     driver = SimulatedDriver(settings.bench_id, settings.unit_truth, settings.bench_truth, settings.real_time_factor)
     stores, database = open_stores(settings.database_url)
     closing.callback(database.dispose)
-    planner = Planner(catalog.discover(), stores, driver)
+    planner = Planner(stores, driver)
     runner = JobRunner(stores, planner, driver)
     engine: Engine | None = None
     if drive:
         closing.callback(acquire_lease(settings.database_url, settings.bench_id).release)
         engine = Engine(engine_database_url(settings.database_url), settings.bench_id, settings.poll_s, runner)
-    service = BenchService(stores, driver, planner, methods.discover(), runner, engine, code_version())
+    service = BenchService(stores, driver, planner, runner, engine, code_version())
     closing.callback(service.stop)
     service.start()
     return service

@@ -8,6 +8,7 @@ new build goes on with the jobs of the old one.
 
 import json
 import logging
+from threading import Event
 from typing import Any
 
 from dbos import DBOS, DBOSConfig, Serializer, SetEnqueueOptions, SetWorkflowID
@@ -21,6 +22,8 @@ from bench_service.wall_clock import now
 
 PROCEDURE_ABI = "1"
 """Raise it when stored workflows can no longer be continued by this code."""
+SHUT_DOWN_S = 20.0
+"""How long the running job may take to leave the bench safe when the service ends [s]."""
 MAX_RECOVERIES = 50
 """How often a job may take the service down before it is given up."""
 
@@ -53,6 +56,9 @@ class Engine:
         self._queue = f"bench:{bench_id}"
         self._poll_s = poll_s
         self._runner = runner
+        self._ending = Event()
+        self._idle = Event()
+        self._idle.set()
         config: DBOSConfig = {
             "name": "bench",
             "system_database_url": system_database_url,
@@ -68,7 +74,13 @@ class Engine:
 
         @DBOS.workflow(name="run_job", max_recovery_attempts=MAX_RECOVERIES)
         def run_job(job_id: str) -> None:
-            self._run_job(job_id)
+            self._idle.clear()
+            try:
+                if self._ending.is_set():
+                    raise ShuttingDown
+                self._run_job(job_id)
+            finally:
+                self._idle.set()
 
         self._workflow = run_job
 
@@ -92,8 +104,10 @@ class Engine:
 
     def shut_down(self) -> None:
         """Stop working. The running job is left for the next start; the bench is made safe first."""
+        self._ending.set()
         self._runner.shut_down()
-        DBOS.destroy(destroy_registry=True, workflow_completion_timeout_sec=10)
+        self._idle.wait(SHUT_DOWN_S)
+        DBOS.destroy(destroy_registry=True)
 
     def _run_job(self, job_id: str) -> None:
         runner = self._runner

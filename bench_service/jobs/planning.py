@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -9,6 +10,7 @@ from pydantic import TypeAdapter
 from bench_service.jobs.driver import BenchDriver
 from bench_service.jobs.errors import NotFound, NotMounted
 from bench_service.jobs.store import Stores
+from procedures import catalog
 from procedures.core.recording import Station
 from procedures.core.unit import Unit
 from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
@@ -38,10 +40,14 @@ class Plan:
 class Planner:
     """Knows the catalogue and the one bench of this process."""
 
-    def __init__(self, catalog: Mapping[str, AnyProcedure], stores: Stores, driver: BenchDriver) -> None:
-        self.catalog = catalog
+    def __init__(self, stores: Stores, driver: BenchDriver) -> None:
         self._stores = stores
         self._driver = driver
+
+    @cached_property
+    def catalog(self) -> Mapping[str, AnyProcedure]:
+        """Every procedure by name; read when it is first wanted, because that imports all of the numerics."""
+        return catalog.discover()
 
     def procedure(self, name: str) -> AnyProcedure:
         """Raises `NotFound`."""

@@ -5,7 +5,9 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
+from functools import cached_property
 from random import SystemRandom
+from threading import Thread
 from typing import Any
 
 from bench_service.formats.description import ImportDescription
@@ -19,6 +21,7 @@ from bench_service.jobs.runner import JobRunner, analysed
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import Idempotency, NewRecording, RecordingState, StoredResult
 from bench_service.wall_clock import new_id, now
+from procedures import methods
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.recording import Recording, RecordingInfo
 from procedures.core.report import Report
@@ -62,7 +65,6 @@ class BenchService:
         stores: Stores,
         driver: BenchDriver,
         planner: Planner,
-        methods: Mapping[str, AnyMethod],
         runner: JobRunner,
         engine: Engine | None,
         code_version: str,
@@ -70,10 +72,14 @@ class BenchService:
         self.stores = stores
         self.driver = driver
         self.planner = planner
-        self.methods = methods
         self.code_version = code_version
         self._runner = runner
         self._engine = engine
+
+    @cached_property
+    def methods(self) -> Mapping[str, AnyMethod]:
+        """Every method by name."""
+        return methods.discover()
 
     def start(self) -> None:
         """Register the bench and its units, then begin to work. The bench's lease must be held."""
@@ -83,6 +89,11 @@ class BenchService:
             self._register(unit)
         if self._engine is not None:
             self._engine.launch(self.stores.jobs)
+        Thread(target=self._warm_up, name="warm-up", daemon=True).start()
+
+    def _warm_up(self) -> None:
+        """Load what the first job will need, beside the first answers: the numerics take longer than the service."""
+        _ = self.planner.catalog, self.methods
 
     def stop(self) -> None:
         """End the service: the running job is left for the next start, the bench made safe."""

@@ -17,8 +17,8 @@ from procedures.analysis.verification import predicted_sd
 from procedures.analysis.verification_analysis import planned_covariance, verify_triad
 from procedures.bench.description import BenchDescription, TableAccuracy
 from procedures.catalog import discover
+from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import ACCELEROMETER, GYRO, Channel, MemoryRecording, Quantity, RecordingInfo, Station
-from procedures.core.unit import Unit
 from procedures.procedure import Context
 from simulators.truth import Array, BenchTruth, TableTruth, default_bench, random_table_truth, random_unit_truth
 from simulators.world import DwellMeans, WorldConfig, declared_unit, dwell_means, launch_truth
@@ -77,9 +77,11 @@ class Outcome:
     """Predicted for the same unit never calibrated before: K is taken for the identity, (24,)."""
     chi_square: Array
     """Of the calibration's residuals over their degrees of freedom, (2,)."""
+    residual_degrees: Array
     p_value: Array
     verification_chi_square: Array
     """Of the verification's errors over their number, (2,)."""
+    verification_degrees: Array
     verification_p_value: Array
     spread: Array
     """Sample variance of the corrected magnitudes over its prediction, (2,)."""
@@ -87,53 +89,85 @@ class Outcome:
     """Degrees of freedom of a chi-square with the variance that this ratio should have, (2,)."""
 
 
+@dataclass(frozen=True)
+class Plans:
+    """What is the same for every unit of a scenario: stations, their plans for both triads, and the reference."""
+
+    calibration: tuple[Station, ...]
+    verification: tuple[Station, ...]
+    to_calibrate: list[TriadPlan]
+    to_verify: list[TriadPlan]
+    seen: Reference
+
+
 @cache
-def plans(scenario: Scenario) -> tuple[tuple[Station, ...], tuple[Station, ...], Reference]:
-    """Stations of calibration and verification, and what is seen at the former. The same for every unit."""
+def plans(scenario: Scenario) -> Plans:
+    """Made from the procedures' own defaults for a unit of the kind."""
     bench = scenario.bench()
-    context = Context(declared_unit(random_unit_truth(0)), bench.description)
-    stations = [p.schedule(p.resolve(p.params(), context)) for p in (CALIBRATION, VERIFICATION)]
-    return stations[0], stations[1], reference(bench, stations[0])
+    unit = declared_unit(random_unit_truth(0))
+    context = Context(unit, bench.description)
+    here, there = (p.schedule(p.resolve(p.params(), context)) for p in (CALIBRATION, VERIFICATION))
+    d = bench.description
+    axes = [(axis.rate_deg_s, axis.acceleration_deg_s2) for axis in (d.outer, d.middle, d.inner)]
+    return Plans(
+        here,
+        there,
+        [triad_plan(name, unit, here, axes, d.site, table_uncertainty(d)) for name in TRIAD_NAMES],
+        [triad_plan(name, unit, there, axes, d.site, TableUncertainty()) for name in TRIAD_NAMES],
+        reference(bench, here),
+    )
 
 
 def one_unit(scenario: Scenario, index: int) -> Outcome:
     """Draw a unit and a table, calibrate in launch 1, verify in launch 2."""
     seed = scenario.first_seed + index
-    truth, bench = random_unit_truth(seed), scenario.bench(seed)
+    truth, bench, plan = random_unit_truth(seed), scenario.bench(seed), plans(scenario)
     config, declared = WorldConfig(truth, bench, seed), declared_unit(truth)
-    calibration, verification, seen = plans(scenario)
     site, uncertainty = bench.description.site, table_uncertainty(bench.description)
 
-    taken = recordings(config, calibration, 1)
+    taken = recordings(config, plan.calibration, 1)
     fits = [analyse_triad(taken, name, site, uncertainty, declared.triad(name)) for name in TRIAD_NAMES]
-    known = replace(declared, calibrations=tuple(f.calibration for f in fits))
-    taken = recordings(config, verification, 2)
+    made = [f.calibration for f in fits]
+    known = replace(declared, calibrations=tuple(made))
+    taken = recordings(config, plan.verification, 2)
     verified = [verify_triad(taken, name, site, known) for name in TRIAD_NAMES]
-    expected = [planned_covariance(plan) for plan in _plans(known, verification, bench.description, TableUncertainty())]
+    again = [replace(p, unit=known, matrix=c.matrix_array) for p, c in zip(plan.to_verify, made, strict=True)]
+    expected = [c for c in map(planned_covariance, again) if c is not None]
 
-    windows = dwell_windows(bench, calibration, config.rate_hz)
     true = [launch_truth(config, 1)[name] for name in TRIAD_NAMES]
+    windows = dwell_windows(bench, plan.calibration, config.rate_hz)
     noise = (dwell_covariance(truth.gyro, windows), dwell_covariance(truth.accelerometer, windows))
-    allowed = bounds(seen, noise, (true[0][1], true[1][1]))
-    first = _plans(declared, calibration, bench.description, uncertainty)
-    again = [replace(p, matrix=f.calibration.matrix_array) for p, f in zip(first, fits, strict=True)]
-    coefficients = np.concatenate([np.column_stack(pair).ravel() for pair in true])
+    allowed = bounds(plan.seen, noise, (true[0][1], true[1][1]))
+    pairs = [previewed(replace(p, unit=declared), c) for p, c in zip(plan.to_calibrate, made, strict=True)]
+    preview, first_preview = np.concatenate(pairs, axis=1)
     spread = [v.magnitudes.sd_after**2 / predicted_sd(c) ** 2 for v, c in zip(verified, expected, strict=True)]
     return Outcome(
-        np.concatenate([f.calibration.coefficients for f in fits]) - coefficients,
-        np.concatenate([f.calibration.standard_uncertainties for f in fits]),
+        np.concatenate([c.coefficients for c in made]) - np.concatenate([np.column_stack(t).ravel() for t in true]),
+        np.concatenate([c.standard_uncertainties for c in made]),
         allowed.noise,
         allowed.weighted,
         allowed.joint,
-        np.concatenate([preview(plan) for plan in again]),
-        np.concatenate([preview(plan) for plan in first]),
+        preview,
+        first_preview,
         np.array([f.chi_square / f.degrees_of_freedom for f in fits]),
+        np.array([f.degrees_of_freedom for f in fits], dtype=np.float64),
         np.array([f.p_value for f in fits], dtype=np.float64),
-        np.array([v.chi_square / len(verification) for v in verified]),
+        np.array([v.chi_square for v in verified], dtype=np.float64) / len(plan.verification),
+        np.full(len(verified), len(plan.verification), dtype=np.float64),
         np.array([v.p_value for v in verified], dtype=np.float64),
         np.array(spread),
         np.array([spread_degrees(c) for c in expected]),
     )
+
+
+def previewed(plan: TriadPlan, calibration: TriadCalibration) -> Array:
+    """Predicted standard uncertainties of a triad with a calibration and of one without, (2, 12)."""
+    noise = plan.noise_covariance()
+    assert noise is not None
+    gls = plan.estimator(noise)
+    known = replace(plan, matrix=calibration.matrix_array)
+    shares = [np.diagonal(p.share(gls).covariance) for p in (known, plan)]
+    return np.sqrt(np.diagonal(gls.noise_covariance) + np.array(shares))
 
 
 def recordings(config: WorldConfig, stations: Sequence[Station], launch: int) -> list[MemoryRecording]:
@@ -155,21 +189,6 @@ def table_uncertainty(bench: BenchDescription) -> TableUncertainty:
     a = bench.accuracy
     sds = (a.orthogonality_sd_arcsec, a.pointing_sd_arcsec, a.level_sd_arcsec, bench.site.azimuth_sd_arcsec)
     return TableUncertainty(*sds, bench.site.gravity_sd_m_s2 / bench.site.gravity_m_s2)
-
-
-def _plans(
-    unit: Unit, stations: Sequence[Station], bench: BenchDescription, uncertainty: TableUncertainty
-) -> list[TriadPlan]:
-    axes = [(axis.rate_deg_s, axis.acceleration_deg_s2) for axis in (bench.outer, bench.middle, bench.inner)]
-    return [triad_plan(name, unit, stations, axes, bench.site, uncertainty) for name in TRIAD_NAMES]
-
-
-def preview(plan: TriadPlan) -> Array:
-    """Predicted standard uncertainties of a triad's coefficients, (12,)."""
-    noise = plan.noise_covariance()
-    assert noise is not None
-    gls = plan.estimator(noise)
-    return np.sqrt(np.diagonal(gls.noise_covariance + plan.share(gls).covariance))
 
 
 def spread_degrees(covariance: Array) -> float:

@@ -61,8 +61,8 @@ def dwell_windows(bench: BenchTruth, stations: Sequence[Station], rate_hz: float
 def dwell_covariance(truth: TriadTruth, windows: Array) -> Array:
     """Covariance of the dwells' means of the three channels, (3, n, n): readings at both ends, random walk, flicker.
 
-    The flicker is the simulator's own finite bank, each member ``exp(−|t − u|/τ)`` averaged over two dwells. Rate random
-    walk and ramp are not among the drawn units' noise.
+    The flicker is the simulator's own finite bank, each member ``exp(−|t − u|/τ)`` averaged over two dwells. The drawn
+    units have neither rate random walk nor ramp.
     """
     assert not any((*truth.rate_random_walk, *truth.rate_ramp, *truth.startup))
     lengths = windows[:, 1] - windows[:, 0]
