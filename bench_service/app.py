@@ -15,8 +15,8 @@ from bench_service.jobs.engine import Engine
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.service import BenchService
-from bench_service.pages import routes
-from bench_service.persistence import acquire_lease, engine_database_url, open_stores
+from bench_service.pages import figures, routes
+from bench_service.persistence import acquire_lease, engine_database, open_stores
 from bench_service.settings import Settings
 
 ROUTERS = (procedures, jobs, recordings, analyses, units, benches, health)
@@ -33,14 +33,16 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     stores, database = open_stores(settings.database_url)
     closing.callback(database.dispose)
     planner = Planner(stores, driver)
-    runner = JobRunner(stores, planner, driver)
+    code = code_version()
     engine: Engine | None = None
     if drive:
-        closing.callback(acquire_lease(settings.database_url, settings.bench_id).release)
-        engine = Engine(engine_database_url(settings.database_url), settings.bench_id, settings.poll_s, runner)
-    service = BenchService(stores, driver, planner, runner, engine, code_version())
+        lease = acquire_lease(settings.database_url, settings.bench_id)
+        closing.callback(lease.release)
+        runner = JobRunner(stores, planner, driver, code, lease.held)
+        engine = Engine(*engine_database(settings.database_url), settings.bench_id, settings.poll_s, runner)
+    service = BenchService(stores, driver, planner, engine, code)
     closing.callback(service.stop)
-    service.start()
+    service.start(warm_up=[figures.warm_up])
     return service
 
 

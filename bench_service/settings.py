@@ -11,12 +11,12 @@ class BadSettings(Exception):
 
 
 class Settings(BaseModel):
-    """Where the data are and how the service listens. Environment: `BENCH_` + the field's name in capitals."""
+    """Where the data are and how the service listens. Environment: `BENCH_` + the field's name in capitals, once."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     database_url: str = "sqlite:///.bench/bench.sqlite"
-    """`sqlite:///file` (embedded, one machine) or `postgresql+psycopg://…` (any number of API processes)."""
+    """`sqlite:///file` (embedded, one machine) or `postgresql+psycopg://…`."""
     host: str = "127.0.0.1"
     port: int = Field(8000, ge=0, le=65535)
     bench_id: str = Field("sim", pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")
@@ -35,12 +35,12 @@ class Settings(BaseModel):
     @classmethod
     def from_environ(cls, environ: Mapping[str, str]) -> "Settings":
         """Read settings from a mapping such as ``os.environ``. Raises `BadSettings`."""
-        given = {name: environ[key] for name in cls.model_fields if (key := f"BENCH_{name.upper()}") in environ}
+        given = {name: environ[key] for name in cls.model_fields if (key := _variable(name)) in environ}
         try:
             return cls.model_validate(given)
         except ValidationError as error:
             first = error.errors()[0]
-            name = f"BENCH_{str(first['loc'][0]).upper()}"
+            name = _variable(str(first["loc"][0]))
             raise BadSettings(f"{name} = {given.get(str(first['loc'][0]))!r}: {first['msg']}") from error
 
     @property
@@ -48,3 +48,8 @@ class Settings(BaseModel):
         """The database file, or None where the database is a server."""
         prefix = "sqlite:///"
         return Path(self.database_url.removeprefix(prefix)) if self.database_url.startswith(prefix) else None
+
+
+def _variable(field: str) -> str:
+    """The environment variable of a field: bench_truth is BENCH_TRUTH."""
+    return f"BENCH_{field.removeprefix('bench_').upper()}"

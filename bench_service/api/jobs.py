@@ -92,7 +92,7 @@ async def _watch(job_id: str, request: Request, service: BenchService, after: in
         for event in fresh:
             after = event.sequence
             yield f"id: {event.sequence}\nevent: {event.kind}\ndata: {EventView.of(event).model_dump_json()}\n\n"
-        if not fresh and job.state in FINAL:
+        if not fresh and (job.state in FINAL or job.state is JobState.INTERRUPTED):
             return
         quiet_s = 0.0 if fresh else quiet_s + WATCH_S
         if quiet_s >= HEARTBEAT_S:

@@ -15,7 +15,13 @@ from bench_service.cli.watching import exit_code, watch
 from bench_service.jobs.errors import ServiceError
 from bench_service.settings import Settings
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help=__doc__)
+HELP = "Test bench for inertial navigation units. Exit code: 0 pass, 1 fail, 2 error."
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Test bench for inertial navigation units. Exit code: 0 pass, 1 fail, 2 error.",
+)
 console = Console()
 errors = Console(stderr=True)
 
@@ -62,7 +68,7 @@ def demo(
     port: Annotated[int | None, typer.Option(help="Port to listen on")] = None,
     once: Annotated[bool, typer.Option(help="End after the verdict, with it as exit code")] = False,
     unit: Annotated[str, typer.Option(help="Serial of a simulated unit, SIM-0001 or RANDOM-<number>")] = "SIM-0001",
-    seed: Annotated[int | None, typer.Option(help="Seed of the simulated world")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the calibration's world; the verification takes the next")] = 2,
 ) -> int:
     """Start the service, calibrate and verify the simulated unit through it, show what came out, keep serving."""
     from bench_service.cli.demo import demonstrate
@@ -191,7 +197,7 @@ def jobs(
     if as_json:
         print(json.dumps(page, indent=2))
     else:
-        console.print(job_table(page["items"]))
+        Console(width=max(console.width, 140)).print(job_table(page["items"]))
 
 
 def _with(settings: Settings, **given: Any) -> Settings:

@@ -52,16 +52,18 @@ class JsonSerializer(Serializer):
 class Engine:
     """Runs jobs of one bench, in this process, durably."""
 
-    def __init__(self, system_database_url: str, bench_id: str, poll_s: float, runner: JobRunner) -> None:
+    def __init__(
+        self, database_url: str, connection: dict[str, Any], bench_id: str, poll_s: float, runner: JobRunner
+    ) -> None:
         self._queue = f"bench:{bench_id}"
         self._poll_s = poll_s
         self._runner = runner
-        self._ending = Event()
         self._idle = Event()
         self._idle.set()
         config: DBOSConfig = {
             "name": "bench",
-            "system_database_url": system_database_url,
+            "system_database_url": database_url,
+            "db_engine_kwargs": connection,
             "executor_id": f"bench:{bench_id}",
             "application_version": PROCEDURE_ABI,
             "serializer": JsonSerializer(),
@@ -76,8 +78,6 @@ class Engine:
         def run_job(job_id: str) -> None:
             self._idle.clear()
             try:
-                if self._ending.is_set():
-                    raise ShuttingDown
                 self._run_job(job_id)
             finally:
                 self._idle.set()
@@ -102,9 +102,12 @@ class Engine:
         with SetWorkflowID(job.id), SetEnqueueOptions(priority=job.priority):
             DBOS.enqueue_workflow(self._queue, self._workflow, job.id)
 
+    def running_job(self) -> Job | None:
+        """The job that drives the bench now."""
+        return self._runner.running_job()
+
     def shut_down(self) -> None:
         """Stop working. The running job is left for the next start; the bench is made safe first."""
-        self._ending.set()
         self._runner.shut_down()
         self._idle.wait(SHUT_DOWN_S)
         DBOS.destroy(destroy_registry=True)
@@ -112,10 +115,11 @@ class Engine:
     def _run_job(self, job_id: str) -> None:
         runner = self._runner
         try:
-            outcome = self._stations(job_id)
-            safe = _step("safe", lambda: OUTCOME.dump_python(runner.make_safe(job_id)))
-            if outcome.good:
-                outcome = OUTCOME.validate_python(safe)
+            count: int = _step("prepare", lambda: runner.prepare(job_id))
+            outcome = self._stations(job_id, count)
+            if count > 0:
+                safe = OUTCOME.validate_python(_step("safe", lambda: OUTCOME.dump_python(runner.make_safe(job_id))))
+                outcome = outcome if not outcome.good else safe
             if outcome.good:
                 outcome = OUTCOME.validate_python(
                     _step("conclude", lambda: OUTCOME.dump_python(runner.conclude(job_id)))
@@ -130,9 +134,8 @@ class Engine:
         if not outcome.good:
             _step("end", lambda: runner.end_badly(job_id, outcome))
 
-    def _stations(self, job_id: str) -> StepOutcome:
+    def _stations(self, job_id: str, count: int) -> StepOutcome:
         runner = self._runner
-        count: int = _step("prepare", lambda: runner.prepare(job_id))
         for index in range(count):
             outcome = OUTCOME.validate_python(
                 _step(f"station {index}", lambda k=index: OUTCOME.dump_python(runner.acquire(job_id, k)))

@@ -10,7 +10,10 @@ from procedures.core.recording import Station
 
 
 class JobState(StrEnum):
-    """Where a job is. The last four are final, except that an interrupted one may be queued again."""
+    """Where a job is. `FINAL` says which states are the last; an interrupted job may be queued again.
+
+    Pausing and queueing again have their place here and come with the queue's own issue.
+    """
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -62,7 +65,7 @@ class Job:
     parameters: dict[str, Any]
     """Complete: every default filled, from the unit and the bench too."""
     context: dict[str, Any]
-    """What was known of unit and bench at submission (JSON of `procedures.procedure.Context`)."""
+    """What is known of unit and bench (JSON of `procedures.procedure.Context`): at submission, then at the start."""
     stations: tuple[Station, ...]
     duration_s: float
     """Predicted bench time."""
@@ -90,5 +93,5 @@ class Event:
     sequence: int
     at: datetime
     kind: str
-    """"state", "station", "result" or "note"."""
+    """"state", "station" or "note"."""
     data: dict[str, Any]

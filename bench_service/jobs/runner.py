@@ -1,14 +1,15 @@
 """The steps of a job, each safe to repeat: what the engine calls, and what it must not know."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from threading import Event
 from typing import Any
 
 from bench_service.jobs.driver import BenchDriver
 from bench_service.jobs.errors import ServiceError
 from bench_service.jobs.job import FINAL, Failure, Job, JobState
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
-from bench_service.jobs.session import BenchSession
+from bench_service.jobs.session import BenchSession, ShuttingDown
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import Idempotency, StoredResult
 from bench_service.wall_clock import new_id, now
@@ -33,11 +34,22 @@ class StepOutcome:
 class JobRunner:
     """Runs the steps of jobs on one bench, one job at a time."""
 
-    def __init__(self, stores: Stores, planner: Planner, driver: BenchDriver) -> None:
+    def __init__(
+        self,
+        stores: Stores,
+        planner: Planner,
+        driver: BenchDriver,
+        code_version: str,
+        lease_held: Callable[[], bool],
+    ) -> None:
+        """`lease_held`: whether this process still has the right to drive the bench; asked before every station."""
         self._stores = stores
         self._planner = planner
         self._driver = driver
+        self._code_version = code_version
+        self._lease_held = lease_held
         self._session: BenchSession | None = None
+        self._ending = Event()
 
     def prepare(self, job_id: str) -> int:
         """Note what is known of the unit now, and start. How many stations there are; 0 stations, nothing moves."""
@@ -51,13 +63,20 @@ class JobRunner:
         return len(job.stations)
 
     def acquire(self, job_id: str, index: int) -> StepOutcome:
-        """Record one station. Where its recording exists already, a crash came between storing and noting it."""
+        """Record one station. Where its recording exists already, a crash came between storing and noting it.
+
+        Raises `ShuttingDown` when the service is ending.
+        """
+        if self._ending.is_set():
+            raise ShuttingDown
         jobs, recordings = self._stores.jobs, self._stores.recordings
         if index in {r.info.station.index for r in recordings.of_job(job_id) if r.info.station}:
             jobs.station_done(job_id, index, now(), {})
             return StepOutcome()
         if jobs.cancel_requested(job_id):
             return StepOutcome(cancelled=True)
+        if not self._lease_held():
+            return StepOutcome(Failure("LeaseLost", "another process may drive this bench now", index))
         try:
             info = self._session_of(jobs.get(job_id)).record(index)
         except Stopped:
@@ -70,18 +89,17 @@ class JobRunner:
         return StepOutcome()
 
     def make_safe(self, job_id: str) -> StepOutcome:
-        """Leave the bench safe, also after a restart in which no session survived."""
-        session = self._session
-        if session is None:
-            return StepOutcome()
-        self._session = None
+        """Leave the bench safe; after a restart in which no session survived, by opening it for that alone."""
+        try:
+            session = self._session_of(self._stores.jobs.get(job_id))
+        except (BenchError, ServiceError) as error:
+            return self._not_safe(job_id, str(error))
         try:
             session.make_safe()
         except ExceptionGroup as group:
-            message = "; ".join(str(error) for error in group.exceptions)
-            self._stores.jobs.note(job_id, "note", now(), {"text": f"the bench could not be made safe: {message}"})
-            return StepOutcome(Failure("NotSafe", f"the bench could not be made safe: {message}"))
+            return self._not_safe(job_id, "; ".join(str(error) for error in group.exceptions))
         finally:
+            self._session = None
             session.close()
         return StepOutcome()
 
@@ -91,7 +109,7 @@ class JobRunner:
         procedure = self._planner.procedure(job.procedure)
         try:
             recordings = [self._stores.recordings.load(r.info.id) for r in self._stores.recordings.of_job(job_id)]
-            result = analysed(job, procedure, job.parameters, recordings)
+            result = analysed(job, procedure, job.parameters, recordings, self._code_version)
             stored = self._stores.results.add(
                 result.stored, result.calibrations, idempotency=Idempotency(f"job:{job_id}", job_id)
             )
@@ -112,6 +130,7 @@ class JobRunner:
 
     def shut_down(self) -> None:
         """The service is ending: leave the running job to the next start, and the bench safe."""
+        self._ending.set()
         session = self._session
         if session is not None:
             session.shut_down()
@@ -119,6 +138,11 @@ class JobRunner:
     def running_job(self) -> Job | None:
         """The job that drives the bench now."""
         return None if self._session is None else self._stores.jobs.get(self._session.job.id)
+
+    def _not_safe(self, job_id: str, why: str) -> StepOutcome:
+        text = f"the bench could not be made safe: {why}"
+        self._stores.jobs.note(job_id, "note", now(), {"text": text})
+        return StepOutcome(Failure("NotSafe", text))
 
     def _session_of(self, job: Job) -> BenchSession:
         if self._session is not None and self._session.job.id == job.id:
@@ -145,7 +169,11 @@ class Analysed:
 
 
 def analysed(
-    job: Job, procedure: AnyProcedure, parameters: dict[str, Any], recordings: Sequence[Recording]
+    job: Job,
+    procedure: AnyProcedure,
+    parameters: dict[str, Any],
+    recordings: Sequence[Recording],
+    code_version: str,
 ) -> Analysed:
     """Run a procedure's analysis on a job's recordings. Raises `DomainError`, `ValidationError` for the parameters."""
     context = CONTEXT.validate_python(job.context)
@@ -162,7 +190,7 @@ def analysed(
         verdict=outcome.verdict,
         recordings=tuple((r.info.id, r.info.content_hash) for r in recordings),
         calibrations=(used,) if used else (),
-        code_version=job.code_version,
+        code_version=code_version,
         simulated=job.simulated,
         created_at=now(),
         unit=job.unit,

@@ -2,8 +2,8 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import timedelta
 from functools import cached_property
 from random import SystemRandom
@@ -17,7 +17,7 @@ from bench_service.jobs.engine import Engine
 from bench_service.jobs.errors import IllegalTransition, NotDriving, NotFound
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.planning import CONTEXT, Plan, Planner
-from bench_service.jobs.runner import JobRunner, analysed
+from bench_service.jobs.runner import analysed
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import Idempotency, NewRecording, RecordingState, StoredResult
 from bench_service.wall_clock import new_id, now
@@ -65,7 +65,6 @@ class BenchService:
         stores: Stores,
         driver: BenchDriver,
         planner: Planner,
-        runner: JobRunner,
         engine: Engine | None,
         code_version: str,
     ) -> None:
@@ -73,7 +72,6 @@ class BenchService:
         self.driver = driver
         self.planner = planner
         self.code_version = code_version
-        self._runner = runner
         self._engine = engine
 
     @cached_property
@@ -81,19 +79,24 @@ class BenchService:
         """Every method by name."""
         return methods.discover()
 
-    def start(self) -> None:
-        """Register the bench and its units, then begin to work. The bench's lease must be held."""
+    def start(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
+        """Register the bench and its units, then begin to work. The bench's lease must be held.
+
+        `warm_up` is called beside the first answers, after the numerics were loaded there.
+        """
         self.stores.units.put_bench(self.driver.description)
         self.stores.recordings.discard_open_imports(now() - CRASHED_IMPORT)
         for unit in self.driver.mounted():
             self._register(unit)
         if self._engine is not None:
             self._engine.launch(self.stores.jobs)
-        Thread(target=self._warm_up, name="warm-up", daemon=True).start()
+        Thread(target=self._warm_up, args=(warm_up,), name="warm-up", daemon=True).start()
 
-    def _warm_up(self) -> None:
-        """Load what the first job will need, beside the first answers: the numerics take longer than the service."""
+    def _warm_up(self, more: Sequence[Callable[[], object]]) -> None:
+        """Load what the first job will need: the numerics take longer than the service."""
         _ = self.planner.catalog, self.methods
+        for work in more:
+            work()
 
     def stop(self) -> None:
         """End the service: the running job is left for the next start, the bench made safe."""
@@ -124,7 +127,7 @@ class BenchService:
         """Stop what the bench is doing; the job that was running, if any. Its bench is safe once it is cancelled."""
         if bench_id != self.driver.description.id:
             raise NotFound("bench", bench_id)
-        running = self._runner.running_job()
+        running = self.running_job()
         if running is None:
             return None
         try:
@@ -134,7 +137,7 @@ class BenchService:
 
     def running_job(self) -> Job | None:
         """The job that drives the bench now."""
-        return self._runner.running_job()
+        return None if self._engine is None else self._engine.running_job()
 
     def result_of(self, job_id: str) -> StoredResult:
         """The result that gave the job its verdict. Raises `NotFound` where there is none (yet)."""
@@ -157,8 +160,7 @@ class BenchService:
         if len(recordings) < len(job.stations):
             raise UnfitRecording(f"job {job_id} has {len(recordings)} of its {len(job.stations)} recordings")
         merged = {**job.requested_parameters, **parameters}
-        current = replace(job, code_version=self.code_version)
-        result = analysed(current, self.planner.procedure(job.procedure), merged, recordings)
+        result = analysed(job, self.planner.procedure(job.procedure), merged, recordings, self.code_version)
         idempotency = None if key is None else Idempotency(f"again:{key}", fingerprint([job_id, parameters]))
         return self.stores.results.add(result.stored, result.calibrations, False, idempotency)
 
@@ -167,9 +169,8 @@ class BenchService:
         method = self.method(request.method)
         params = method.params.model_validate(request.parameters)
         evidence = self._evidence(request)
-        units = {r.info.unit for r in evidence.recordings} | {
-            self.stores.results.calibration(c).unit for c in request.calibrations
-        }
+        used = [self.stores.results.calibration(c) for c in request.calibrations]
+        units = {r.info.unit for r in evidence.recordings} | {c.unit for c in used}
         if len(units) > 1:
             raise UnfitRecording(f"the evidence is of several units: {', '.join(sorted(units))}")
         serial = next(iter(units), None)
@@ -185,7 +186,7 @@ class BenchService:
             recordings=tuple((r.info.id, r.info.content_hash) for r in evidence.recordings),
             calibrations=request.calibrations,
             code_version=self.code_version,
-            simulated=any(r.info.simulated for r in evidence.recordings),
+            simulated=any(r.info.simulated for r in evidence.recordings) or any(c.simulated for c in used),
             created_at=now(),
             unit=serial,
         )

@@ -1,4 +1,4 @@
-"""A `Figure` of the domain as an SVG, drawn by matplotlib. Imported only when the first plot is asked for."""
+"""A `Figure` of the domain as an SVG, drawn by matplotlib. Imported beside the first answers, not before."""
 
 from io import StringIO
 
@@ -7,6 +7,11 @@ from procedures.core.report import Figure, Series
 SIZE_IN = (7.2, 3.4)
 COLOURS = ("#1f5fa8", "#c2410c", "#15803d", "#7c3aed", "#a16207", "#0e7490")
 MARKS = ("o", "^", "s", "D", "v", "P")
+
+
+def warm_up() -> None:
+    """Load matplotlib, so that nobody waits for it at the first plot."""
+    svg(Figure("", "", "", (Series("", (0.0, 1.0), (0.0, 1.0)),)))
 
 
 def svg(figure: Figure) -> str:

@@ -13,6 +13,9 @@ from procedures.core.table_angles import TableAngles
 BATCHES = 20
 """Stretches a dwell is cut into; the scatter of their means allows for noise correlated over less than a stretch."""
 
+RANGE_ENDS = tuple(float(2**bits - over) for bits in (15, 31) for over in (0, 1))
+"""Where counters of 16 and 32 bits end, up to the sign."""
+
 
 @dataclass(frozen=True)
 class StationMeans:
@@ -136,10 +139,12 @@ def _require_finite(raw: Array, info: RecordingInfo, triad: str) -> None:
 
 
 def _refuse_frozen(recordings: Sequence[Recording], summaries: Sequence[_Summary], triad: str) -> None:
-    """A channel that never changes is dead if it says the same at every one of several stations, or stuck if it stands
-    at a whole number other than zero through one station while it moves at another.
+    """A channel that never changes is dead if it says the same at every one of several stations; it is stuck if it
+    stands at a whole number other than zero at some and moves at others.
 
-    A few zeros prove nothing: a quantised gyro across the Earth's rate gives no pulse for minutes.
+    A counter proves less than a sample does: across the Earth's rate it gives no pulse for minutes, and a quiet input
+    of almost exactly k pulses a sample gives k throughout a dwell, by chance one dwell in as many as it has samples.
+    So a counter is stuck only if it stands at the same number twice, or at the end of its range.
     """
     if len(recordings) < 2:
         return
@@ -152,8 +157,13 @@ def _refuse_frozen(recordings: Sequence[Recording], summaries: Sequence[_Summary
             )
         moving = any(v is None for v in values)
         for recording, value in zip(recordings, values, strict=True):
-            if moving and value and _is_integer(recording):
+            if moving and value and _is_integer(recording) and _is_stuck(recording.info, name, value, values):
                 raise UnfitRecording(f"recording {recording.info.id}: channel {name} is stuck at {value:g}")
+
+
+def _is_stuck(info: RecordingInfo, name: str, value: float, values: Sequence[float | None]) -> bool:
+    counter = info.channels[info.column(name)].quantity in INCREMENTS
+    return not counter or abs(value) in RANGE_ENDS or values.count(value) > 1
 
 
 def _is_integer(recording: Recording) -> bool:

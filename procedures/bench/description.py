@@ -22,8 +22,7 @@ class TableAccuracy:
 
     `orthogonality` holds for each of the two right angles (outer to middle, middle to inner), constant over a
     job; `pointing` for each axis anew at each station; `level` for the tilt of the outer axis about each horizontal
-    direction; `mounting` for the unit's seat on the table about each of its axes. The last is part of what a
-    calibration measures (the unit's axes *are* those of its mounting plate) and is not propagated.
+    direction. The unit's seat on the table is not among them: a unit's axes *are* those of its mounting plate.
     """
 
     orthogonality_sd_arcsec: float = 0.0

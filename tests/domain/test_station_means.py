@@ -71,6 +71,29 @@ def test_a_stuck_or_saturated_channel_is_refused():
         station_means([recording(counts(6)), recording(stuck, name="bad")], "gyro")
 
 
+def test_a_counter_at_the_same_number_in_two_of_several_stations_is_stuck():
+    raws = [counts(i) for i in range(4)]
+    raws[1][:, 0] = raws[3][:, 0] = 10
+    with pytest.raises(UnfitRecording, match="channel gyro_x is stuck at 10"):
+        station_means([recording(raw) for raw in raws], "gyro")
+
+
+def test_a_quiet_counter_that_gives_whole_pulses_through_one_station_is_no_fault():
+    """Ten pulses a sample, to a part in a hundred thousand: seen on the default unit in one dwell of some hundreds."""
+    even = counts(3)
+    even[:, 1] = 10
+    rate = station_means([recording(even), recording(counts(4))], "gyro").outputs[0, 1]
+    assert rate == pytest.approx(10 * 2 * ARCSEC * 10.0)
+
+
+def test_a_sampled_rate_that_never_changes_through_one_station_is_stuck():
+    channels = tuple(Channel(name, Quantity.ANGULAR_RATE, "count") for name in GYRO)
+    stuck = counts(5)
+    stuck[:, 0] = 10
+    with pytest.raises(UnfitRecording, match="channel gyro_x is stuck at 10"):
+        station_means([recording(counts(6), channels), recording(stuck, channels)], "gyro")
+
+
 def test_samples_that_are_no_numbers_are_refused():
     raw = counts(7).astype(np.float64)
     raw[500, 1] = np.nan

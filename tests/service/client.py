@@ -1,5 +1,8 @@
 """What a test says to the service."""
 
+import json
+from urllib.parse import quote
+
 import httpx
 
 from bench_service.wall_clock import monotonic_s, pause
@@ -36,3 +39,28 @@ class Client:
 
     def recordings(self, job_id: str) -> list[dict]:
         return self.http.get("/api/v1/recordings", params={"job": job_id, "limit": 500}).json()["items"]
+
+    def stored(self) -> dict[str, list[str]]:
+        """The ids of everything that is stored: to show that a refusal left nothing behind."""
+        pages = {name: f"/api/v1/{name}" for name in ("jobs", "recordings", "results")}
+        for unit in self.http.get("/api/v1/units").json():
+            serial = quote(unit["serial"], safe="")
+            pages[unit["serial"]] = f"/api/v1/units/{serial}/calibrations"
+        return {
+            name: [item["id"] for item in self.http.get(path, params={"limit": 500}).json()["items"]]
+            for name, path in pages.items()
+        }
+
+    def preview(self, procedure: str = "calibration_12_orientations", **parameters: object) -> httpx.Response:
+        body = {"unit": "SIM-0001", "parameters": parameters}
+        return self.http.post(f"/api/v1/procedures/{procedure}/preview", json=body)
+
+    def import_files(self, description: object, *files: bytes, key: str | None = None) -> httpx.Response:
+        """Send files as one recording; a description that is no text is sent as JSON."""
+        text = description if isinstance(description, str) else json.dumps(description)
+        parts = [("files", (f"file{number}.csv", data)) for number, data in enumerate(files)]
+        headers = {} if key is None else {"Idempotency-Key": key}
+        return self.http.post("/api/v1/recordings", files=parts, data={"description": text}, headers=headers)
+
+    def analyse(self, method: str, **body: object) -> httpx.Response:
+        return self.http.post("/api/v1/analyses", json={"method": method, **body})

@@ -12,7 +12,15 @@ from procedures.analysis.table_errors import table_errors
 from procedures.procedure import Context
 from simulators.truth import random_unit_truth
 from simulators.world import WorldConfig, declared_unit
-from tests.validation.judgement import COVERAGE, NAMES, checks, failures, preview_limits, spread_limits
+from tests.validation.judgement import (
+    COVERAGE,
+    NAMES,
+    PREVIEW_TOLERANCE,
+    checks,
+    failures,
+    preview_limits,
+    spread_limits,
+)
 from tests.validation.population import (
     CALIBRATION,
     SCENARIOS,
@@ -28,12 +36,21 @@ from tests.validation.population import (
 )
 from tests.validation.theory import bounds, dwell_covariance, dwell_windows
 
-UNITS = {"ideal table": 100, "axes 3″, azimuth 5″": 50, "axes 3″, azimuth 5″, pointing 1″, level 1″": 50}
+UNITS = 75
+"""A spread is then known to 8 %, judged to 37 %; the bounds below are compared without any chance."""
+
+
+@pytest.mark.parametrize("scenario", [SCENARIOS[0], SCENARIOS[2]], ids=lambda s: s.title)
+def test_errors_are_what_is_claimed_and_what_theory_allows(scenario: Scenario) -> None:
+    assert failures(stacked(list(population(scenario, UNITS)))) == []
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.title)
-def test_errors_are_what_is_claimed_and_what_theory_allows(scenario: Scenario) -> None:
-    assert failures(stacked(list(population(scenario, UNITS[scenario.title])))) == []
+def test_claim_and_preview_are_what_theory_says_of_each_unit(scenario: Scenario) -> None:
+    several = stacked(list(population(scenario, 4)))
+    # The claim knows K to parts in a thousand and takes the flicker's bank for a continuum.
+    np.testing.assert_allclose(several.claimed, several.weighted_bound, rtol=5e-3)
+    np.testing.assert_allclose(several.preview, several.weighted_bound, rtol=PREVIEW_TOLERANCE)
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.title)
