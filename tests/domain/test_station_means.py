@@ -79,7 +79,7 @@ def test_a_counter_at_the_same_number_in_two_of_several_stations_is_stuck():
 
 
 def test_a_quiet_counter_that_gives_whole_pulses_through_one_station_is_no_fault():
-    """Ten pulses a sample, to a part in a hundred thousand: seen on the default unit in one dwell of some hundreds."""
+    """Ten pulses a sample, to a part in a hundred thousand: seen on an accelerometer of the default unit."""
     even = counts(3)
     even[:, 1] = 10
     rate = station_means([recording(even), recording(counts(4))], "gyro").outputs[0, 1]
