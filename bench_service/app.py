@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncGenerator, Callable
 from contextlib import ExitStack, asynccontextmanager
+from functools import partial
 from importlib.metadata import version
 
 from fastapi import FastAPI
@@ -11,10 +12,11 @@ from threadpoolctl import threadpool_limits
 from bench_service.api import analyses, benches, errors, health, jobs, procedures, recordings, units
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs.code_version import code_version
-from bench_service.jobs.engine import Engine
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.service import BenchService
+from bench_service.jobs.store import Stores
+from bench_service.jobs.worker import JobEngine, Worker
 from bench_service.pages import figures, routes
 from bench_service.persistence import acquire_lease, engine_database, open_stores
 from bench_service.settings import Settings
@@ -34,16 +36,23 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     closing.callback(database.dispose)
     planner = Planner(stores, driver)
     code = code_version()
-    engine: Engine | None = None
+    worker: Worker | None = None
     if drive:
         lease = acquire_lease(settings.database_url, settings.bench_id)
         closing.callback(lease.release)
-        runner = JobRunner(stores, planner, driver, code, lease.held)
-        engine = Engine(*engine_database(settings.database_url), settings.bench_id, settings.poll_s, runner)
-    service = BenchService(stores, driver, planner, engine, code)
+        worker = Worker(JobRunner(stores, planner, driver, code, lease.held), partial(_engine, settings, stores))
+    service = BenchService(stores, driver, planner, worker, code)
     closing.callback(service.stop)
     service.start(warm_up=[figures.warm_up])
     return service
+
+
+def _engine(settings: Settings, stores: Stores, runner: JobRunner) -> JobEngine:
+    """The job engine, which is imported here because it takes as long as the rest of the service."""
+    from bench_service.jobs.engine import Engine
+
+    books = engine_database(settings.database_url)
+    return Engine(*books, settings.bench_id, settings.poll_s, runner, stores.jobs)
 
 
 def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[], None]) -> FastAPI:

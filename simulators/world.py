@@ -11,15 +11,13 @@ import numpy as np
 
 from procedures.bench import Bench
 from procedures.core import units
-from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import Station
 from procedures.core.table_angles import TableAngles
-from procedures.core.unit import TriadRecord, Unit
 from simulators.clock import SimClock, Wait
-from simulators.imu.device import SimImu, unit_channels
+from simulators.imu.device import SimImu
 from simulators.imu.sensor import TRIADS, Coefficients, launch_coefficients, station_means
 from simulators.supply.device import SimSupply
-from simulators.truth import Array, BenchTruth, TriadTruth, UnitTruth, default_bench, default_unit
+from simulators.truth import Array, BenchTruth, UnitTruth, default_bench, default_unit
 from simulators.turntable.device import SETTLE_S, SimTurntable, pointing_error_rad
 from simulators.turntable.kinematics import at_rest, attitude
 from simulators.turntable.profile import move_ticks
@@ -101,31 +99,6 @@ def launch_coefficients_of(config: WorldConfig, launch: int = 1) -> dict[str, Co
 def launch_truth(config: WorldConfig, launch: int = 1) -> dict[str, tuple[Array, Array]]:
     """Triad -> (bias (3,) [rad/s or m/s²], K (3, 3)) of a launch, without running anything."""
     return {name: (c.bias, c.matrix) for name, c in launch_coefficients_of(config, launch).items()}
-
-
-def declared_unit(truth: UnitTruth, averaging_time_s: float = 70.0, sample_rate_hz: float | None = None) -> Unit:
-    """The unit's data sheet: channels, noise coefficients and run-to-run stability as they truly are."""
-
-    def record(triad: TriadTruth) -> TriadRecord:
-        columns = zip(
-            triad.quantization,
-            triad.random_walk,
-            triad.bias_instability,
-            triad.rate_random_walk,
-            [abs(r) for r in triad.rate_ramp],
-            strict=True,
-        )
-        x, y, z = (NoiseCoefficients(*column, flicker_band_s=triad.flicker_band_s) for column in columns)
-        return TriadRecord((x, y, z), triad.bias_run_to_run_sd, triad.scale_factor_run_to_run_sd_ppm * units.PPM)
-
-    return Unit(
-        truth.serial,
-        truth.sample_rate_hz if sample_rate_hz is None else sample_rate_hz,
-        unit_channels(truth),
-        record(truth.gyro),
-        record(truth.accelerometer),
-        averaging_time_s,
-    )
 
 
 @dataclass(frozen=True)

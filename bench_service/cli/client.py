@@ -4,22 +4,25 @@ import tempfile
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
-
-import httpx
+from typing import TYPE_CHECKING, Any
 
 from bench_service.cli.refusal import Refused
 from bench_service.settings import Settings
+
+if TYPE_CHECKING:
+    import httpx  # at run time where it is used: a server that starts needs no client
 
 TIMEOUT_S = 600.0
 
 
 @contextmanager
-def connect(settings: Settings, server: str | None, drive: bool) -> Generator[httpx.Client]:
+def connect(settings: Settings, server: str | None, drive: bool) -> Generator["httpx.Client"]:
     """A client to `server`, or to an application in this process that lives as long as the block.
 
     `drive`: whether the embedded application is to run jobs, for which it must have the bench to itself.
     """
+    import httpx
+
     if server is not None:
         with httpx.Client(base_url=server, timeout=TIMEOUT_S) as client:
             yield client
@@ -37,8 +40,10 @@ def connect(settings: Settings, server: str | None, drive: bool) -> Generator[ht
             yield client
 
 
-def call(client: httpx.Client, method: str, path: str, **options: Any) -> Any:
+def call(client: "httpx.Client", method: str, path: str, **options: Any) -> Any:
     """The JSON of a good answer. Raises `Refused` with what the service said."""
+    import httpx
+
     try:
         response = client.request(method, path, **options)
     except httpx.HTTPError as error:
@@ -48,7 +53,7 @@ def call(client: httpx.Client, method: str, path: str, **options: Any) -> Any:
     raise Refused(sentence(response))
 
 
-def sentence(response: httpx.Response) -> str:
+def sentence(response: "httpx.Response") -> str:
     """A problem document in words."""
     try:
         problem = response.json()

@@ -20,7 +20,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
-    help="Test bench for inertial navigation units. Exit code: 0 pass, 1 fail, 2 error.",
+    help=HELP,
 )
 console = Console()
 errors = Console(stderr=True)

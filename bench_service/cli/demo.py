@@ -1,24 +1,26 @@
 """``make run``: calibrate and verify the simulated unit through the service, as an operator would."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import httpx
 from rich.console import Console
 
 from bench_service.cli.client import call
 from bench_service.cli.tables import check_table, coefficient_table
 from bench_service.cli.watching import exit_code, watch
 
+if TYPE_CHECKING:
+    import httpx
+
 PROCEDURES = ("calibration_12_orientations", "verification_9_orientations")
 
 
-def demonstrate(client: httpx.Client, unit: str, seed: int, console: Console) -> int:
+def demonstrate(client: "httpx.Client", unit: str, seed: int, console: Console) -> int:
     """Calibrate, verify after another power-up (the next seed), show; the exit code of the worse verdict."""
     codes = [_one(client, procedure, unit, seed + k, console) for k, procedure in enumerate(PROCEDURES)]
     return max(codes)
 
 
-def _one(client: httpx.Client, procedure: str, unit: str, seed: int, console: Console) -> int:
+def _one(client: "httpx.Client", procedure: str, unit: str, seed: int, console: Console) -> int:
     body: dict[str, Any] = {"procedure": procedure, "unit": unit, "seed": seed}
     job = watch(client, call(client, "POST", "/api/v1/jobs", json=body), console)
     if job["state"] != "succeeded":
@@ -37,7 +39,7 @@ def _one(client: httpx.Client, procedure: str, unit: str, seed: int, console: Co
     return exit_code(job["verdict"])
 
 
-def _show_coefficients(client: httpx.Client, job: dict[str, Any], console: Console) -> None:
+def _show_coefficients(client: "httpx.Client", job: dict[str, Any], console: Console) -> None:
     newest = call(client, "GET", f"/api/v1/units/{job['unit']}/calibrations", params={"limit": 1})["items"][0]
     truth = call(client, "GET", f"/api/v1/jobs/{job['id']}/truth")["triads"]
     table, worst = coefficient_table(newest["triads"], truth)

@@ -1,19 +1,21 @@
 """Watching a job to its end, with a progress bar for a person."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import httpx
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from bench_service.cli.client import call
 from bench_service.wall_clock import pause
 
+if TYPE_CHECKING:
+    import httpx
+
 ENDED = ("succeeded", "failed", "cancelled", "interrupted")
 LOOK_S = 0.1
 
 
-def watch(client: httpx.Client, job: dict[str, Any], console: Console) -> dict[str, Any]:
+def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict[str, Any]:
     """Follow a job until it has ended; the job as it then is."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console) as progress:

@@ -3,15 +3,25 @@
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bench_service.jobs.driver import TrueTriad
 from bench_service.jobs.errors import NotMounted
 from bench_service.wall_clock import pause_async
 from procedures.bench import Bench, BenchDescription
 from procedures.core.unit import Unit
-from simulators.truth import UnitTruth, default_bench, default_unit, load_bench, load_unit, random_unit_truth
-from simulators.world import WorldConfig, build, declared_unit, launch_truth
+from simulators.truth import (
+    UnitTruth,
+    declared_unit,
+    default_bench,
+    default_unit,
+    load_bench,
+    load_unit,
+    random_unit_truth,
+)
+
+if TYPE_CHECKING:
+    from simulators.world import WorldConfig
 
 RANDOM_UNIT = re.compile(r"^RANDOM-(\d{1,9})$")
 """Serial of a unit whose truth is drawn from the number in it: as many different units as a night needs."""
@@ -46,10 +56,14 @@ class SimulatedDriver:
 
     def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None) -> Bench:
         """A world with that unit on the table, at its beginning or at a checkpoint."""
+        from simulators.world import build  # with MuJoCo: not needed before a bench is opened
+
         return build(self._config(unit, 0 if seed is None else seed), checkpoint)
 
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
         """Bias and matrix of the job's launch, run-to-run changes included."""
+        from simulators.world import launch_truth
+
         found = launch_truth(self._config(unit, seed))
         units = {"gyro": "rad/s", "accelerometer": "m/s^2"}
         return tuple(
@@ -62,7 +76,9 @@ class SimulatedDriver:
             for triad, (bias, matrix) in found.items()
         )
 
-    def _config(self, unit: str, seed: int) -> WorldConfig:
+    def _config(self, unit: str, seed: int) -> "WorldConfig":
+        from simulators.world import WorldConfig
+
         return WorldConfig(
             unit=self._truth_of(unit),
             bench=self._bench,

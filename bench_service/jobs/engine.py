@@ -53,11 +53,18 @@ class Engine:
     """Runs jobs of one bench, in this process, durably."""
 
     def __init__(
-        self, database_url: str, connection: dict[str, Any], bench_id: str, poll_s: float, runner: JobRunner
+        self,
+        database_url: str,
+        connection: dict[str, Any],
+        bench_id: str,
+        poll_s: float,
+        runner: JobRunner,
+        jobs: JobStore,
     ) -> None:
         self._queue = f"bench:{bench_id}"
         self._poll_s = poll_s
         self._runner = runner
+        self._jobs = jobs
         self._idle = Event()
         self._idle.set()
         config: DBOSConfig = {
@@ -84,7 +91,7 @@ class Engine:
 
         self._workflow = run_job
 
-    def launch(self, jobs: JobStore) -> None:
+    def launch(self) -> None:
         """Start working; jobs that a dead process left go on. The bench's lease must be held."""
         DBOS.listen_queues([self._queue])
         DBOS.launch()
@@ -95,20 +102,15 @@ class Engine:
             polling_interval_sec=self._poll_s,
             on_conflict="always_update",
         )
-        self._reconcile(jobs)
+        self._reconcile()
 
     def enqueue(self, job: Job) -> None:
         """Queue a job; queueing the same job twice is a no-op."""
         with SetWorkflowID(job.id), SetEnqueueOptions(priority=job.priority):
             DBOS.enqueue_workflow(self._queue, self._workflow, job.id)
 
-    def running_job(self) -> Job | None:
-        """The job that drives the bench now."""
-        return self._runner.running_job()
-
     def shut_down(self) -> None:
-        """Stop working. The running job is left for the next start; the bench is made safe first."""
-        self._runner.shut_down()
+        """Stop working, once the running job has left the bench safe; it goes on after the next start."""
         self._idle.wait(SHUT_DOWN_S)
         DBOS.destroy(destroy_registry=True)
 
@@ -144,19 +146,19 @@ class Engine:
                 return outcome
         return StepOutcome(cancelled=count < 0)
 
-    def _reconcile(self, jobs: JobStore) -> None:
+    def _reconcile(self) -> None:
         """Make our jobs and the engine's workflows agree after a crash or a change of version."""
         for state in (JobState.QUEUED, JobState.RUNNING):
             cursor: str | None = None
             while True:
-                page = jobs.list(state=state, after=cursor, limit=200)
+                page = self._jobs.list(state=state, after=cursor, limit=200)
                 for job in page.items:
-                    self._reconcile_job(job, jobs)
+                    self._reconcile_job(job)
                 cursor = page.next
                 if cursor is None:
                     break
 
-    def _reconcile_job(self, job: Job, jobs: JobStore) -> None:
+    def _reconcile_job(self, job: Job) -> None:
         if f"bench:{job.bench}" != self._queue:
             return
         status = DBOS.get_workflow_status(job.id)
@@ -164,12 +166,12 @@ class Engine:
             self.enqueue(job)
         elif status.status in ("ERROR", "CANCELLED", "MAX_RECOVERY_ATTEMPTS_EXCEEDED"):
             failure = Failure("EngineGaveUp", f"the job engine ended this job as {status.status}")
-            jobs.transition(job.id, JobState.INTERRUPTED, at=now(), failure=failure)
+            self._jobs.transition(job.id, JobState.INTERRUPTED, at=now(), failure=failure)
         elif status.app_version not in (None, PROCEDURE_ABI):
             failure = Failure(
                 "OtherVersion", f"begun by version {status.app_version} of the procedures, this is {PROCEDURE_ABI}"
             )
-            jobs.transition(job.id, JobState.INTERRUPTED, at=now(), failure=failure)
+            self._jobs.transition(job.id, JobState.INTERRUPTED, at=now(), failure=failure)
 
 
 def _step(name: str, work: Any) -> Any:

@@ -7,19 +7,18 @@ from dataclasses import dataclass, field
 from datetime import timedelta
 from functools import cached_property
 from random import SystemRandom
-from threading import Thread
 from typing import Any
 
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.import_file import ImportFile, read_import
 from bench_service.jobs.driver import BenchDriver, TrueTriad
-from bench_service.jobs.engine import Engine
 from bench_service.jobs.errors import IllegalTransition, NotDriving, NotFound
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.planning import CONTEXT, Plan, Planner
 from bench_service.jobs.runner import analysed
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import Idempotency, NewRecording, RecordingState, StoredResult
+from bench_service.jobs.worker import Worker
 from bench_service.wall_clock import new_id, now
 from procedures import methods
 from procedures.core.errors import BadParameter, UnfitRecording
@@ -65,14 +64,14 @@ class BenchService:
         stores: Stores,
         driver: BenchDriver,
         planner: Planner,
-        engine: Engine | None,
+        worker: Worker | None,
         code_version: str,
     ) -> None:
         self.stores = stores
         self.driver = driver
         self.planner = planner
         self.code_version = code_version
-        self._engine = engine
+        self._worker = worker
 
     @cached_property
     def methods(self) -> Mapping[str, AnyMethod]:
@@ -82,26 +81,25 @@ class BenchService:
     def start(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
         """Register the bench and its units, then begin to work. The bench's lease must be held.
 
-        `warm_up` is called beside the first answers, after the numerics were loaded there.
+        `warm_up` is called beside the first answers, once the engine runs and the numerics are loaded.
         """
         self.stores.units.put_bench(self.driver.description)
         self.stores.recordings.discard_open_imports(now() - CRASHED_IMPORT)
         for unit in self.driver.mounted():
             self._register(unit)
-        if self._engine is not None:
-            self._engine.launch(self.stores.jobs)
-        Thread(target=self._warm_up, args=(warm_up,), name="warm-up", daemon=True).start()
+        if self._worker is not None:
+            self._worker.begin([lambda: (self.planner.catalog, self.methods), *warm_up])
 
-    def _warm_up(self, more: Sequence[Callable[[], object]]) -> None:
-        """Load what the first job will need: the numerics take longer than the service."""
-        _ = self.planner.catalog, self.methods
-        for work in more:
-            work()
+    def ready(self) -> None:
+        """Return once requests can be served in full. Raises `StorageFailure`, `NotDriving`."""
+        self.stores.jobs.counts()
+        if self._worker is not None:
+            self._worker.require_engine()
 
     def stop(self) -> None:
         """End the service: the running job is left for the next start, the bench made safe."""
-        if self._engine is not None:
-            self._engine.shut_down()
+        if self._worker is not None:
+            self._worker.shut_down()
 
     def submit(self, request: JobRequest, idempotency_key: str | None = None) -> Job:
         """Plan, store and queue a job. Raises what `Planner.plan` raises, `BadParameter` for an axis limit."""
@@ -110,13 +108,13 @@ class BenchService:
             raise BadParameter("orientations", plan.violations[0], "beyond an axis limit of the bench")
         if request.seed is not None and not plan.context.bench.simulated:
             raise BadParameter("seed", request.seed, "only a simulated bench has one")
-        if self._engine is None:
+        if self._worker is None:
             raise NotDriving("this process does not drive a bench; ask the service that does")
         self._register(plan.context.unit)
         job = self._new_job(request, plan)
         key = None if idempotency_key is None else Idempotency(f"jobs:{idempotency_key}", fingerprint(request))
         stored = self.stores.jobs.add(job, key)
-        self._engine.enqueue(stored)
+        self._worker.require_engine().enqueue(stored)
         return stored
 
     def cancel(self, job_id: str) -> Job:
@@ -137,7 +135,7 @@ class BenchService:
 
     def running_job(self) -> Job | None:
         """The job that drives the bench now."""
-        return None if self._engine is None else self._engine.running_job()
+        return None if self._worker is None else self._worker.running_job()
 
     def result_of(self, job_id: str) -> StoredResult:
         """The result that gave the job its verdict. Raises `NotFound` where there is none (yet)."""

@@ -9,24 +9,14 @@ from numpy.typing import NDArray
 
 from procedures.bench.errors import DeviceFault, NotPowered, OutOfRange
 from procedures.bench.imu import Stream
-from procedures.core.recording import ACCELEROMETER, GYRO, Channel, Quantity, Station
+from procedures.core.recording import Channel, Station
 from simulators.clock import Motion, SimClock
 from simulators.imu.sensor import TRIADS, TriadSensor
-from simulators.truth import UnitTruth
+from simulators.truth import UnitTruth, unit_channels
 
 BLOCK_S = 10.0
 
 Counts = NDArray[np.int32]
-
-
-def unit_channels(truth: UnitTruth) -> tuple[Channel, ...]:
-    """Six channels of increments, gyros first; the nominal scale of each is the weight of its pulse."""
-    gyros = zip(GYRO, truth.gyro.pulse, strict=True)
-    accelerometers = zip(ACCELEROMETER, truth.accelerometer.pulse, strict=True)
-    return (
-        *(Channel(name, Quantity.ANGLE_INCREMENT, "rad", scale) for name, scale in gyros),
-        *(Channel(name, Quantity.VELOCITY_INCREMENT, "m/s", scale) for name, scale in accelerometers),
-    )
 
 
 @dataclass

@@ -1,6 +1,7 @@
 """What is true of the simulated world: values, the files they live in, and chance keyed by seed."""
 
 from simulators.truth.chance import keyed_generator, random_table_truth, random_unit_truth
+from simulators.truth.data_sheet import declared_unit, unit_channels
 from simulators.truth.files import (
     default_bench,
     default_unit,
@@ -19,6 +20,7 @@ __all__ = [
     "TriadTruth",
     "TruthError",
     "UnitTruth",
+    "declared_unit",
     "default_bench",
     "default_unit",
     "keyed_generator",
@@ -28,4 +30,5 @@ __all__ = [
     "random_unit_truth",
     "save_bench",
     "save_unit",
+    "unit_channels",
 ]

@@ -47,7 +47,8 @@ class Service:
 def command(arguments: list[str], port: int, environment: dict[str, str]) -> Generator[Service]:
     """Start a command that will answer on a port, wait for its first 200, and end it afterwards."""
     begun = monotonic_s()
-    process = subprocess.Popen(arguments, env={**os.environ, **environment}, stderr=subprocess.DEVNULL)
+    quiet = subprocess.DEVNULL
+    process = subprocess.Popen(arguments, env={**os.environ, **environment}, stdout=quiet, stderr=quiet)
     with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=600) as client:
         try:
             while True:

@@ -12,8 +12,8 @@ from procedures.core.recording import Quantity, Station
 from procedures.core.table_angles import TableAngles
 from procedures.core.units import DEG, EARTH_RATE
 from simulators.clock import Motion, SimClock
-from simulators.truth import default_unit
-from simulators.world import WorldConfig, build, declared_unit
+from simulators.truth import declared_unit, default_unit
+from simulators.world import WorldConfig, build
 
 STATIONS = [
     Station(0, "a", TableAngles(0, 0, 90), None, 1.0, 3.0),

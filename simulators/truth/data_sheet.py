@@ -1,0 +1,42 @@
+"""What a laboratory would know of a simulated unit beforehand: its channels and its noise, as they truly are."""
+
+from procedures.core import units
+from procedures.core.noise import NoiseCoefficients
+from procedures.core.recording import ACCELEROMETER, GYRO, Channel, Quantity
+from procedures.core.unit import TriadRecord, Unit
+from simulators.truth.values import TriadTruth, UnitTruth
+
+
+def unit_channels(truth: UnitTruth) -> tuple[Channel, ...]:
+    """Six channels of increments, gyros first; the nominal scale of each is the weight of its pulse."""
+    gyros = zip(GYRO, truth.gyro.pulse, strict=True)
+    accelerometers = zip(ACCELEROMETER, truth.accelerometer.pulse, strict=True)
+    return (
+        *(Channel(name, Quantity.ANGLE_INCREMENT, "rad", scale) for name, scale in gyros),
+        *(Channel(name, Quantity.VELOCITY_INCREMENT, "m/s", scale) for name, scale in accelerometers),
+    )
+
+
+def declared_unit(truth: UnitTruth, averaging_time_s: float = 70.0, sample_rate_hz: float | None = None) -> Unit:
+    """The unit's data sheet: channels, noise coefficients and run-to-run stability as they truly are."""
+
+    def record(triad: TriadTruth) -> TriadRecord:
+        columns = zip(
+            triad.quantization,
+            triad.random_walk,
+            triad.bias_instability,
+            triad.rate_random_walk,
+            [abs(r) for r in triad.rate_ramp],
+            strict=True,
+        )
+        x, y, z = (NoiseCoefficients(*column, flicker_band_s=triad.flicker_band_s) for column in columns)
+        return TriadRecord((x, y, z), triad.bias_run_to_run_sd, triad.scale_factor_run_to_run_sd_ppm * units.PPM)
+
+    return Unit(
+        truth.serial,
+        truth.sample_rate_hz if sample_rate_hz is None else sample_rate_hz,
+        unit_channels(truth),
+        record(truth.gyro),
+        record(truth.accelerometer),
+        averaging_time_s,
+    )
