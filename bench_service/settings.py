@@ -35,6 +35,9 @@ class Settings(BaseModel):
     @classmethod
     def from_environ(cls, environ: Mapping[str, str]) -> "Settings":
         """Read settings from a mapping such as ``os.environ``. Raises `BadSettings`."""
+        unknown = sorted(key for key in environ if key.startswith("BENCH_") and key not in cls.variables())
+        if unknown:
+            raise BadSettings(f"{unknown[0]} is no setting; there are {', '.join(cls.variables())}")
         given = {name: environ[key] for name in cls.model_fields if (key := _variable(name)) in environ}
         try:
             return cls.model_validate(given)
@@ -43,11 +46,10 @@ class Settings(BaseModel):
             name = _variable(str(first["loc"][0]))
             raise BadSettings(f"{name} = {given.get(str(first['loc'][0]))!r}: {first['msg']}") from error
 
-    @property
-    def sqlite_file(self) -> Path | None:
-        """The database file, or None where the database is a server."""
-        prefix = "sqlite:///"
-        return Path(self.database_url.removeprefix(prefix)) if self.database_url.startswith(prefix) else None
+    @classmethod
+    def variables(cls) -> tuple[str, ...]:
+        """Every environment variable that is read."""
+        return tuple(_variable(name) for name in cls.model_fields)
 
 
 def _variable(field: str) -> str:

@@ -112,7 +112,7 @@ def _drop(server: str, name: str) -> None:
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The real recordings with their reference results; the test is skipped where they are absent."""
-    folder = Path(os.environ.get("BENCH_SHARED_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
+    folder = Path(os.environ.get("SHARED_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
     if not folder.is_dir():
         pytest.skip(f"no recordings in {folder}")
     return folder

@@ -10,6 +10,7 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, Field, ValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from bench_service.jobs.errors import (
     BenchBusy,
@@ -46,7 +47,7 @@ class FieldError(BaseModel):
 
     field: str = Field(description="Path of the field, for example parameters.dwell_s")
     message: str = Field(description="What is wrong, with the allowed range")
-    value: Any = Field(None, description="What was given; text where JSON has no such number")
+    value: Any = Field(default=None, description="What was given; text where JSON has no such number")
 
 
 class Problem(BaseModel):
@@ -59,6 +60,9 @@ class Problem(BaseModel):
     instance: str = ""
     errors: list[FieldError] = Field(default_factory=list[FieldError])
     lost: list[str] = Field(default_factory=list[str], description="Combinations that a plan cannot determine")
+
+
+_NO_BODY = FieldError(field="body", message="UTF-8 text of one JSON document is expected")
 
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
@@ -90,6 +94,21 @@ def install(app: FastAPI) -> None:
     for error in (DomainError, ServiceError, BenchError):
         app.add_exception_handler(error, _on_known)
     app.add_exception_handler(Exception, _on_unknown)
+    app.add_middleware(RefuseNul)
+
+
+class RefuseNul:
+    """No database can hold the character NUL in a text, so no address may contain it."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http" and ("\x00" in scope["path"] or b"%00" in scope["query_string"]):
+            refusal = respond(Request(scope), 400, "an address may not contain the character NUL", "BadRequest")
+            await refusal(scope, receive, send)
+            return
+        await self._app(scope, receive, send)
 
 
 def status_of(error: Exception) -> int:
@@ -107,6 +126,10 @@ def _on_known(request: Request, error: Exception) -> Response:
 
 def _on_request_validation(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    if first["type"] == "json_invalid" and first["loc"][0] == "body":
+        message = f"no JSON: {first['ctx']['error']} at character {first['loc'][-1]}"
+        return respond(request, 400, message, "BadRequest", [FieldError(field="body", message=message)])
     return _invalid(request, error.errors(), prefix="")
 
 
@@ -119,20 +142,31 @@ def _invalid(request: Request, errors: Sequence[Any], prefix: str) -> Response:
     fields = [
         FieldError(field=_path(e["loc"], prefix), message=str(e["msg"]), value=_jsonable(e.get("input")))
         for e in errors
+        if not _follows(e, errors)
     ]
     detail = "; ".join(f"{f.field}: {f.message}" for f in fields[:5])
     return respond(request, 422, detail, "Invalid", fields)
 
 
+def _follows(error: Any, errors: Sequence[Any]) -> bool:
+    """A list whose bad element was left out is told to be too short as well: that is no second fault."""
+    place = tuple(error["loc"])
+    return error["type"] == "too_short" and any(
+        len(other["loc"]) > len(place) and tuple(other["loc"][: len(place)]) == place for other in errors
+    )
+
+
 def _on_http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    response = respond(request, error.status_code, str(error.detail), HTTPStatus(error.status_code).phrase)
+    kind = HTTPStatus(error.status_code).phrase.replace(" ", "")
+    fields = [_NO_BODY] if error.status_code == 400 else []
+    response = respond(request, error.status_code, str(error.detail), kind, fields)
     response.headers.update(error.headers or {})
     return response
 
 
 def _on_unknown(request: Request, error: Exception) -> Response:
-    return respond(request, 500, "a defect of the service; its log has the details", type(error).__name__)
+    return respond(request, 500, "a defect of the service; its log has the details", "InternalError")
 
 
 def respond(
@@ -152,7 +186,8 @@ def respond(
 
 
 def _path(location: Sequence[str | int], prefix: str) -> str:
-    parts = [str(part) for part in location if part not in ("body", "query", "path", "header")]
+    inside = location[1:] if location and location[0] in ("body", "query", "path", "header") else location
+    parts = [str(part) for part in inside]
     return ".".join(([prefix] if prefix else []) + parts) or "body"
 
 

@@ -1,14 +1,14 @@
 """What a client may send: request bodies, every field bounded, unknown ones refused. Units are in the field names."""
 
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from procedures.core.recording import Channel
 from procedures.core.unit import TriadRecord
 
-Labels = dict[str, str]
 NAME = Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f]+$")
+Labels = dict[Annotated[str, NAME], Annotated[str, NAME]]
 
 
 class Request(BaseModel):
@@ -21,7 +21,7 @@ class PreviewRequest(Request):
     """What a plan would be worth."""
 
     unit: str = NAME
-    bench: str | None = Field(None, min_length=1, max_length=100)
+    bench: Annotated[str, NAME] | None = None
     parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
 
 

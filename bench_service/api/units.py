@@ -8,10 +8,10 @@ from bench_service.api.dependencies import After, Limit, Service
 from bench_service.api.errors import problems
 from bench_service.api.requests import UnitDeclaration
 from bench_service.api.schemas import CalibrationPage, CalibrationView, UnitView
-from procedures.core.unit import Unit
+from procedures.core.unit import SERIAL, Unit
 
 router = APIRouter(prefix="/api/v1/units", tags=["units"])
-Serial = Annotated[str, Path(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
+Serial = Annotated[str, Path(pattern=SERIAL)]
 
 
 @router.get("")

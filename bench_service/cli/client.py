@@ -59,6 +59,5 @@ def sentence(response: "httpx.Response") -> str:
         problem = response.json()
     except ValueError:
         return f"{response.status_code}: {response.text[:200]}"
-    lines = [problem.get("detail", response.text[:200])]
-    lines += [f"  {e['field']} = {e['value']!r}: {e['message']}" for e in problem.get("errors", [])]
-    return "\n".join(lines)
+    fields = [f"{e['field']} = {e['value']!r}: {e['message']}" for e in problem.get("errors", [])]
+    return "; ".join(fields) or problem.get("detail", response.text[:200])

@@ -1,5 +1,6 @@
 """The HTTP server, in this thread or beside it."""
 
+import errno
 import socket
 import threading
 from collections.abc import Generator
@@ -43,9 +44,10 @@ def check_port(settings: Settings) -> None:
         try:
             probe.bind((settings.host, settings.port))
         except OSError as error:
+            why = "is taken" if error.errno == errno.EADDRINUSE else f"cannot be had: {error.strerror}"
             raise Refused(
-                f"port {settings.port} of {settings.host} is taken ({error.strerror}); "
-                "choose another with PORT=… or BENCH_PORT=…"
+                f"port {settings.port} of {settings.host} {why}; "
+                "choose others with PORT=…, BENCH_PORT=… and BENCH_HOST=…"
             ) from error
 
 

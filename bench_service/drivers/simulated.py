@@ -1,12 +1,13 @@
 """The simulated bench as a driver: the only file that imports the simulators."""
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from bench_service.jobs.driver import TrueTriad
-from bench_service.jobs.errors import NotMounted
+from bench_service.jobs.errors import Misconfigured, NotMounted
 from bench_service.wall_clock import pause_async
 from procedures.bench import Bench, BenchDescription
 from procedures.core.unit import Unit
@@ -27,6 +28,17 @@ RANDOM_UNIT = re.compile(r"^RANDOM-(\d{1,9})$")
 """Serial of a unit whose truth is drawn from the number in it: as many different units as a night needs."""
 
 
+T = TypeVar("T")
+
+
+def _loaded(path: Path, load: Callable[[Path], T]) -> T:
+    """A truth file. Raises `Misconfigured` naming it."""
+    try:
+        return load(path)
+    except (OSError, ValueError, TypeError) as error:
+        raise Misconfigured(f"{path}: {error}") from error
+
+
 class SimulatedDriver:
     """A bench whose table, unit and supply live in this process; its data are marked as simulated."""
 
@@ -37,8 +49,9 @@ class SimulatedDriver:
         bench_truth: Path | None = None,
         real_time_factor: float | None = None,
     ) -> None:
-        self._bench = default_bench() if bench_truth is None else load_bench(bench_truth)
-        self._unit = default_unit() if unit_truth is None else load_unit(unit_truth)
+        """Raises `Misconfigured` for a truth file that cannot be used, `NotMounted` for one of another bench."""
+        self._bench = default_bench() if bench_truth is None else _loaded(bench_truth, load_bench)
+        self._unit = default_unit() if unit_truth is None else _loaded(unit_truth, load_unit)
         self._real_time_factor = real_time_factor
         if bench_id != self._bench.description.id:
             raise NotMounted(f"the truth file is of bench {self._bench.description.id!r}, not {bench_id!r}")

@@ -8,6 +8,7 @@ from typing import Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from procedures.core.recording import Channel, Quantity
+from procedures.core.unit import SERIAL
 
 Column = str | int
 """By name, or by index from 0."""
@@ -47,7 +48,7 @@ class ImportedChannel(_Strict):
 class ImportDescription(_Strict):
     """All that must be known to read files as one recording of a unit."""
 
-    unit: str = Field(min_length=1, max_length=64, description="serial of the unit")
+    unit: str = Field(pattern=SERIAL, description="serial of the unit")
     channels: tuple[ImportedChannel, ...] = Field(min_length=1, max_length=64)
     rate_hz: float | None = Field(None, gt=0, description="where there is no time column, or to be checked against it")
     time_column: Column | None = Field(None, description="name, or index from 0, the same in every file")

@@ -8,12 +8,14 @@ new build goes on with the jobs of the old one.
 
 import json
 import logging
+from collections.abc import Callable
 from threading import Event
 from typing import Any
 
 from dbos import DBOS, DBOSConfig, Serializer, SetEnqueueOptions, SetWorkflowID
 from pydantic import TypeAdapter
 
+from bench_service.jobs.errors import ServiceError
 from bench_service.jobs.job import Failure, Job, JobState
 from bench_service.jobs.runner import JobRunner, StepOutcome
 from bench_service.jobs.session import ShuttingDown
@@ -24,6 +26,8 @@ PROCEDURE_ABI = "1"
 """Raise it when stored workflows can no longer be continued by this code."""
 SHUT_DOWN_S = 20.0
 """How long the running job may take to leave the bench safe when the service ends [s]."""
+RETRY_S = 0.5
+"""How often a bad end that could not be written is tried again [s]."""
 MAX_RECOVERIES = 50
 """How often a job may take the service down before it is given up."""
 
@@ -65,6 +69,8 @@ class Engine:
         self._poll_s = poll_s
         self._runner = runner
         self._jobs = jobs
+        self._last = StepOutcome()
+        self._ending = Event()
         self._idle = Event()
         self._idle.set()
         config: DBOSConfig = {
@@ -111,37 +117,55 @@ class Engine:
 
     def shut_down(self) -> None:
         """Stop working, once the running job has left the bench safe; it goes on after the next start."""
+        self._ending.set()
         self._idle.wait(SHUT_DOWN_S)
         DBOS.destroy(destroy_registry=True)
 
     def _run_job(self, job_id: str) -> None:
         runner = self._runner
         try:
+            self._last = StepOutcome()
             count: int = _step("prepare", lambda: runner.prepare(job_id))
             outcome = self._stations(job_id, count)
             if count > 0:
-                safe = OUTCOME.validate_python(_step("safe", lambda: OUTCOME.dump_python(runner.make_safe(job_id))))
+                safe = self._checked("safe", lambda: runner.make_safe(job_id))
                 outcome = outcome if not outcome.good else safe
             if outcome.good:
-                outcome = OUTCOME.validate_python(
-                    _step("conclude", lambda: OUTCOME.dump_python(runner.conclude(job_id)))
-                )
+                outcome = self._checked("conclude", lambda: runner.conclude(job_id))
         except ShuttingDown:
             runner.make_safe(job_id)
             raise
-        except Exception as error:  # a defect of ours: the job must still end, and the bench safe
+        except Exception as error:  # a defect, or books that cannot be kept: the job must still end, and the bench safe
             log.exception("job %s failed inside the service", job_id)
             runner.make_safe(job_id)
-            outcome = StepOutcome(Failure("InternalError", f"{type(error).__name__}: {error}"))
+            unexpected = StepOutcome(Failure("InternalError", f"{type(error).__name__}: {error}"))
+            outcome = unexpected if self._last.good else self._last
         if not outcome.good:
-            _step("end", lambda: runner.end_badly(job_id, outcome))
+            self._end(job_id, outcome)
+
+    def _end(self, job_id: str, outcome: StepOutcome) -> None:
+        """Note a bad end, as soon as it can be: while the disk is full the job waits, and the bench is safe already."""
+        while True:
+            try:
+                return self._runner.end_badly(job_id, outcome)
+            except ServiceError as error:
+                log.warning("the end of job %s cannot be noted yet: %s", job_id, error)
+            if self._ending.wait(RETRY_S):
+                raise ShuttingDown
+
+    def _checked(self, name: str, work: Callable[[], StepOutcome]) -> StepOutcome:
+        """A step with an outcome; the last one is remembered, should the engine's own books fail after it."""
+
+        def run() -> Any:
+            self._last = work()
+            return OUTCOME.dump_python(self._last)
+
+        return OUTCOME.validate_python(_step(name, run))
 
     def _stations(self, job_id: str, count: int) -> StepOutcome:
         runner = self._runner
         for index in range(count):
-            outcome = OUTCOME.validate_python(
-                _step(f"station {index}", lambda k=index: OUTCOME.dump_python(runner.acquire(job_id, k)))
-            )
+            outcome = self._checked(f"station {index}", lambda k=index: runner.acquire(job_id, k))
             if not outcome.good:
                 return outcome
         return StepOutcome(cancelled=count < 0)

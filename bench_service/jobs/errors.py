@@ -5,6 +5,7 @@ ServiceError
 ├── IllegalTransition    the job's state does not allow it
 ├── IdempotencyConflict  the key was used before with another request
 ├── BenchBusy            another process drives this bench
+├── Misconfigured        a file that the settings name cannot be used
 ├── NotDriving           this process drives no bench
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
@@ -19,8 +20,8 @@ class ServiceError(Exception):
 class NotFound(ServiceError):
     """There is no such thing."""
 
-    def __init__(self, kind: str, name: str) -> None:
-        super().__init__(f"there is no {kind} {name!r}")
+    def __init__(self, kind: str, name: str, why: str = "") -> None:
+        super().__init__(f"there is no {kind} {name!r}{': ' if why else ''}{why}")
         self.kind = kind
         self.name = name
 
@@ -35,6 +36,10 @@ class IdempotencyConflict(ServiceError):
 
 class BenchBusy(ServiceError):
     """Another process drives this bench."""
+
+
+class Misconfigured(ServiceError):
+    """A file that the settings name cannot be used."""
 
 
 class NotDriving(ServiceError):

@@ -73,7 +73,7 @@ class JobRunner:
         if index in {r.info.station.index for r in recordings.of_job(job_id) if r.info.station}:
             jobs.station_done(job_id, index, now(), {})
             return StepOutcome()
-        if jobs.cancel_requested(job_id):
+        if jobs.cancel_requested(job_id) or jobs.get(job_id).state in FINAL:
             return StepOutcome(cancelled=True)
         if not self._lease_held():
             return StepOutcome(Failure("LeaseLost", "another process may drive this bench now", index))

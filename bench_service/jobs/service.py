@@ -141,14 +141,14 @@ class BenchService:
         """The result that gave the job its verdict. Raises `NotFound` where there is none (yet)."""
         job = self.stores.jobs.get(job_id)
         if job.result_id is None:
-            raise NotFound(f"result yet: job is {job.state.value}; job", job_id)
+            raise NotFound("result of job", job_id, f"it is {job.state.value}")
         return self.stores.results.get(job.result_id)
 
     def truth(self, job_id: str) -> tuple[TrueTriad, ...]:
         """What a simulated unit really was in a job. Raises `NotFound` on a real bench."""
         job = self.stores.jobs.get(job_id)
         if not job.simulated or job.seed is None:
-            raise NotFound("truth: nobody knows it on a real bench; job", job_id)
+            raise NotFound("truth of job", job_id, "nobody knows it on a real bench")
         return self.driver.truth(job.unit, job.seed)
 
     def analyse_again(self, job_id: str, parameters: dict[str, Any], key: str | None = None) -> StoredResult:

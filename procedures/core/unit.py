@@ -7,6 +7,10 @@ from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import Channel
 
 
+SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
+"""Form of a serial: what can stand in an address and in a file name."""
+
+
 @dataclass(frozen=True)
 class TriadRecord:
     """One triad: noise of its channels x, y, z, and how much it changes from one power-up to the next."""

@@ -57,8 +57,9 @@ def test_a_limit_that_the_plan_cannot_resolve_is_warned_of_with_its_figure(sqlit
 def test_a_longer_dwell_promises_smaller_uncertainties_and_costs_what_it_says(sqlite_client: Client) -> None:
     short, default, long = (sqlite_client.preview(**p) for p in ({"dwell_s": 20.0}, {}, {"dwell_s": 700.0}))
     of = [uncertainties(answer) for answer in (short, default, long)]
-    for name in of[0]:
+    for name in (n for n in of[0] if n.startswith("gyro")):  # accelerometers are at the floor of their flicker noise
         assert of[0][name] > of[1][name] > of[2][name]
+    assert of[0]["gyro.K11"] / of[2]["gyro.K11"] > 3
     seconds = [answer.json()["duration_s"] for answer in (short, default, long)]
     assert seconds[1] - seconds[0] == pytest.approx(12 * 50.0)
     assert seconds[2] - seconds[1] == pytest.approx(12 * 630.0)
@@ -86,9 +87,9 @@ def test_a_verification_can_be_previewed_once_there_is_a_calibration(sqlite_clie
 
 
 def test_launches_are_compared_and_what_the_calibrations_cannot_resolve_is_said(sqlite_client: Client) -> None:
-    for seed in (41, 42, 43, 44):
+    for seed in (41, 42, 43):
         assert sqlite_client.wait(sqlite_client.submit(parameters={}, seed=seed)["id"])["state"] == "succeeded"
-    items = sqlite_client.http.get("/api/v1/units/SIM-0001/calibrations", params={"limit": 4}).json()["items"]
+    items = sqlite_client.http.get("/api/v1/units/SIM-0001/calibrations", params={"limit": 3}).json()["items"]
     ids = [c["id"] for c in items]
     answer = sqlite_client.analyse("run_to_run", calibrations=ids)
     assert answer.status_code == 201, answer.text
@@ -99,7 +100,7 @@ def test_launches_are_compared_and_what_the_calibrations_cannot_resolve_is_said(
     assert set(scatters) == {(triad, kind) for triad in ("gyro", "accelerometer") for kind in kinds}
     for s in scatters.values():
         assert 0 < s["low"] < s["sd"] < s["high"]
-        assert len(s["values"]) == len(s["value_sds"]) == 4
+        assert len(s["values"]) == len(s["value_sds"]) == 3
     unresolved = [w for w in result["document"]["warnings"] if w.startswith("gyro scale factor")]
     assert len(unresolved) == 3
     assert all("cannot be resolved" in w for w in unresolved)
@@ -109,7 +110,6 @@ def test_launches_are_compared_and_what_the_calibrations_cannot_resolve_is_said(
     assert sqlite_client.http.get(result["page"]).text.count("<svg") == 12
 
 
-@pytest.mark.xfail(strict=True, reason="a result of calibrations alone is marked as not simulated")
 def test_a_comparison_of_simulated_calibrations_is_itself_simulated(sqlite_client: Client) -> None:
     for seed in (51, 52):
         sqlite_client.wait(sqlite_client.submit(seed=seed)["id"])

@@ -36,8 +36,7 @@ XSENS = {
     "time_column": 0,
     "header": False,
     "delimiter": "whitespace",
-    "channels": counts(ACCELEROMETER, "specific_force", [1, 2, 3])
-    + counts(GYRO, "angular_rate", [1, 2, 3], file=1),
+    "channels": counts(ACCELEROMETER, "specific_force", [1, 2, 3]) + counts(GYRO, "angular_rate", [1, 2, 3], file=1),
 }
 MPU6050 = {
     "unit": "MPU6050-1",

@@ -1,0 +1,323 @@
+"""The command line as an operating system process: what it prints, its exit codes, and how it ends."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Generator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from bench_service.wall_clock import monotonic_s, pause
+
+pytestmark = pytest.mark.timeout(240)
+
+FAST = ("--set", "dwell_s=5.0", "--set", "settle_s=0.5")
+ROOT = Path(__file__).parents[2]
+
+
+class Done:
+    """A command that has ended."""
+
+    def __init__(self, code: int, out: str, err: str) -> None:
+        self.code, self.out, self.err = code, out, err
+        assert "Traceback" not in out + err, err
+
+    def json(self) -> Any:
+        return json.loads(self.out)
+
+
+Command = Callable[..., Done]
+
+
+def environment(folder: Path, **settings: str) -> dict[str, str]:
+    """An environment with settings of ours alone."""
+    outer = {k: v for k, v in os.environ.items() if not k.startswith("BENCH_")}
+    given = {"BENCH_DATABASE_URL": f"sqlite:///{folder / 'bench.sqlite'}", **settings}
+    return {**outer, "COLUMNS": "200", "PYTHONPATH": str(ROOT), **given}
+
+
+def command_in(folder: Path) -> Command:
+    def run(*arguments: object, **settings: str) -> Done:
+        done = subprocess.run(
+            [sys.executable, "-m", "bench_service", *map(str, arguments)],
+            env=environment(folder, **settings),
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        return Done(done.returncode, done.stdout, done.stderr)
+
+    return run
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Command:
+    """``bench`` with a database of this test's own."""
+    return command_in(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the tests of one story meet."""
+    return tmp_path_factory.mktemp("story")
+
+
+@pytest.fixture(scope="module")
+def calibrated(folder: Path) -> Any:
+    """What ``bench run`` printed of a short calibration."""
+    done = command_in(folder)("run", "calibration_12_orientations", "--unit", "SIM-0001", "--seed", 3, *FAST, "--json")
+    assert done.code == {"pass": 0, "fail": 1}[done.json()["job"]["verdict"]], done.err
+    return done.json()
+
+
+def one_line(done: Done, *words: str) -> None:
+    """A refusal: exit code 2, nothing said to standard output, one line to standard error."""
+    assert (done.code, done.out) == (2, ""), done.err
+    assert len(done.err.strip().splitlines()) == 1, done.err
+    assert done.err.startswith("bench: ")
+    assert all(word in done.err for word in words), done.err
+
+
+def test_the_demonstration_prints_coefficients_verdicts_and_addresses(bench: Command, free_port: int) -> None:
+    done = bench("demo", "--once", BENCH_PORT=str(free_port))
+    assert done.code == 0, done.err
+    assert done.out.count("gyro K") == done.out.count("accelerometer K") == 9
+    assert "truth" in done.out
+    assert "of its own standard uncertainty" in done.out
+    for procedure in ("calibration_12_orientations", "verification_9_orientations"):
+        assert f"{procedure}: verdict pass, page http://127.0.0.1:{free_port}/jobs/" in done.out
+    assert "Idle" not in done.err
+    with socket.socket() as probe:
+        assert probe.connect_ex(("127.0.0.1", free_port)) != 0
+
+
+def test_a_run_gives_job_and_result_with_what_was_set(calibrated: Any) -> None:
+    job, result = calibrated["job"], calibrated["result"]
+    assert (job["state"], job["seed"]) == ("succeeded", 3)
+    assert job["requested_parameters"] == {"dwell_s": 5.0, "settle_s": 0.5}
+    assert result["lineage"]["job"] == job["id"]
+    assert len(result["lineage"]["recordings"]) == 12
+
+
+def test_the_exit_code_is_the_verdict(bench: Command) -> None:
+    good = bench("run", "no_operation", "--unit", "SIM-0001")
+    assert (good.code, "verdict pass" in good.out) == (0, True)
+    limits = 'limits={"gyro_bias_in_run_deg_h": 1e-9}'
+    bad = bench("run", "calibration_12_orientations", "--unit", "SIM-0001", "--seed", 3, *FAST, "--set", limits)
+    assert (bad.code, "verdict fail" in bad.out) == (1, True)
+
+
+def test_jobs_are_listed_newest_first(folder: Path, calibrated: Any) -> None:
+    bench = command_in(folder)
+    table = bench("jobs")
+    assert table.code == 0
+    assert calibrated["job"]["id"] in table.out
+    assert "calibration_12_orientations" in table.out
+    listed = bench("jobs", "--json", "--state", "succeeded", "--unit", "SIM-0001", "--limit", 1).json()
+    assert [job["id"] for job in listed["items"]] == [calibrated["job"]["id"]]
+
+
+def test_samples_go_out_as_csv_parquet_and_arrow(folder: Path, calibrated: Any) -> None:
+    bench = command_in(folder)
+    recording = calibrated["result"]["lineage"]["recordings"][0]["id"]
+    files = {form: folder / f"out.{form}" for form in ("csv", "parquet", "arrow")}
+    for file in files.values():
+        done = bench("export", recording, "-o", file, "--channels", "gyro_y", "--start-s", 1, "--stop-s", 2)
+        assert done.code == 0, done.err
+        assert f"{file.stat().st_size} bytes" in done.out
+        assert not file.with_name(file.name + ".part").exists()
+    lines = [line for line in files["csv"].read_text().splitlines() if not line.startswith("#")]
+    assert lines[0] == "time_s,gyro_y"
+    text = np.array([float(line.split(",")[1]) for line in lines[1:]])
+    parquet = pq.read_table(files["parquet"]).column("gyro_y").to_numpy()
+    arrow = pa.ipc.open_stream(files["arrow"].read_bytes()).read_all().column("gyro_y").to_numpy()
+    assert len(text) == 400
+    np.testing.assert_array_equal(text, parquet)
+    np.testing.assert_array_equal(text, arrow)
+
+
+def test_what_cannot_be_exported_leaves_no_file(folder: Path, calibrated: Any) -> None:
+    bench = command_in(folder)
+    recording = calibrated["result"]["lineage"]["recordings"][0]["id"]
+    refused = bench("export", recording, "-o", folder / "out.xls")
+    assert refused.code == 2
+    assert "'arrow', 'parquet' or 'csv'" in refused.err
+    one_line(bench("export", "none", "-o", folder / "none.csv"), "there is no recording 'none'")
+    assert not list(folder.glob("out.xls*")) + list(folder.glob("none.csv*"))
+
+
+def still_poses(path: Path) -> None:
+    """Accelerometers turned by hand: 25 s of rest, then 14 poses of 4 s at 50 Hz, in m/s²."""
+    rng = np.random.Generator(np.random.PCG64(5))
+    directions = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
+    directions += [[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)]
+    scale, bias = np.array([1.01, 0.99, 1.02]), np.array([0.05, -0.03, 0.02])
+    parts = []
+    for number, direction in enumerate(directions):
+        force = 9.81 * np.array(direction) / np.linalg.norm(direction)
+        rest = scale * force + bias + rng.normal(0.0, 0.002, (1250 if number == 0 else 200, 3))
+        parts += [rest, rest[-1] + rng.normal(0.0, 3.0, (50, 3))]
+    lines = ["x,y,z", *(",".join(f"{v:.6f}" for v in row) for row in np.concatenate(parts))]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def test_a_file_is_imported_and_analysed(bench: Command, tmp_path: Path) -> None:
+    still_poses(tmp_path / "poses.csv")
+    channels = [
+        {"name": f"accelerometer_{axis}", "column": axis, "quantity": "specific_force", "unit": "m/s^2"}
+        for axis in "xyz"
+    ]
+    description = tmp_path / "poses.json"
+    description.write_text(json.dumps({"unit": "HAND-1", "rate_hz": 50.0, "channels": channels}))
+    imported = bench("import", tmp_path / "poses.csv", "--description", description)
+    assert imported.code == 0, imported.err
+    recording = imported.json()["id"]
+    arguments = ("analyse", "scalar_calibration", "--recording", recording)
+    one_line(bench(*arguments[:2], "--recording", "none", "--set", "gravity_m_s2=9.81"), "no recording 'none'")
+    done = bench(*arguments, "--set", "gravity_m_s2=9.81", "--json")
+    found = {p["name"]: p["estimate"] for p in done.json()["document"]["parameters"]}
+    assert done.code == {"pass": 0, "fail": 1}[done.json()["verdict"]]
+    assert [found[f"b_{axis}"] for axis in "xyz"] == pytest.approx([0.05, -0.03, 0.02], abs=0.002)
+    assert [found[f"s_{axis}"] for axis in "xyz"] == pytest.approx([1 / 1.01, 1 / 0.99, 1 / 1.02], rel=2e-4)
+    refused = bench(*arguments)
+    assert refused.code == 2
+    assert "gravity_m_s2 is needed" in refused.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("run", "nothing", "--unit", "SIM-0001"), ("there is no procedure 'nothing'",)),
+        (("run", "no_operation", "--unit", "SIM-9"), ("has no unit 'SIM-9'",)),
+        (("run", "no_operation", "--unit", "SIM-0001", "--set", "dwell_s"), ("--set dwell_s", "name=value")),
+        (("jobs", "--server", "http://127.0.0.1:9"), ("http://127.0.0.1:9", "does not answer")),
+    ],
+)
+def test_what_cannot_be_done_is_one_line_and_exit_code_2(
+    bench: Command, arguments: tuple[str, ...], words: tuple[str, ...]
+) -> None:
+    one_line(bench(*arguments), *words)
+
+
+@pytest.mark.parametrize("arguments", [("run", "no_operation"), ("dance",), ("jobs", "--limit", "many")])
+def test_a_wrong_use_shows_the_usage_and_exits_with_2(bench: Command, arguments: tuple[str, ...]) -> None:
+    done = bench(*arguments)
+    assert (done.code, done.out) == (2, "")
+    assert "Usage:" in done.err
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("BENCH_PORT", "http"),
+        ("BENCH_REAL_TIME_FACTOR", "-1"),
+        ("BENCH_ID", "no spaces"),
+    ],
+)
+def test_a_bad_setting_is_one_line_that_names_it(bench: Command, name: str, value: str) -> None:
+    one_line(bench("jobs", **{name: value}), name, repr(value))
+
+
+@pytest.mark.parametrize("url", ["nonsense", "sqlite:////proc/none/bench.sqlite", "sqlite:///:memory:"])
+def test_a_database_that_cannot_be_opened_is_one_line(bench: Command, url: str) -> None:
+    one_line(bench("jobs", BENCH_DATABASE_URL=url))
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [("BENCH_UNIT_TRUTH", None), ("BENCH_TRUTH", "id = "), ("BENCH_UNIT_TRUTH", "serial = 3")],
+)
+def test_a_truth_file_that_cannot_be_used_is_one_line(
+    bench: Command, tmp_path: Path, name: str, content: str | None
+) -> None:
+    file = tmp_path / "truth.toml"
+    if content is not None:
+        file.write_text(content)
+    one_line(bench("jobs", **{name: str(file)}), str(file))
+
+
+class Served:
+    """``bench serve`` and a client to it."""
+
+    def __init__(self, folder: Path, port: int) -> None:
+        self.log = folder / "service.log"
+        self.client = httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=10)
+        self._environment = environment(folder, BENCH_PORT=str(port), BENCH_REAL_TIME_FACTOR="400")
+        self.start()
+
+    def start(self) -> None:
+        arguments = [sys.executable, "-m", "bench_service", "serve"]
+        with self.log.open("ab") as log:
+            self.process = subprocess.Popen(arguments, env=self._environment, stdout=log, stderr=log)
+        deadline = monotonic_s() + 60
+        while True:
+            assert self.process.poll() is None, self.log.read_text()
+            assert monotonic_s() < deadline, self.log.read_text()
+            try:
+                if self.client.get("/healthz").is_success:
+                    return
+            except httpx.TransportError:
+                pause(0.05)
+
+    def end(self) -> float:
+        """Ask it to end; how long that took [s]."""
+        begun = monotonic_s()
+        self.process.send_signal(signal.SIGTERM)
+        assert self.process.wait(30) in (0, -signal.SIGTERM), self.log.read_text()
+        return monotonic_s() - begun
+
+    def until(self, job_id: str, stations: int) -> dict[str, Any]:
+        deadline = monotonic_s() + 60
+        while True:
+            job: dict[str, Any] = self.client.get(f"/api/v1/jobs/{job_id}").json()
+            if job["progress"]["station"] >= stations or job["state"] in ("failed", "cancelled", "succeeded"):
+                return job
+            assert monotonic_s() < deadline, job
+            pause(0.01)
+
+
+@pytest.fixture
+def served(tmp_path: Path, free_port: int) -> Generator[Served]:
+    made = Served(tmp_path, free_port)
+    yield made
+    if made.process.poll() is None:
+        made.end()
+    made.client.close()
+
+
+def test_a_second_process_is_kept_off_the_bench_and_the_port_but_may_read(
+    served: Served, bench: Command, free_port: int
+) -> None:
+    one_line(bench("serve", BENCH_PORT=str(free_port)), f"port {free_port}", "is taken", "BENCH_PORT")
+    one_line(bench("run", "no_operation", "--unit", "SIM-0001"), "bench 'sim'")
+    one_line(bench("serve", "--port", "0"), "bench 'sim'")
+    assert bench("jobs", "--json").json() == {"items": [], "next": None}
+    server = f"http://127.0.0.1:{free_port}"
+    assert bench("run", "no_operation", "--unit", "SIM-0001", "--server", server).code == 0
+    assert len(bench("jobs", "--json", "--server", server).json()["items"]) == 1
+
+
+def test_a_service_that_is_asked_to_end_does_so_soon_and_its_job_goes_on_after_the_next_start(served: Served) -> None:
+    body = {"procedure": "calibration_12_orientations", "unit": "SIM-0001", "seed": 7}
+    job = served.client.post("/api/v1/jobs", json=body).json()["id"]
+    served.until(job, 3)
+    assert served.end() < 8.0
+    assert "Traceback" not in served.log.read_text()
+    served.start()
+    ended = served.until(job, 13)
+    assert (ended["state"], ended["verdict"]) == ("succeeded", "pass"), ended
+    items = served.client.get("/api/v1/recordings", params={"job": job}).json()["items"]
+    assert sorted(r["station"]["index"] for r in items if r["state"] == "complete") == list(range(12))
+    assert served.end() < 8.0
+    assert "Traceback" not in served.log.read_text()

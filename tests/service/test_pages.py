@@ -1,0 +1,104 @@
+"""The pages: they answer, are whole, and show progress, verdicts, plots and lineage."""
+
+from typing import Any
+
+import pytest
+
+from bench_service.wall_clock import pause
+from tests.service.client import Client
+from tests.service.page import page
+
+EVIL = "<script>alert(1)</script>"
+
+
+@pytest.fixture(scope="module")
+def calibrated(sqlite_client: Client) -> dict[str, Any]:
+    """A calibration of full length, so that it passes."""
+    return sqlite_client.wait(sqlite_client.submit(parameters={}, seed=7)["id"])
+
+
+def test_the_first_page_says_what_the_bench_has_and_does(sqlite_client: Client, calibrated: dict[str, Any]) -> None:
+    home = page(sqlite_client, "/")
+    assert "Idle." in home.words
+    assert "This bench is a simulation." in home.words
+    assert "SIM-0001" in home.words
+    assert ("href", f"/jobs/{calibrated['id']}") in home.attributes
+
+
+def test_the_page_of_a_good_job_has_verdict_coefficients_plots_and_lineage(
+    sqlite_client: Client, calibrated: dict[str, Any]
+) -> None:
+    job = page(sqlite_client, calibrated["page"])
+    assert ("class", "badge succeeded") in job.attributes
+    assert ("class", "badge pass") in job.attributes
+    assert job.tags.count("svg") >= 4
+    assert "Lineage" in job.words
+    assert calibrated["code_version"] in job.words
+    for recording in sqlite_client.recordings(calibrated["id"]):
+        assert recording["id"] in job.words
+    assert "limit of 10 ppm cannot be resolved" in job.words
+    assert "EventSource" not in job.words
+
+
+def test_a_running_job_shows_progress_and_a_way_to_end_it(sqlite_client: Client) -> None:
+    running = sqlite_client.submit(parameters={"dwell_s": 86_400.0})
+    sqlite_client.wait(running["id"], "running")
+    while sqlite_client.http.get("/api/v1/benches/sim").json()["state"] == "idle":
+        pause(0.01)
+    job, home = page(sqlite_client, running["page"]), page(sqlite_client, "/")
+    sqlite_client.http.post(f"/api/v1/jobs/{running['id']}/cancel")
+    sqlite_client.wait(running["id"])
+    assert {"progress", "button"} <= set(job.tags)
+    assert "0 of 12 stations" in " ".join(job.words.split())
+    assert "svg" not in job.tags
+    assert "Busy with" in home.words
+    assert "Stop the bench" in home.words
+    ended = page(sqlite_client, running["page"])
+    assert ("class", "badge cancelled") in ended.attributes
+    assert "button" not in ended.tags
+
+
+def test_a_unit_that_fails_its_limits_is_shown_as_such(sqlite_client: Client) -> None:
+    job = sqlite_client.wait(sqlite_client.submit(seed=8)["id"])
+    assert job["verdict"] == "fail"
+    shown = page(sqlite_client, job["page"])
+    assert ("class", "badge fail") in shown.attributes
+    result = page(sqlite_client, f"/results/{job['result']}")
+    assert ("class", "badge fail") in result.attributes
+    assert "svg" in result.tags
+
+
+def test_the_page_of_a_result_is_that_of_its_job_without_the_job(
+    sqlite_client: Client, calibrated: dict[str, Any]
+) -> None:
+    result = page(sqlite_client, f"/results/{calibrated['result']}")
+    assert ("class", "badge pass") in result.attributes
+    assert ("href", calibrated["page"]) in result.attributes
+    assert result.tags.count("svg") == page(sqlite_client, calibrated["page"]).tags.count("svg")
+
+
+def test_the_page_of_a_unit_has_its_calibrations_with_uncertainties(
+    sqlite_client: Client, calibrated: dict[str, Any]
+) -> None:
+    unit = page(sqlite_client, "/units/SIM-0001")
+    current = sqlite_client.http.get("/api/v1/units/SIM-0001").json()["calibration"]
+    assert current in unit.words
+    assert "±" in unit.words
+    assert ("href", f"/results/{calibrated['result']}") in unit.attributes
+
+
+def test_the_page_of_an_imported_result_has_no_job(sqlite_client: Client) -> None:
+    current = sqlite_client.http.get("/api/v1/units/SIM-0001/calibrations").json()["items"]
+    if len(current) < 2:
+        sqlite_client.wait(sqlite_client.submit(seed=9)["id"])
+        current = sqlite_client.http.get("/api/v1/units/SIM-0001/calibrations").json()["items"]
+    made = sqlite_client.analyse("run_to_run", calibrations=[c["id"] for c in current[:2]]).json()
+    shown = page(sqlite_client, made["page"])
+    assert "Job" not in shown.words.split("Checks")[0]
+
+
+def test_an_address_that_is_markup_comes_back_as_data(sqlite_client: Client) -> None:
+    for path in (f"/jobs/{EVIL.replace('/', '%2F')}", "/units/%3Cb%3Ex", "/results/%3Csvg%20onload=alert(1)%3E"):
+        answer = sqlite_client.http.get(path)
+        assert answer.status_code == 404
+        assert answer.headers["content-type"] == "application/problem+json"
