@@ -61,6 +61,8 @@ class Prediction:
     duration_s: float = 0.0
     uncertainties: tuple[PredictedUncertainty, ...] = ()
     warnings: tuple[str, ...] = ()
+    basis: str = ""
+    """What the prediction rests on, in words: which calibration, or nominal scale factors where there is none."""
 
 
 @dataclass(frozen=True)

@@ -46,6 +46,7 @@ def preview(name: str, request: PreviewRequest, service: Service) -> Preview:
         duration_s=plan.prediction.duration_s,
         data_bytes=plan.data_bytes,
         predicted_uncertainties=list(plan.prediction.uncertainties),
+        basis=plan.prediction.basis,
         warnings=list(plan.prediction.warnings),
         violations=list(plan.violations),
     )

@@ -39,6 +39,7 @@ class Preview(BaseModel):
     duration_s: float
     data_bytes: int
     predicted_uncertainties: list[PredictedUncertainty]
+    basis: str = Field(description="What the prediction rests on: a calibration, or nominal scale factors")
     warnings: list[str]
     violations: list[str]
 

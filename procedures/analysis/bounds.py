@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.linalg import block_diag
 
-from procedures.analysis.multiposition import estimator
+from procedures.analysis.estimator import estimator
 from procedures.analysis.table_errors import TableErrors
 from procedures.analysis.whitening import whitener
 from procedures.core.arrays import Array

@@ -10,12 +10,13 @@ from procedures.analysis.calibration_summary import (
     scalar_check,
     triad_summary,
 )
-from procedures.analysis.multiposition import TriadFit, estimator, fit_triad
+from procedures.analysis.estimator import Weighting
+from procedures.analysis.multiposition import TriadFit, fit_triad
 from procedures.analysis.reference import INPUT_UNITS, reference_magnitude, reference_vectors
 from procedures.analysis.scalar import fit_scalar, nominal_start, start_from_data
 from procedures.analysis.station_means import StationMeans, station_means
 from procedures.analysis.station_noise import triad_covariance
-from procedures.analysis.table_errors import TableErrors, TableUncertainty, table_errors
+from procedures.analysis.table_errors import TableUncertainty, table_errors
 from procedures.analysis.verification import magnitudes
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
@@ -32,6 +33,7 @@ def analyse_triad(
     uncertainty: TableUncertainty,
     record: TriadRecord | None,
     with_scalar: bool = False,
+    weighting: Weighting = "noise_and_table",
 ) -> TriadSummary:
     """Calibrate one triad from one recording a station. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
     means = station_means(recordings, triad)
@@ -40,9 +42,9 @@ def analyse_triad(
     table = table_errors(angles, vectors, uncertainty, of_gravity=triad == "accelerometer")
     noise, known = noise_of_means(means, record)
     unit = INPUT_UNITS[triad]
-    fit = fit_triad(triad, means.output_unit, unit, vectors, means.outputs, noise, table, known)
+    fit = fit_triad(triad, means.output_unit, unit, vectors, means.outputs, noise, table, known, weighting)
     reference = reference_magnitude(triad, site)
-    scalar = _scalar(means, reference, noise, known, fit, table, vectors) if with_scalar else None
+    scalar = _scalar(means, reference, noise, known, fit) if with_scalar else None
     after = magnitudes(means.outputs, fit.calibration(), reference, means.labels, fit.magnitude_sd)
     return triad_summary(fit, after, means.labels, scalar)
 
@@ -68,11 +70,8 @@ def station_angles(means: StationMeans) -> list[TableAngles]:
     return [angles for angles in means.angles if angles is not None]
 
 
-def _scalar(
-    means: StationMeans, reference: float, noise: Array, known: bool, fit: TriadFit, table: TableErrors, vectors: Array
-) -> ScalarCheck:
+def _scalar(means: StationMeans, reference: float, noise: Array, known: bool, fit: TriadFit) -> ScalarCheck:
     in_counts = means.output_unit == "count"
     start = start_from_data(means.outputs, reference) if in_counts else nominal_start()
     scalar = fit_scalar(f"the scalar {fit.triad} parameters", means.outputs, noise, reference, start, known)
-    gain = estimator(fit.triad, vectors, noise).gain
-    return scalar_check(fit, scalar, noise, table, gain)
+    return scalar_check(fit, scalar)

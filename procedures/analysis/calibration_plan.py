@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from procedures.analysis.multiposition import Estimator, TableShare, estimator, table_share
+from procedures.analysis.estimator import Estimator, TableShare, Weighting, estimator, table_share
 from procedures.analysis.reference import reference_vectors
 from procedures.analysis.station_noise import triad_covariance
 from procedures.analysis.station_plan import dwell_for, windows
@@ -38,6 +38,9 @@ class TriadPlan:
     table: TableErrors
     matrix: Array
     """K as far as known: of the current calibration, else the identity (nominal outputs)."""
+    calibrated: bool = False
+    """Whether K is of a calibration."""
+    weighting: Weighting = "noise_and_table"
 
     def noise_covariance(self, dwell_s: float | None = None) -> Array | None:
         """Of the station means, (3, n, n), at the planned dwell or another; None where the noise is not known."""
@@ -46,11 +49,12 @@ class TriadPlan:
 
     def estimator(self, noise_covariance: Array) -> Estimator:
         """The generalised least squares of this plan. Raises `Undetermined`."""
-        return estimator(f"the {self.triad} coefficients", self.vectors, noise_covariance)
+        flaws = self.table.of_outputs(self.matrix) if self.weighting == "noise_and_table" else None
+        return estimator(f"the {self.triad} coefficients", self.vectors, noise_covariance, flaws)
 
     def share(self, plan: Estimator) -> TableShare:
         """What the table's flaws add."""
-        return table_share(plan, self.table, self.matrix)
+        return table_share(plan, self.table.of_outputs(self.matrix), self.table)
 
 
 @dataclass(frozen=True)
@@ -73,14 +77,41 @@ def triad_plan(
     axes: Sequence[tuple[float, float]],
     site: Site,
     uncertainty: TableUncertainty,
+    weighting: Weighting = "noise_and_table",
 ) -> TriadPlan:
     """A triad's plan at stations that all carry table angles."""
     angles = [s.angles for s in stations if s.angles is not None]
     vectors = reference_vectors(triad, angles, site)
     table = table_errors(angles, vectors, uncertainty, of_gravity=triad == "accelerometer")
     known = unit.calibration(triad)
-    matrix = np.eye(3) if known is None or known.output_unit == "count" else known.matrix_array
-    return TriadPlan(triad, unit, tuple(stations), tuple(axes), vectors, table, matrix)
+    calibrated = known is not None and known.output_unit != "count"
+    matrix = known.matrix_array if known is not None and calibrated else np.eye(3)
+    return TriadPlan(triad, unit, tuple(stations), tuple(axes), vectors, table, matrix, calibrated, weighting)
+
+
+def predicted_parts(plan: TriadPlan) -> tuple[Array, Array] | None:
+    """Standard uncertainties of the twelve coefficients from noise and from the table, each (12,).
+
+    None where the noise is not known. Raises `Undetermined`.
+    """
+    noise = plan.noise_covariance()
+    if noise is None:
+        estimator(f"the {plan.triad} coefficients", plan.vectors, np.array([np.eye(len(plan.stations))] * 3))
+        return None
+    gls = plan.estimator(noise)
+    return np.sqrt(np.diagonal(gls.noise_covariance)), np.sqrt(np.diagonal(plan.share(gls).covariance))
+
+
+def basis(plans: Sequence[TriadPlan]) -> str:
+    """What the predicted uncertainties of a unit rest on: its calibration, or its nominal scale factors."""
+    nominal = [plan.triad for plan in plans if not plan.calibrated]
+    if len(nominal) == len(plans):
+        return "nominal scale factors: the unit has no calibration yet; uncertainties scale with the true ones"
+    calibration = f"calibration {plans[0].unit.calibration_id or 'of the unit'}"
+    of_others = "".join(
+        f"; {triad}: nominal scale factors, uncertainties scale with the true ones" for triad in nominal
+    )
+    return calibration + of_others
 
 
 def run_to_run_requirements(

@@ -9,6 +9,7 @@ from procedures.analysis.verification import Magnitudes
 from procedures.core import units
 from procedures.core.report import Figure, Series, Table
 
+WEIGHTS = {"noise_and_table": "the noise and the table's declared accuracy", "noise": "the noise alone"}
 SYMBOL = {"gyro": "|ω|", "accelerometer": "|g|"}
 
 
@@ -21,7 +22,7 @@ def coefficient_table(summary: TriadSummary) -> Table:
         f"Coefficients of the {triad} triad",
         ("coefficient", "unit", "estimate", "± standard uncertainty", "of noise", "of table", *sources),
         rows,
-        f"U = b + K·v. Condition of the design {summary.condition:.3g}.",
+        f"U = b + K·v. Condition of the design {summary.condition:.3g}. Weighted by {WEIGHTS[summary.weighting]}.",
     )
 
 

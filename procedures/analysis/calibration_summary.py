@@ -5,11 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from procedures.analysis.estimator import Weighting
 from procedures.analysis.multiposition import TriadFit
 from procedures.analysis.scalar import PARAMETERS, ScalarFit, observable_derivative, scalar_parameters
-from procedures.analysis.table_errors import TableErrors
 from procedures.analysis.verification import Magnitudes
-from procedures.core.arrays import Array
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
 
 
@@ -73,6 +72,8 @@ class TriadSummary:
     noise_known: bool
     magnitudes: Magnitudes
     scalar: ScalarCheck | None = None
+    weighting: Weighting = "noise"
+    """Results of procedure versions before 1.1.0 do not say: theirs is this."""
 
 
 def coefficient_unit(name: str, output_unit: str, input_unit: str) -> str:
@@ -100,6 +101,7 @@ def triad_summary(
         fit.noise_known,
         magnitudes,
         scalar,
+        fit.weighting,
     )
 
 
@@ -122,23 +124,17 @@ def _coefficients(fit: TriadFit) -> tuple[Coefficient, ...]:
     )
 
 
-def scalar_check(
-    fit: TriadFit, scalar: ScalarFit, noise_covariance: Array, table: TableErrors, gain: Array
-) -> ScalarCheck:
+def scalar_check(fit: TriadFit, scalar: ScalarFit) -> ScalarCheck:
     """Scalar against linear, parameter by parameter.
 
-    Both are functions of the same outputs, so the difference has the covariance ``D·C·Dᵀ`` with
-    ``D = J·G_linear − G_scalar`` over all outputs, C noise and table together. `gain` is the linear estimator's, (3,
-    4, n).
+    Both are functions of the same outputs, so the difference has the covariance ``D·(C + F·Fᵀ)·Dᵀ`` with
+    ``D = J·G_linear − G_scalar`` over all outputs of all channels, C noise and F the table's flaws; G_linear is the
+    estimator that made the fit, whatever its weights.
     """
-    n = gain.shape[2]
-    linear_gain = np.zeros((3, 4, n, 3))
-    for channel in range(3):
-        linear_gain[channel, :, :, channel] = gain[channel]
-    difference = np.einsum("pa,anc->pnc", observable_derivative(fit.coefficients), linear_gain.reshape(12, n, 3))
-    difference = difference - scalar.gain
-    variance = np.einsum("pnc,cnm,pmc->p", difference, noise_covariance, difference)
-    flaws = np.einsum("pnc,ncq->pq", difference, table.of_outputs(fit.matrix))
+    linear_gain = np.einsum("pk,kcn->pnc", observable_derivative(fit.coefficients), fit.estimator.gain)
+    difference = linear_gain - scalar.gain
+    variance = np.einsum("pnc,cnm,pmc->p", difference, fit.station_noise, difference)
+    flaws = np.einsum("pnc,ncq->pq", difference, fit.of_table)
     sd = np.sqrt(variance + np.sum(flaws**2, axis=1))
     linear = scalar_parameters(fit.coefficients)
     own = scalar.standard_uncertainties

@@ -1,58 +1,22 @@
-"""Calibration of a triad from known vectors at many orientations: generalised least squares, channel by channel.
+"""Calibration of a triad from known vectors at many orientations: generalised least squares.
 
 ``[1 v_x v_y v_z]·[b K_i1 K_i2 K_i3]ᵀ = U_i`` (thesis 3.31, 3.35 and the solution of 3.3.6), weighted by the covariance
-of the station means. The uncertainty has two parts: the unit's noise, and the table that set the vectors.
+of the station means and, unless told otherwise, of the table's flaws. The uncertainty has these two parts: the unit's
+noise, and the table that set the vectors.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import null_space
+from scipy.linalg import block_diag, null_space
 from scipy.special import chdtrc
 
-from procedures.analysis.determination import require_full_rank
-from procedures.analysis.table_errors import SOURCES, TableErrors
+from procedures.analysis.estimator import Estimator, TableShare, Weighting, estimator, table_share
+from procedures.analysis.noise_scale import noise_factor
+from procedures.analysis.table_errors import TableErrors
 from procedures.analysis.whitening import whitener
 from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration, triad_calibration
-
-
-@dataclass(frozen=True)
-class Estimator:
-    """The linear estimator of a plan: what it multiplies the outputs with, and what noise does to the answer."""
-
-    design: Array
-    """[1 v_x v_y v_z], shape (n, 4)."""
-    gain: Array
-    """Coefficients = gain·outputs, per channel, shape (3, 4, n)."""
-    noise_covariance: Array
-    """Of the twelve coefficients, channel by channel, shape (12, 12)."""
-    condition: float
-    """Condition number of the column-scaled design."""
-
-
-@dataclass(frozen=True)
-class TableShare:
-    """What the table's flaws add to the twelve coefficients."""
-
-    per_sd: Array
-    """Change of the coefficients per standard deviation of each flaw, shape (12, P)."""
-    source: tuple[str, ...]
-
-    @property
-    def covariance(self) -> Array:
-        """Shape (12, 12)."""
-        return self.per_sd @ self.per_sd.T
-
-    def standard_uncertainty(self, source: str) -> Array:
-        """Of the twelve coefficients from one source alone, shape (12,)."""
-        columns = np.array([s == source for s in self.source], dtype=bool)
-        return np.sqrt(np.sum(self.per_sd[:, columns] ** 2, axis=1))
-
-    def by_source(self) -> dict[str, Array]:
-        """Standard uncertainties (12,) of every source that contributes."""
-        parts = {source: self.standard_uncertainty(source) for source in SOURCES}
-        return {source: part for source, part in parts.items() if np.any(part > 0.0)}
 
 
 @dataclass(frozen=True)
@@ -62,11 +26,16 @@ class TriadFit:
     triad: str
     output_unit: str
     input_unit: str
+    weighting: Weighting
     coefficients: Array
     """Shape (12,), in the order of `COEFFICIENT_NAMES`."""
-    noise_covariance: Array
+    estimator: Estimator
+    """What made them of the outputs."""
     table: TableShare
-    condition: float
+    station_noise: Array
+    """Covariance of the station means, scaled up where it was not known, (3, n, n)."""
+    of_table: Array
+    """Change of the outputs per standard deviation of each flaw, (n, 3, P)."""
     residuals: Array
     """Outputs minus model, shape (n, 3), in the output's unit."""
     residual_sd: Array
@@ -79,9 +48,19 @@ class TriadFit:
     """False where the noise was estimated from the recordings themselves: then chi-square proves nothing."""
 
     @property
+    def noise_covariance(self) -> Array:
+        """What noise adds to the twelve coefficients, shape (12, 12)."""
+        return self.estimator.noise_covariance
+
+    @property
     def covariance(self) -> Array:
-        """Noise and table together, shape (12, 12)."""
+        """Noise and table together, shape (12, 12); weighted by both it is ``(AᵀS⁻¹A)⁻¹``."""
         return self.noise_covariance + self.table.covariance
+
+    @property
+    def condition(self) -> float:
+        """Condition number of the column-scaled design."""
+        return self.estimator.condition
 
     @property
     def matrix(self) -> Array:
@@ -100,29 +79,6 @@ class TriadFit:
         return triad_calibration(self.triad, self.output_unit, self.input_unit, self.coefficients, self.covariance)
 
 
-def estimator(what: str, vectors: Array, noise_covariance: Array) -> Estimator:
-    """Generalised least squares for input vectors (n, 3) and covariances of the station means (3, n, n).
-
-    ``x̂ = (AᵀC⁻¹A)⁻¹AᵀC⁻¹·U`` per channel. Raises `Undetermined` naming the lost combinations.
-    """
-    design = np.column_stack([np.ones(len(vectors)), vectors])
-    condition = require_full_rank(what, design, ("b_i", "K_i1", "K_i2", "K_i3"))
-    scale = np.linalg.norm(design, axis=0)
-    gains, covariance = [], np.zeros((12, 12))
-    for channel, c in enumerate(noise_covariance):
-        weights = whitener(c)
-        pseudo_inverse = np.linalg.pinv(weights @ design / scale) / scale[:, None]
-        gains.append(pseudo_inverse @ weights)
-        covariance[4 * channel : 4 * channel + 4, 4 * channel : 4 * channel + 4] = pseudo_inverse @ pseudo_inverse.T
-    return Estimator(design, np.array(gains), covariance, condition)
-
-
-def table_share(plan: Estimator, table: TableErrors, matrix: Array) -> TableShare:
-    """The table's flaws carried through the outputs ``K·δv`` and the estimator into the coefficients."""
-    per_sd = np.einsum("can,ncp->cap", plan.gain, table.of_outputs(matrix))
-    return TableShare(per_sd.reshape(12, -1), table.source)
-
-
 def fit_triad(
     triad: str,
     output_unit: str,
@@ -132,69 +88,84 @@ def fit_triad(
     noise_covariance: Array,
     table: TableErrors,
     noise_known: bool = True,
+    weighting: Weighting = "noise_and_table",
 ) -> TriadFit:
     """Fit one triad's outputs (n, 3) at input vectors (n, 3); `noise_covariance` of the means has shape (3, n, n).
 
-    Where the noise is not known (`noise_known` False) its covariance is a first estimate from the dwells and is scaled
-    up to what the residuals show, never down.
+    The flaws act through K, which least squares with the noise's weights gives first; weights and uncertainties of the
+    answer are made with that K, since another pass would change nothing that can be seen (`tests/domain`). Where the
+    noise is not known (`noise_known` False) its covariance is a first estimate from the dwells and is scaled up to what
+    the residuals show, never down.
     """
-    plan = estimator(f"the {triad} coefficients", vectors, noise_covariance)
-    by_channel = np.einsum("can,nc->ca", plan.gain, outputs)
-    residuals = outputs - plan.design @ by_channel.T
-    of_table = table.of_outputs(by_channel[:, 1:])
-    chi_square, degrees = _chi_square(plan.design, outputs, noise_covariance, of_table)
-    factor = 1.0 if noise_known or degrees == 0 else max(1.0, chi_square / degrees)
-    residual_variance, residual_flaws = _residual_parts(plan, noise_covariance * factor, of_table)
-    weights = vectors / np.linalg.norm(vectors, axis=1)[:, None] @ np.linalg.inv(by_channel[:, 1:])
-    along = np.einsum("nc,ncp->np", weights, residual_flaws)
+    what = f"the {triad} coefficients"
+    plan = estimator(what, vectors, noise_covariance)
+    of_table = table.of_outputs(plan.coefficients(outputs).reshape(3, 4)[:, 1:])
+    free, of_noise, of_flaws = _free_of_coefficients(plan.design, outputs, noise_covariance, of_table)
+    factor = 1.0 if noise_known else noise_factor(free, of_noise, of_flaws)
+    if weighting == "noise_and_table" or factor > 1.0:
+        flaws = of_table if weighting == "noise_and_table" else None
+        plan = estimator(what, vectors, noise_covariance * factor, flaws)
+    coefficients = plan.coefficients(outputs)
+    residual_sd, magnitude_sd = _expected(
+        plan, vectors, coefficients.reshape(3, 4)[:, 1:], noise_covariance * factor, of_table
+    )
     return TriadFit(
         triad,
         output_unit,
         input_unit,
-        by_channel.ravel(),
-        plan.noise_covariance * factor,
-        table_share(plan, table, by_channel[:, 1:]),
-        plan.condition,
-        residuals,
-        np.sqrt(residual_variance + np.sum(residual_flaws**2, axis=2)),
-        np.sqrt(np.sum(weights**2 * residual_variance, axis=1) + np.sum(along**2, axis=1)),
-        chi_square,
-        degrees,
+        weighting,
+        coefficients,
+        plan,
+        table_share(plan, of_table, table),
+        noise_covariance * factor,
+        of_table,
+        outputs - plan.modelled(coefficients),
+        residual_sd,
+        magnitude_sd,
+        _chi_square(free, of_noise + of_flaws),
+        len(free),
         noise_known,
     )
 
 
-def _chi_square(design: Array, outputs: Array, noise_covariance: Array, of_table: Array) -> tuple[float, int]:
-    """What no coefficient can explain against its full covariance, noise and table, all three channels together.
+def _free_of_coefficients(
+    design: Array, outputs: Array, noise_covariance: Array, of_table: Array
+) -> tuple[Array, Array, Array]:
+    """What no coefficient can explain of all three channels, y (k,), and its covariances by noise and table, (k, k).
 
-    With Z an orthonormal basis of the complement of the design, ``y = ZᵀU`` is free of the coefficients and
-    ``χ² = yᵀ·cov(y)⁻¹·y`` has 3(n − 4) degrees of freedom.
+    ``y = ZᵀU`` with Z an orthonormal basis of the complement of the design, k = 3(n − 4). It does not depend on the
+    weights.
     """
-    free = null_space((design / np.linalg.norm(design, axis=0)).T)
-    degrees = 3 * free.shape[1]
-    if degrees == 0:
-        return 0.0, 0
-    y = (free.T @ outputs).T.ravel()
-    flaws = np.einsum("nk,ncp->ckp", free, of_table).reshape(degrees, -1)
-    covariance = flaws @ flaws.T
-    k = free.shape[1]
-    for channel, c in enumerate(noise_covariance):
-        covariance[channel * k : channel * k + k, channel * k : channel * k + k] += free.T @ c @ free
-    whitened = whitener(covariance) @ y
-    return float(whitened @ whitened), degrees
+    basis = null_space((design / np.linalg.norm(design, axis=0)).T)
+    flaws = np.einsum("nk,ncp->ckp", basis, of_table).reshape(3 * basis.shape[1], of_table.shape[2])
+    of_noise = block_diag(*[basis.T @ c @ basis for c in noise_covariance])
+    return (basis.T @ outputs).T.ravel(), of_noise, flaws @ flaws.T
 
 
-def _residual_parts(plan: Estimator, noise_covariance: Array, of_table: Array) -> tuple[Array, Array]:
-    """What the residuals ``(I − A·G)·U`` should be: variance of noise (n, 3), change per sd of each flaw (n, 3, P)."""
-    variances, flaws = [], []
-    for channel, (gain, c) in enumerate(zip(plan.gain, noise_covariance, strict=True)):
-        remaining = np.eye(len(plan.design)) - plan.design @ gain
-        variances.append(np.maximum(np.diagonal(remaining @ c @ remaining.T), 0.0))
-        flaws.append(remaining @ of_table[:, channel])
-    return np.array(variances).T, np.stack(flaws, axis=1)
+def _chi_square(free: Array, covariance: Array) -> float:
+    """``χ² = yᵀ·cov(y)⁻¹·y`` against noise and table together, as many degrees of freedom as y has components."""
+    if len(free) == 0:
+        return 0.0
+    whitened = whitener(covariance) @ free
+    return float(whitened @ whitened)
 
 
-def joint_table_covariance(gyro: TableShare, accelerometer: TableShare) -> Array:
-    """Covariance of all twenty-four coefficients from the table's flaws, which both triads share, shape (24, 24)."""
-    both = np.vstack([gyro.per_sd, accelerometer.per_sd])
-    return both @ both.T
+def _expected(
+    plan: Estimator, vectors: Array, matrix: Array, noise_covariance: Array, of_table: Array
+) -> tuple[Array, Array]:
+    """Standard deviations of the residuals ``(1 − A·G)·U`` (n, 3) and of |v̂| − |v|, their part along v̂, (n,)."""
+    n = len(vectors)
+    flaws = of_table.transpose(1, 0, 2).reshape(3 * n, -1)
+    remaining = plan.remaining()
+    along = np.einsum("nc,cnj->nj", _direction(vectors, matrix), remaining.reshape(3, n, 3 * n))
+
+    def sd(rows: Array) -> Array:
+        noise = np.einsum("kci,cij,kcj->k", rows.reshape(-1, 3, n), noise_covariance, rows.reshape(-1, 3, n))
+        return np.sqrt(np.maximum(noise, 0.0) + np.sum((rows @ flaws) ** 2, axis=1))
+
+    return sd(remaining).reshape(3, n).T, sd(along)
+
+
+def _direction(vectors: Array, matrix: Array) -> Array:
+    """``∂|v̂|/∂U = K⁻ᵀ·v/|v|``, shape (n, 3)."""
+    return vectors / np.linalg.norm(vectors, axis=1)[:, None] @ np.linalg.inv(matrix)

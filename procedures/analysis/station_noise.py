@@ -14,7 +14,7 @@ from procedures.core.arrays import Array
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.unit import TriadRecord
 
-_NODES = 48
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 """Gauss-Legendre nodes over ln(relaxation time): twelve e-folds of smooth integrand, good to about 1e-12."""
 
 
@@ -53,11 +53,10 @@ def flicker_covariance(noise: NoiseCoefficients, windows: ArrayLike) -> Array:
     """
     spans = _spans(windows)
     low, high = np.log(noise.flicker_band_s)
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     half = 0.5 * (high - low)
     density = noise.bias_instability**2 / np.pi
-    relaxations = np.exp(0.5 * (high + low) + half * nodes)
-    return _double_mean(spans, _gauss_markov(relaxations, density * half * weights))
+    relaxations = np.exp(0.5 * (high + low) + half * _NODES)
+    return _double_mean(spans, _gauss_markov(relaxations, density * half * _WEIGHTS))
 
 
 def rate_random_walk_covariance(noise: NoiseCoefficients, windows: ArrayLike) -> Array:

@@ -1,7 +1,8 @@
 """Bench calibration: both triads from twelve known orientations (thesis 3.3.3-3.3.6, 5.1-5.5).
 
 The unit is set to each orientation and rests there for the averaging time; least squares over the station means
-gives bias, scale factors and cross-couplings of gyros (from the Earth's rate) and accelerometers (from gravity).
+gives bias, scale factors and cross-couplings of gyros (from the Earth's rate) and accelerometers (from gravity). The
+weights allow for the unit's noise and the table's declared accuracy; weighting="noise" is the thesis's own.
 """
 
 from collections.abc import AsyncIterator, Sequence
@@ -15,12 +16,15 @@ from procedures.analysis import calibration_report as pictures
 from procedures.analysis.calibration_analysis import analyse_triad
 from procedures.analysis.calibration_plan import (
     TriadPlan,
+    basis,
     in_run_unresolved,
+    predicted_parts,
     run_to_run_requirements,
     triad_plan,
     unresolved,
 )
 from procedures.analysis.calibration_summary import TriadSummary, coefficient_unit
+from procedures.analysis.estimator import Weighting
 from procedures.analysis.reference import INPUT_UNITS, TRIAD_NAMES, site_with
 from procedures.analysis.scalar import require_scalar_determined
 from procedures.analysis.station_plan import windows
@@ -78,6 +82,11 @@ class Params(Parameters):
     orthogonality_sd_arcsec: Arcsec | None = Field(None, description="of each of the table's two right angles")
     pointing_sd_arcsec: Arcsec | None = Field(None, description="of each axis, anew at each station")
     level_sd_arcsec: Arcsec | None = Field(None, description="of the outer axis about each horizontal direction")
+    weighting: Weighting = Field(
+        "noise_and_table",
+        description="noise_and_table: least squares that allows for the table's declared accuracy; noise: the table's "
+        "angles as commanded (the thesis), their uncertainty added afterwards",
+    )
     scalar_check: bool = Field(True, description="cross-check with the magnitude of gravity alone")
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
@@ -124,7 +133,8 @@ def predict(params: Params, context: Context) -> Prediction:
     _require_scalar(params, plans[1])
     uncertainties = tuple(u for plan in plans for u in _predicted(plan))
     duration_s = float(windows(stations, _axes(context))[-1, 1])
-    return Prediction(duration_s, uncertainties, _warnings(params, plans))
+    rests_on = basis(plans) if uncertainties else ""
+    return Prediction(duration_s, uncertainties, _warnings(params, plans), rests_on)
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
@@ -147,6 +157,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
             uncertainty,
             context.unit.triad(triad),
             params.scalar_check and triad == "accelerometer",
+            params.weighting,
         )
         for triad in TRIAD_NAMES
     )
@@ -195,7 +206,7 @@ def _axes(context: Context) -> tuple[tuple[float, float], ...]:
 
 def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
     site, uncertainty = _site(params, context), _uncertainty(params, context)
-    return triad_plan(triad, context.unit, schedule(params), _axes(context), site, uncertainty)
+    return triad_plan(triad, context.unit, schedule(params), _axes(context), site, uncertainty, params.weighting)
 
 
 def _require_scalar(params: Params, accelerometer: TriadPlan) -> None:
@@ -212,16 +223,12 @@ def _require_scalar(params: Params, accelerometer: TriadPlan) -> None:
 
 
 def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
-    noise = plan.noise_covariance()
-    if noise is None:
-        plan.estimator(np.array([np.eye(len(plan.stations))] * 3))
+    parts, unit = predicted_parts(plan), INPUT_UNITS[plan.triad]
+    if parts is None:
         return []
-    gls = plan.estimator(noise)
-    of_noise, of_table = np.sqrt(np.diagonal(gls.noise_covariance)), np.sqrt(np.diagonal(plan.share(gls).covariance))
-    unit = INPUT_UNITS[plan.triad]
     return [
         PredictedUncertainty(f"{plan.triad}.{name}", coefficient_unit(name, unit, unit), float(np.hypot(n, t)), n, t)
-        for name, n, t in zip(COEFFICIENT_NAMES, of_noise.tolist(), of_table.tolist(), strict=True)
+        for name, n, t in zip(COEFFICIENT_NAMES, parts[0].tolist(), parts[1].tolist(), strict=True)
     ]
 
 
@@ -273,7 +280,7 @@ def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
 PROCEDURE = Procedure(
     "calibration_12_orientations",
     "Calibration in twelve orientations",
-    "1.0.0",
+    "1.1.0",
     Params,
     Result,
     resolve,

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis import calibration_report as pictures
-from procedures.analysis.calibration_plan import TriadPlan, in_run_unresolved, triad_plan
+from procedures.analysis.calibration_plan import TriadPlan, basis, in_run_unresolved, triad_plan
 from procedures.analysis.reference import TRIAD_NAMES, site_with
 from procedures.analysis.station_plan import windows
 from procedures.analysis.table_errors import TableUncertainty
@@ -109,7 +109,8 @@ def predict(params: Params, context: Context) -> Prediction:
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     uncertainties = tuple(u for plan in plans for u in _predicted(plan))
     duration_s = float(windows(schedule(params), _axes(context))[-1, 1])
-    return Prediction(duration_s, uncertainties, _warnings(plans, params.limits))
+    rests_on = basis(plans) if uncertainties else ""
+    return Prediction(duration_s, uncertainties, _warnings(plans, params.limits), rests_on)
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:

@@ -8,7 +8,6 @@ import pytest
 from pydantic import ValidationError
 
 from procedures import catalog, methods
-from procedures.core import units
 from procedures.core.errors import BadParameter, DomainError, Undetermined
 from procedures.core.limits import Verdict
 from procedures.core.recording import MemoryRecording, RecordingInfo
@@ -69,6 +68,7 @@ def test_defaults_are_valid_and_resolved_ones_too(name: str, context: Context):
         {"orientations": ((0.0, 0.0),) * 201},
         {"orientations": ()},
         {"rotation_order": "sideways"},
+        {"weighting": "table"},
         {"gravity_m_s2": float("inf")},
         {"limits": {"gyro_scale_run_to_run_ppm": float("nan")}},
         {"dwel_s": 70.0},
@@ -89,40 +89,6 @@ def test_one_does_not_verify_where_one_has_calibrated(context: Context):
     assert len(sets[0]) == 12
     assert len(sets[1]) == 9
     assert len(sets[0] & sets[1]) == 1  # (0, 0, 0) alone is in both sets of the thesis
-
-
-def test_the_preview_of_the_default_plan(context: Context):
-    prediction = CALIBRATION.predict(CALIBRATION.params(), context)
-    by_name = {u.name: u for u in prediction.uncertainties}
-    assert len(by_name) == 24
-    # methods, errata: about 0.006 deg/h on a gyro's bias and 550 ppm on its scale factor.
-    assert by_name["gyro.b_x"].standard_uncertainty / units.DEG_PER_HOUR == pytest.approx(0.0055, rel=0.1)
-    assert by_name["gyro.K11"].standard_uncertainty / units.PPM == pytest.approx(530, rel=0.1)
-    assert by_name["accelerometer.b_x"].from_noise / units.MICRO_G == pytest.approx(1.0, rel=0.1)
-    assert all(u.standard_uncertainty == pytest.approx(np.hypot(u.from_noise, u.from_table)) for u in by_name.values())
-    (warning,) = prediction.warnings
-    assert "gyro scale factor" in warning
-    assert "no dwell" in warning
-    assert "whole turns" in warning
-    assert 12 * 72.0 < prediction.duration_s < 12 * 80.0
-
-
-def test_a_limit_that_a_longer_dwell_reaches_is_told_with_the_dwell(context: Context):
-    limits = {"gyro_bias_run_to_run_deg_h": 0.004, "gyro_scale_run_to_run_ppm": 1e4}
-    (warning,) = CALIBRATION.predict(CALIBRATION.params(limits=limits), context).warnings
-    assert "gyro bias" in warning
-    hours = float(warning.split("about ")[1].split(" h")[0])
-    params = CALIBRATION.params(limits=limits, dwell_s=hours * 3600 * 1.05)
-    assert CALIBRATION.predict(params, context).warnings == ()
-
-
-def test_an_in_run_limit_beneath_the_noise_of_the_dwell_is_told(context: Context):
-    params = CALIBRATION.params(
-        dwell_s=5.0, limits={"gyro_scale_run_to_run_ppm": 1e5, "gyro_bias_run_to_run_deg_h": 1.0}
-    )
-    (warning,) = CALIBRATION.predict(params, context).warnings
-    # 5 s: √2·0.39″/5 s is 0.11 deg/h, 0.0014 deg/√h over √(5 s) is 0.04 deg/h; over √3: far above 0.015.
-    assert "gyro bias in run: the limit of 0.015 deg/h" in warning
 
 
 def test_the_other_rotation_order_is_refused_before_anything_moves(context: Context):
@@ -149,6 +115,7 @@ def test_calibrate_store_verify(context: Context):
     recordings = station_recordings(CALIBRATION.schedule(params), context.unit.channels, rng, table, noise)
     result = CALIBRATION.analyse(recordings, params, context)
     assert result.verdict is Verdict.PASS, result.checks
+    assert {t.weighting for t in result.triads} == {"noise_and_table"}
     assert CALIBRATION.result.model_validate_json(result.model_dump_json()) == result
     assert result.warnings == CALIBRATION.predict(params, context).warnings
     calibrations = CALIBRATION.calibrations(result)
@@ -180,9 +147,10 @@ def test_calibrate_store_verify(context: Context):
     assert VERIFICATION.report(verified).sections
 
 
-def test_scalar_and_linear_differ_by_what_is_claimed(context: Context):
+@pytest.mark.parametrize("weighting", ["noise_and_table", "noise"])
+def test_scalar_and_linear_differ_by_what_is_claimed(context: Context, weighting: str):
     rng, sigmas = np.random.default_rng(18), []
-    params = CALIBRATION.resolve(CALIBRATION.params(), context)
+    params = CALIBRATION.resolve(CALIBRATION.params(weighting=weighting), context)
     stations = CALIBRATION.schedule(params)
     noise = drawn_covariances(stations)
     for _ in range(40):

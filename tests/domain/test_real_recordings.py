@@ -11,7 +11,7 @@ from procedures.core.recording import ACCELEROMETER, Channel, MemoryRecording, Q
 from procedures.methods.scalar_calibration import METHOD, Result
 from procedures.procedure import Evidence
 
-DATA = Path(os.environ.get("BENCH_SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
+DATA = Path(os.environ.get("SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
 pytestmark = [
     pytest.mark.shared_data,
     pytest.mark.skipif(not DATA.is_dir(), reason="the shared recordings are absent"),

@@ -88,10 +88,11 @@ def columns(population: Outcome) -> list[Column]:
     return [
         Column("mean error / its se", normalised.mean(axis=0) * np.sqrt(units), (-sigmas, sigmas)),
         Column("sd / claimed", ratio(p.claimed), spread),
-        Column("sd / bound", ratio(p.weighted_bound), spread),
+        Column("sd / bound", ratio(p.bound), spread),
         Column("sd / preview", ratio(p.preview), preview_limits(units)),
         Column("in 95 %", inside, tuple(inside_limits)),  # pyright: ignore[reportArgumentType]
         Column("sd / noise bound", ratio(p.noise_bound)),
+        Column("sd / thesis bound", ratio(p.weighted_bound)),
         Column("sd / joint bound", ratio(p.joint_bound)),
         Column("sd / first preview", ratio(p.first_preview)),
     ]
@@ -114,6 +115,30 @@ def _of_triad(p: Outcome, i: int, triad: str) -> list[Check]:
         _uniform(f"{triad} verification: KS test of p-values", p.verification_p_value[:, i]),
         Check(f"{triad} verification: mean s²/predicted", p.spread[:, i].mean(), *variance_limits(spread)),
     ]
+
+
+@dataclass(frozen=True)
+class Misdeclared:
+    """What comes of a triad on tables that are not as declared; the worst and the best of its twelve coefficients."""
+
+    triad: str
+    detected: float
+    """Part of the units whose residuals' p-value is below the procedure's limit."""
+    claimed: tuple[float, float]
+    """Least and greatest spread of the errors over what is claimed."""
+    noise_bound: tuple[float, float]
+    """The same over the Cramér-Rao bound on an ideal table."""
+
+
+def misdeclared(population: Outcome, p_value_min: float) -> list[Misdeclared]:
+    """Triad by triad."""
+    p, found = population, []
+    for i, triad in enumerate(TRIAD_NAMES):
+        own = slice(12 * i, 12 * i + 12)
+        claimed, bound = (np.std((p.errors / sd)[:, own], axis=0, ddof=1) for sd in (p.claimed, p.noise_bound))
+        detected = float(np.mean(p.p_value[:, i] < p_value_min))
+        found.append(Misdeclared(triad, detected, (claimed.min(), claimed.max()), (bound.min(), bound.max())))
+    return found
 
 
 def _uniform(name: str, p_values: Array) -> Check:

@@ -10,6 +10,7 @@ import numpy as np
 
 from procedures.analysis.calibration_analysis import analyse_triad
 from procedures.analysis.calibration_plan import TriadPlan, triad_plan
+from procedures.analysis.estimator import Weighting
 from procedures.analysis.reference import TRIAD_NAMES
 from procedures.analysis.station_means import BATCHES
 from procedures.analysis.table_errors import TableUncertainty
@@ -20,8 +21,16 @@ from procedures.catalog import discover
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import ACCELEROMETER, GYRO, Channel, MemoryRecording, Quantity, RecordingInfo, Station
 from procedures.procedure import Context
-from simulators.truth import Array, BenchTruth, TableTruth, default_bench, random_table_truth, random_unit_truth
-from simulators.world import DwellMeans, WorldConfig, declared_unit, dwell_means, launch_truth
+from simulators.truth import (
+    Array,
+    BenchTruth,
+    TableTruth,
+    declared_unit,
+    default_bench,
+    random_table_truth,
+    random_unit_truth,
+)
+from simulators.world import DwellMeans, WorldConfig, dwell_means, launch_truth
 from tests.validation.theory import Reference, bounds, dwell_covariance, dwell_windows, reference
 
 CALIBRATION = discover()["calibration_12_orientations"]
@@ -34,7 +43,10 @@ CHANNELS = (
 
 @dataclass(frozen=True)
 class Scenario:
-    """A kind of table: the spreads its laboratory declares, from which each unit's table is drawn [arcsec]."""
+    """A kind of table: the spreads its laboratory declares, from which each unit's table is drawn [arcsec].
+
+    The flaws drawn are `true_flaws` times what is declared.
+    """
 
     title: str
     first_seed: int
@@ -42,14 +54,16 @@ class Scenario:
     azimuth: float = 0.0
     pointing: float = 0.0
     level: float = 0.0
+    weighting: Weighting = "noise_and_table"
+    true_flaws: float = 1.0
 
     def bench(self, seed: int | None = None) -> BenchTruth:
         """The declared bench with a table drawn from its own accuracy, or with an ideal one."""
         site = replace(default_bench().description.site, azimuth_sd_arcsec=self.azimuth)
         accuracy = TableAccuracy(self.orthogonality, self.pointing, self.level)
         description = replace(default_bench().description, site=site, accuracy=accuracy)
-        flaws = (self.orthogonality, self.azimuth, self.pointing, self.level)
-        table = TableTruth() if seed is None else random_table_truth(seed, *flaws)
+        flaws = np.array([self.orthogonality, self.azimuth, self.pointing, self.level]) * self.true_flaws
+        table = TableTruth() if seed is None else random_table_truth(seed, *flaws.tolist())
         return BenchTruth(default_bench().site, table, description)
 
 
@@ -58,6 +72,15 @@ SCENARIOS = (
     Scenario("axes 3″, azimuth 5″", 2_000_000, orthogonality=3.0, azimuth=5.0),
     Scenario("axes 3″, azimuth 5″, pointing 1″, level 1″", 3_000_000, 3.0, 5.0, 1.0, 1.0),
 )
+"""The default weighting, which is to reach the joint bound."""
+THESIS = replace(SCENARIOS[2], title="noise's weights, " + SCENARIOS[2].title, first_seed=4_000_000, weighting="noise")
+"""The thesis's least squares, which is to reach its own bound."""
+COARSE = Scenario("axes 3″, azimuth 10″, pointing 5″, level 3″", 5_000_000, 3.0, 10.0, 5.0, 3.0)
+MISDECLARED = (
+    *(replace(s, title=s.title + ": true flaws 5×", true_flaws=5.0) for s in (SCENARIOS[1], SCENARIOS[2], COARSE)),
+    *(replace(s, title=s.title + ": true flaws none", true_flaws=0.0) for s in (SCENARIOS[1], SCENARIOS[2], COARSE)),
+)
+"""Tables that are not as they are declared."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +91,8 @@ class Outcome:
     """Estimates minus the launch's truth, (24,)."""
     claimed: Array
     """Standard uncertainties of the result, (24,)."""
+    bound: Array
+    """Of the scenario's weighting: the joint one of noise and table, else the weighted one, (24,)."""
     noise_bound: Array
     weighted_bound: Array
     joint_bound: Array
@@ -112,7 +137,7 @@ def plans(scenario: Scenario) -> Plans:
     return Plans(
         here,
         there,
-        [triad_plan(name, unit, here, axes, d.site, table_uncertainty(d)) for name in TRIAD_NAMES],
+        [triad_plan(name, unit, here, axes, d.site, table_uncertainty(d), scenario.weighting) for name in TRIAD_NAMES],
         [triad_plan(name, unit, there, axes, d.site, TableUncertainty()) for name in TRIAD_NAMES],
         reference(bench, here),
     )
@@ -126,7 +151,10 @@ def one_unit(scenario: Scenario, index: int) -> Outcome:
     site, uncertainty = bench.description.site, table_uncertainty(bench.description)
 
     taken = recordings(config, plan.calibration, 1)
-    fits = [analyse_triad(taken, name, site, uncertainty, declared.triad(name)) for name in TRIAD_NAMES]
+    weights = scenario.weighting
+    fits = [
+        analyse_triad(taken, name, site, uncertainty, declared.triad(name), weighting=weights) for name in TRIAD_NAMES
+    ]
     made = [f.calibration for f in fits]
     known = replace(declared, calibrations=tuple(made))
     taken = recordings(config, plan.verification, 2)
@@ -144,6 +172,7 @@ def one_unit(scenario: Scenario, index: int) -> Outcome:
     return Outcome(
         np.concatenate([c.coefficients for c in made]) - np.concatenate([np.column_stack(t).ravel() for t in true]),
         np.concatenate([c.standard_uncertainties for c in made]),
+        allowed.weighted if weights == "noise" else allowed.joint,
         allowed.noise,
         allowed.weighted,
         allowed.joint,
@@ -164,10 +193,11 @@ def previewed(plan: TriadPlan, calibration: TriadCalibration) -> Array:
     """Predicted standard uncertainties of a triad with a calibration and of one without, (2, 12)."""
     noise = plan.noise_covariance()
     assert noise is not None
-    gls = plan.estimator(noise)
-    known = replace(plan, matrix=calibration.matrix_array)
-    shares = [np.diagonal(p.share(gls).covariance) for p in (known, plan)]
-    return np.sqrt(np.diagonal(gls.noise_covariance) + np.array(shares))
+    cases = []
+    for case in (replace(plan, matrix=calibration.matrix_array), plan):
+        gls = case.estimator(noise)
+        cases.append(np.sqrt(np.diagonal(gls.noise_covariance) + np.diagonal(case.share(gls).covariance)))
+    return np.array(cases)
 
 
 def recordings(config: WorldConfig, stations: Sequence[Station], launch: int) -> list[MemoryRecording]:

@@ -1,0 +1,159 @@
+"""An Allan deviation with its uncertainty, from an array or from blocks of any length. Knows no files and no chance."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.analysis.allan.differences import NonOverlappingSums
+from procedures.analysis.allan.freedom import ONE_SIGMA, degrees_of_freedom, interval
+from procedures.analysis.allan.identification import LatePoints
+from procedures.analysis.allan.integral import Gaps, Integral
+from procedures.analysis.allan.overlapping import OverlappingSums, RoundingTooLarge
+from procedures.analysis.allan.statistic import OVERLAPPING_ALLAN, Sizes, Statistic, checked_sizes
+from procedures.core.arrays import Array
+from procedures.core.errors import UnfitRecording
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """σ(τ) of one channel; arrays (k,), ascending in τ, in the unit of the rate (time deviation: rate·s)."""
+
+    statistic: Statistic
+    rate_hz: float
+    count: int
+    sizes: Sizes
+    """m: samples a cluster."""
+    tau_s: Array
+    deviation: Array
+    terms: NDArray[np.int64]
+    """Squared differences that were averaged."""
+    left_out: NDArray[np.int64]
+    """Those left out because they touch a gap."""
+    strides: NDArray[np.int64]
+    """Samples between the starts of neighbouring terms; 1 is exact, more: see `differences`."""
+    alpha: Array
+    """Exponent of the rate's spectral density that the edf were taken for."""
+    edf: Array
+    lower: Array
+    upper: Array
+    confidence: float
+    missing: int
+    """Samples that were NaN."""
+    first_missing: int | None
+
+
+class DeviationStream:
+    """One channel's deviation from blocks, in bounded memory (about 40 MB, whatever the length).
+
+    Samples are rates, or with ``increments=True`` increments of the integrated output, which are multiplied by
+    `rate_hz`. A NaN is refused, or with ``gaps="aware"`` the terms that touch it are left out and counted. `count` is
+    the number of samples that will come. Raises `UnfitRecording` and `BadParameter`.
+    """
+
+    def __init__(
+        self,
+        rate_hz: float,
+        count: int,
+        statistic: Statistic = OVERLAPPING_ALLAN,
+        *,
+        sizes: Sequence[int] | Sizes | None = None,
+        increments: bool = False,
+        gaps: Gaps = "refuse",
+        confidence: float = ONE_SIGMA,
+        correlate: bool = True,
+    ) -> None:
+        self._rate_hz, self._count, self._statistic, self._confidence = rate_hz, count, statistic, confidence
+        wanted = checked_sizes(sizes, count, statistic)
+        interval(np.ones(1), np.ones(1), confidence)
+        self._integral = Integral(rate_hz, increments=increments, gaps=gaps)
+        if statistic.overlapping:
+            self._sums = OverlappingSums(statistic, count, wanted, correlate=correlate)
+        else:
+            self._sums = NonOverlappingSums(statistic, count, wanted)
+        self._late = LatePoints(count)
+
+    def add(self, block: Array | NDArray[np.int32]) -> None:
+        """The next samples of the channel, (n,)."""
+        if self._integral.count + len(block) > self._count:
+            raise UnfitRecording(f"more samples came than the {self._count} that were announced")
+        for piece in self._integral.add(block):
+            self._sums.add(piece)
+            self._late.add(piece)
+
+    def finish(self) -> Deviation:
+        """The deviation, once all samples came; cluster sizes without a single term (gaps) do not appear."""
+        self._integral.check_end(self._count)
+        sums, terms = self._sums.finish()
+        all_starts = self._sums.starts()
+        there = terms > 0
+        if not np.any(there):
+            raise UnfitRecording(
+                f"no cluster is whole: {self._integral.missing} of {self._count} samples are missing, the first at "
+                f"{self._integral.first_missing}"
+            )
+        sizes, terms, starts = self._sums.sizes[there], terms[there], all_starts[there]
+        variance = self._statistic.variance(sums[there], terms.astype(np.float64), sizes, self._rate_hz)
+        deviation = np.sqrt(variance)
+        alpha = self._late.exponents(sizes, self._statistic.order)
+        edf = np.array(
+            [
+                degrees_of_freedom(self._statistic, int(a), int(m), self._count)
+                for a, m in zip(alpha, sizes, strict=True)
+            ]
+        )
+        edf *= terms / starts
+        lower, upper = interval(deviation, edf, self._confidence)
+        return Deviation(
+            statistic=self._statistic,
+            rate_hz=self._rate_hz,
+            count=self._count,
+            sizes=sizes,
+            tau_s=sizes / self._rate_hz,
+            deviation=deviation,
+            terms=terms,
+            left_out=starts - terms,
+            strides=self._sums.strides[there],
+            alpha=alpha,
+            edf=edf,
+            lower=lower,
+            upper=upper,
+            confidence=self._confidence,
+            missing=self._integral.missing,
+            first_missing=self._integral.first_missing,
+        )
+
+
+def deviation(
+    samples: Array | NDArray[np.int32],
+    rate_hz: float,
+    statistic: Statistic = OVERLAPPING_ALLAN,
+    *,
+    sizes: Sequence[int] | Sizes | None = None,
+    increments: bool = False,
+    gaps: Gaps = "refuse",
+    confidence: float = ONE_SIGMA,
+) -> Deviation:
+    """The deviation of one channel held in memory, (n,); see `DeviationStream`.
+
+    Where the channel wanders so far that the fast sums would lose more than a millionth, it is differenced term by
+    term.
+    """
+    for correlate in (True, False):
+        stream = DeviationStream(
+            rate_hz,
+            len(samples),
+            statistic,
+            sizes=sizes,
+            increments=increments,
+            gaps=gaps,
+            confidence=confidence,
+            correlate=correlate,
+        )
+        try:
+            stream.add(samples)
+            return stream.finish()
+        except RoundingTooLarge:
+            continue
+    raise AssertionError("term by term, no rounding is too large")

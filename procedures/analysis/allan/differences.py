@@ -1,0 +1,100 @@
+"""Sums of squared differences of a running sum, and the sums of the non-overlapping members."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.analysis.allan.integral import Counts, Piece
+from procedures.analysis.allan.lagged import BLOCK
+from procedures.analysis.allan.statistic import Sizes, Statistic
+from procedures.core.arrays import Array
+
+
+def sum_of_squares(z: Array, missing: Counts | None, m: int, order: int, stop: int) -> tuple[float, int]:
+    """``Σ_{k<stop} (Δ_m^order z_k)²``, order 2 or 3, and its number of terms; a term that touches a gap is left out.
+
+    `z` (n,) with ``stop − 1 + order·m < n``; `missing` (n,) counts the missing samples before each point.
+    """
+    total, terms = 0.0, 0
+    first, second = np.empty(min(stop, BLOCK)), np.empty(min(stop, BLOCK))
+    for a in range(0, stop, BLOCK):
+        b = min(a + BLOCK, stop)
+        d, e = first[: b - a], second[: b - a]
+        if order == 2:
+            np.subtract(z[a + 2 * m : b + 2 * m], z[a + m : b + m], out=d)
+            np.subtract(z[a + m : b + m], z[a:b], out=e)
+        else:
+            np.subtract(z[a + 3 * m : b + 3 * m], z[a:b], out=d)
+            np.subtract(z[a + 2 * m : b + 2 * m], z[a + m : b + m], out=e)
+            e *= 3.0
+        d -= e
+        if missing is not None:
+            touched = missing[a + order * m : b + order * m] != missing[a:b]
+            d[touched] = 0.0
+            terms -= int(np.count_nonzero(touched))
+        total += float(np.dot(d, d))
+        terms += b - a
+    return total, terms
+
+
+def sum_of_smoothed_squares(x: Array, missing: Counts | None, m: int, reach: int, stop: int) -> tuple[float, int]:
+    """``Σ_{k<stop} (Σ_{i<m} Δ_m² x_{k+i})²`` and its number of terms: the modified Allan's, without a sum of sums.
+
+    `x` (n,) with ``stop + 3m − 2 < n``; a term is left out where `missing` differs `reach` points on. Running sums
+    start anew with every stretch, so that they stay small.
+    """
+    total, terms = 0.0, 0
+    stretch = max(BLOCK, 2 * m)
+    for a in range(0, stop, stretch):
+        b = min(a + stretch, stop)
+        e = b + m - 1
+        d = x[a + 2 * m : e + 2 * m] - x[a + m : e + m]
+        d -= x[a + m : e + m] - x[a:e]
+        np.cumsum(d, out=d)
+        d[m:] -= d[:-m].copy()
+        d = d[m - 1 :]
+        if missing is not None:
+            touched = missing[a + reach : b + reach] != missing[a:b]
+            d[touched] = 0.0
+            terms -= int(np.count_nonzero(touched))
+        total += float(np.dot(d, d))
+        terms += b - a
+    return total, terms
+
+
+class NonOverlappingSums:
+    """Sums of a non-overlapping member, exact at every size; memory for a few points a size."""
+
+    def __init__(self, statistic: Statistic, count: int, sizes: Sizes) -> None:
+        self._statistic, self._count, self.sizes = statistic, count, sizes
+        self.strides = np.ones(len(sizes), np.int64)
+        self._sums, self._terms = np.zeros(len(sizes)), np.zeros(len(sizes), np.int64)
+        self._index = 1
+        self._last = [np.zeros(1) for _ in sizes]
+        self._last_gaps = [np.zeros(1, np.int64) for _ in sizes]
+
+    def add(self, piece: Piece) -> None:
+        """The next piece of the running sum."""
+        p = self._statistic.differences
+        for i, size in enumerate(self.sizes):
+            first = -self._index % int(size)
+            points = np.concatenate([self._last[i], piece.x[first :: int(size)]])
+            gaps = None
+            if piece.missing is not None:
+                gaps = np.concatenate([self._last_gaps[i], piece.missing[first :: int(size)]])
+                self._last_gaps[i] = gaps[-p:]
+            if len(points) > p:
+                total, terms = sum_of_squares(points, gaps, 1, p, len(points) - p)
+                self._sums[i] += total
+                self._terms[i] += terms
+            self._last[i] = points[-p:]
+            if gaps is None:
+                self._last_gaps[i] = np.zeros(len(self._last[i]), np.int64)
+        self._index += len(piece.x)
+
+    def finish(self) -> tuple[Array, NDArray[np.int64]]:
+        """Sums and numbers of terms at `sizes`, (k,) each, after the last piece."""
+        return self._sums, self._terms
+
+    def starts(self) -> NDArray[np.int64]:
+        """The terms that fit, gaps or not, (k,)."""
+        return np.array([self._statistic.starts(self._count, int(m)) for m in self.sizes], np.int64)

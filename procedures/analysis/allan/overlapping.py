@@ -1,0 +1,173 @@
+"""The sums of the overlapping members, from pieces of any length, in bounded memory.
+
+Overlapping members of a long series are taken at two resolutions. Cluster sizes up to a limit use every start k
+(exact). Larger ones use the running sum at every s-th sample only: each cluster mean is still exact, but the starts
+are 0, s, 2s…, at least `POINTS` of them where they fit, and the cluster sizes multiples of s. What that costs depends
+on the noise. Where σ̂(τ) has the relative standard deviation ρ, starts every s of m samples differ from all starts by
+about ρ·s/m where the rate is white or redder (below 0.01 %), and by ``1/√(2·POINTS·18/35)`` ≈ 0.1 % (one sigma) where
+white angle noise rules beyond the limit too. A series of up to `WHOLE` samples is exact at every size.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.analysis.allan.differences import sum_of_smoothed_squares, sum_of_squares
+from procedures.analysis.allan.integral import Counts, Piece
+from procedures.analysis.allan.lagged import BLOCK, LaggedProducts, worst_rounding
+from procedures.analysis.allan.statistic import Sizes, Statistic
+from procedures.core.arrays import Array
+from procedures.core.errors import UnfitRecording
+
+WHOLE = 1 << 21
+"""A series up to this length is held and differenced whole."""
+POINTS = 1 << 20
+"""Of a longer one, at least so many points are held."""
+SMOOTH = 64
+"""A modified statistic is smooth over its own cluster: so many starts a cluster are as good as all."""
+FEW = 16
+"""Fewer cluster sizes are differenced faster than correlated."""
+ROUNDING = 1e-6
+"""The worst relative rounding of a sum that passes."""
+
+
+def stride_of(count: int) -> int:
+    """s: the step of the held points, a power of two; 1 where the series is held whole."""
+    return 1 if count <= WHOLE else 1 << int(np.log2(count / POINTS))
+
+
+def exact_limit(statistic: Statistic, count: int) -> int:
+    """The largest cluster size that uses every start."""
+    if count <= WHOLE or not statistic.overlapping:
+        return count
+    near = BLOCK // statistic.differences
+    return min(near, SMOOTH * stride_of(count)) if statistic.modified else near
+
+
+def snapped_sizes(sizes: Sizes, statistic: Statistic, count: int) -> Sizes:
+    """The sizes as they will be computed: those beyond the exact limit are multiples of the stride."""
+    s, limit = stride_of(count), exact_limit(statistic, count)
+    far = np.minimum(np.round(sizes / s).astype(np.int64), statistic.largest(count) // s) * s
+    return np.unique(np.where(sizes <= limit, sizes, far))
+
+
+class RoundingTooLarge(UnfitRecording):
+    """A running sum wanders so far that its lagged products lose the noise; difference it term by term."""
+
+    def __init__(self) -> None:
+        super().__init__("the channel wanders too far for the fast sums; ask for correlate=False")
+
+
+class _Points:
+    """The running sum at every s-th sample; of a modified statistic, its sums over s samples."""
+
+    def __init__(self, count: int, stride: int, *, summed: bool) -> None:
+        self._stride, self._summed = stride, summed
+        self.x = np.zeros((count + 1) // stride if summed else count // stride + 1)
+        self.missing: Counts | None = None
+        self._index, self._carry = 0, np.empty(0)
+
+    def add(self, piece: Piece) -> None:
+        s, first = self._stride, -self._index % self._stride
+        at = (self._index + first) // s
+        if self._summed and s > 1:
+            z = np.concatenate([self._carry, piece.x])
+            whole = len(z) // s * s
+            kept, done = z[:whole].reshape(-1, s).sum(axis=1), (self._index - len(self._carry)) // s
+            self.x[done : done + len(kept)] = kept
+            self._carry = z[whole:]
+        else:
+            kept = piece.x[first::s]
+            self.x[at : at + len(kept)] = kept
+        if piece.missing is not None:
+            if self.missing is None:
+                self.missing = np.zeros(len(self.x) + 1, np.int64)
+            gaps = piece.missing[first::s][: len(self.missing) - at]
+            self.missing[at : at + len(gaps)] = gaps
+            self.missing[at + len(gaps) :] = piece.missing[-1]
+        self._index += len(piece.x)
+
+
+class OverlappingSums:
+    """Sums of an overlapping member for many cluster sizes, from pieces of x."""
+
+    def __init__(self, statistic: Statistic, count: int, sizes: Sizes, *, correlate: bool = True) -> None:
+        self._statistic, self._count = statistic, count
+        self._stride = stride_of(count)
+        self.sizes = snapped_sizes(sizes, statistic, count)
+        near = self.sizes <= exact_limit(statistic, count) if self._stride > 1 else np.zeros(len(self.sizes), bool)
+        self._near = self.sizes[near]
+        self.strides = np.where(near, 1, self._stride)
+        self._sums, self._terms = np.zeros(len(self.sizes)), np.zeros(len(self.sizes), np.int64)
+        self._points = _Points(count, self._stride, summed=statistic.modified)
+        self._rest, self._rest_gaps = np.empty(0), None
+        direct = statistic.modified or not correlate or len(self._near) < FEW
+        self._lagged = None if direct else LaggedProducts()
+        self.add(Piece(np.zeros(1), None))
+
+    def add(self, piece: Piece) -> None:
+        """The next piece of the running sum."""
+        self._points.add(piece)
+        if not len(self._near):
+            return
+        if piece.missing is not None or self._rest_gaps is not None:
+            old = np.zeros(len(self._rest), np.int64) if self._rest_gaps is None else self._rest_gaps
+            new = np.zeros(len(piece.x), np.int64) if piece.missing is None else piece.missing
+            self._rest_gaps = np.concatenate([old, new])
+        if self._lagged is not None and self._rest_gaps is not None:
+            self._close_lagged(self._lagged)
+        self._rest = np.concatenate([self._rest, piece.x])
+        done = 0
+        while len(self._rest) - done >= 2 * BLOCK:
+            if self._lagged is None:
+                self._difference(slice(done, done + 2 * BLOCK), BLOCK)
+            else:
+                if self._lagged.is_empty:
+                    self._lagged.add(self._rest[done : done + BLOCK])
+                self._lagged.add(self._rest[done + BLOCK : done + 2 * BLOCK])
+            done += BLOCK
+        self._rest = self._rest[done:]
+        self._rest_gaps = None if self._rest_gaps is None else self._rest_gaps[done:]
+
+    def _difference(self, window: slice, starts: int | None) -> None:
+        """Adds the terms that begin in a window of x: the first `starts` of them, or all that fit."""
+        x = self._rest[window]
+        gaps = None if self._rest_gaps is None else self._rest_gaps[window]
+        for i, size in enumerate(self._near):
+            total, terms = self._sum(x, gaps, int(size), starts, summed=False)
+            self._sums[i] += total
+            self._terms[i] += terms
+
+    def _sum(self, x: Array, missing: Counts | None, m: int, starts: int | None, *, summed: bool) -> tuple[float, int]:
+        p = self._statistic.differences
+        stop = max(0, len(x) - p * m + self._statistic.modified) if starts is None else starts
+        if self._statistic.modified:
+            return sum_of_smoothed_squares(x, missing, m, 3 * m - (not summed), stop)
+        return sum_of_squares(x, missing, m, p, stop)
+
+    def _close_lagged(self, lagged: LaggedProducts) -> None:
+        """Takes over what the correlations gave; the terms after it are differenced one by one."""
+        self._lagged = None
+        if lagged.starts:
+            order = self._statistic.differences
+            sums, squares = lagged.sums(self._near, order, self._rest[:BLOCK])
+            if worst_rounding(sums, squares, order) > ROUNDING:
+                raise RoundingTooLarge
+            self._sums[: len(sums)] += sums
+            self._terms[: len(sums)] += lagged.starts
+
+    def finish(self) -> tuple[Array, NDArray[np.int64]]:
+        """Sums and numbers of terms at `sizes`, (k,) each, after the last piece."""
+        if self._lagged is not None:
+            self._close_lagged(self._lagged)
+        if len(self._near):
+            self._difference(slice(None), None)
+        for i in range(len(self._near), len(self.sizes)):
+            m = int(self.sizes[i]) // self._stride
+            x, missing = self._points.x, self._points.missing
+            self._sums[i], self._terms[i] = self._sum(x, missing, m, None, summed=self._stride > 1)
+        return self._sums, self._terms
+
+    def starts(self) -> NDArray[np.int64]:
+        """The starts that fit, gaps or not, (k,)."""
+        whole = np.array([self._statistic.starts(self._count, int(m)) for m in self.sizes], np.int64)
+        return (whole - 1) // self.strides + 1
