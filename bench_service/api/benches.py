@@ -1,14 +1,33 @@
 """Benches: what they are, what they are doing, and the software stop."""
 
 from fastapi import APIRouter
+from pydantic import BaseModel, Field
 
 from bench_service.api.dependencies import Service
 from bench_service.api.errors import problems
-from bench_service.api.schemas import BenchView, Stopping
 from bench_service.jobs.errors import NotFound
 from bench_service.jobs.service import BenchService
+from procedures.bench import BenchDescription
 
 router = APIRouter(prefix="/api/v1/benches", tags=["benches"])
+
+
+class BenchView(BaseModel):
+    """A bench: what is declared of it, and what it is doing."""
+
+    id: str
+    description: BenchDescription
+    state: str = Field(description='"idle" or "busy"')
+    job: str | None = Field(description="The job that drives it")
+    units: list[str] = Field(description="Units that it can test")
+
+
+class Stopping(BaseModel):
+    """The answer to a stop. Software is not the emergency stop: that is a hardware circuit beside the table."""
+
+    bench: str
+    job: str | None = Field(description="The job that was running; its bench is safe once it is cancelled")
+    note: str = "This is a software stop. The emergency stop is a hardware circuit beside the table."
 
 
 def _view(service: BenchService) -> BenchView:

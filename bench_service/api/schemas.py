@@ -8,7 +8,6 @@ from pydantic import BaseModel, Field
 from bench_service.jobs.driver import TrueTriad
 from bench_service.jobs.job import Event, Failure, Job, JobState
 from bench_service.jobs.stored import RecordingState, StoredCalibration, StoredRecording, StoredResult
-from procedures.bench import BenchDescription
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import Channel, Station
@@ -285,24 +284,6 @@ class UnitView(BaseModel):
             averaging_time_s=unit.averaging_time_s,
             calibration=unit.calibration_id,
         )
-
-
-class BenchView(BaseModel):
-    """A bench: what is declared of it, and what it is doing."""
-
-    id: str
-    description: BenchDescription
-    state: str = Field(description='"idle" or "busy"')
-    job: str | None = Field(description="The job that drives it")
-    units: list[str] = Field(description="Units that it can test")
-
-
-class Stopping(BaseModel):
-    """The answer to a stop. Software is not the emergency stop: that is a hardware circuit beside the table."""
-
-    bench: str
-    job: str | None = Field(description="The job that was running; its bench is safe once it is cancelled")
-    note: str = "This is a software stop. The emergency stop is a hardware circuit beside the table."
 
 
 class Truth(BaseModel):

@@ -6,7 +6,6 @@ from procedures.core.imu_model import TriadCalibration
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import Channel
 
-
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
 """Form of a serial: what can stand in an address and in a file name."""
 
