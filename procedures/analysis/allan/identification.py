@@ -25,7 +25,9 @@ def lag1_exponent(x: Array, most_differences: int) -> float:
     lag-1 autocorrelation; then ``α = 2 − 2(δ + d)``, d the number of differences.
     """
     t = np.linspace(-1.0, 1.0, len(x))
-    z = x - np.polynomial.legendre.legval(t, np.polynomial.legendre.legfit(t, x, 2))
+    z = x - np.mean(x)
+    for shape in (t, t**2 - np.mean(t**2)):  # orthogonal to one another and to a constant
+        z = z - shape * (np.dot(shape, z) / np.dot(shape, shape))
     for d in range(most_differences + 1):
         z = z - np.mean(z)
         power = float(np.dot(z, z))

@@ -1,11 +1,10 @@
 """The sums of the overlapping members, from pieces of any length, in bounded memory.
 
-Overlapping members of a long series are taken at two resolutions. Cluster sizes up to a limit use every start k
-(exact). Larger ones use the running sum at every s-th sample only: each cluster mean is still exact, but the starts
-are 0, s, 2s…, at least `POINTS` of them where they fit, and the cluster sizes multiples of s. What that costs depends
-on the noise. Where σ̂(τ) has the relative standard deviation ρ, starts every s of m samples differ from all starts by
-about ρ·s/m where the rate is white or redder (below 0.01 %), and by ``1/√(2·POINTS·18/35)`` ≈ 0.1 % (one sigma) where
-white angle noise rules beyond the limit too. A series of up to `WHOLE` samples is exact at every size.
+A series of up to `WHOLE` samples is exact at every size. A longer one is taken at two resolutions: cluster sizes up
+to `exact_limit` use every start k, larger ones the running sum at every s-th sample only. Each cluster mean is still
+exact, but the starts are 0, s, 2s… (4s, beyond `LONG`·s), and the cluster sizes multiples of that. What it costs
+depends on the noise. Where the rate is white or redder neighbouring starts hardly differ: below 0.01 %. Where white
+angle noise still rules there, every start counts: ``1/√(2·POINTS·18/35)`` ≈ 0.1 %, one sigma.
 """
 
 import numpy as np
@@ -22,7 +21,9 @@ WHOLE = 1 << 21
 """A series up to this length is held and differenced whole."""
 POINTS = 1 << 20
 """Of a longer one, at least so many points are held."""
-SMOOTH = 64
+LONG = 1 << 14
+"""Of sizes of so many held points every fourth point is a start."""
+SMOOTH = 16
 """A modified statistic is smooth over its own cluster: so many starts a cluster are as good as all."""
 FEW = 16
 """Fewer cluster sizes are differenced faster than correlated."""
@@ -43,11 +44,19 @@ def exact_limit(statistic: Statistic, count: int) -> int:
     return min(near, SMOOTH * stride_of(count)) if statistic.modified else near
 
 
+def strides_of(sizes: Sizes, statistic: Statistic, count: int) -> Sizes:
+    """Samples between the starts that a size uses: 1, s, or 4s for sizes of at least `LONG` held points."""
+    s = stride_of(count)
+    if s == 1 or not statistic.overlapping:
+        return np.ones(len(sizes), np.int64)
+    longest = np.where((sizes >= LONG * s) & (not statistic.modified), 4 * s, s)
+    return np.where(sizes <= exact_limit(statistic, count), 1, longest)
+
+
 def snapped_sizes(sizes: Sizes, statistic: Statistic, count: int) -> Sizes:
-    """The sizes as they will be computed: those beyond the exact limit are multiples of the stride."""
-    s, limit = stride_of(count), exact_limit(statistic, count)
-    far = np.minimum(np.round(sizes / s).astype(np.int64), statistic.largest(count) // s) * s
-    return np.unique(np.where(sizes <= limit, sizes, far))
+    """The sizes as they will be computed: multiples of the strides they use."""
+    s = strides_of(sizes, statistic, count)
+    return np.unique(np.minimum(np.round(sizes / s).astype(np.int64), statistic.largest(count) // s) * s)
 
 
 class RoundingTooLarge(UnfitRecording):
@@ -94,9 +103,8 @@ class OverlappingSums:
         self._statistic, self._count = statistic, count
         self._stride = stride_of(count)
         self.sizes = snapped_sizes(sizes, statistic, count)
-        near = self.sizes <= exact_limit(statistic, count) if self._stride > 1 else np.zeros(len(self.sizes), bool)
-        self._near = self.sizes[near]
-        self.strides = np.where(near, 1, self._stride)
+        self.strides = strides_of(self.sizes, statistic, count)
+        self._near = self.sizes[self.strides < self._stride]
         self._sums, self._terms = np.zeros(len(self.sizes)), np.zeros(len(self.sizes), np.int64)
         self._points = _Points(count, self._stride, summed=statistic.modified)
         self._rest, self._rest_gaps = np.empty(0), None
@@ -161,9 +169,12 @@ class OverlappingSums:
             self._close_lagged(self._lagged)
         if len(self._near):
             self._difference(slice(None), None)
+        points, gaps = self._points.x, self._points.missing
+        held = {f: (points[::f].copy(), None if gaps is None else gaps[::f].copy()) for f in (1, 4)}
         for i in range(len(self._near), len(self.sizes)):
-            m = int(self.sizes[i]) // self._stride
-            x, missing = self._points.x, self._points.missing
+            step = int(self.strides[i]) // self._stride
+            m = int(self.sizes[i]) // int(self.strides[i])
+            x, missing = held[step]
             self._sums[i], self._terms[i] = self._sum(x, missing, m, None, summed=self._stride > 1)
         return self._sums, self._terms
 
