@@ -47,9 +47,10 @@ class BandStream:
     """The band of one channel from blocks, for sizes with a step in decades; bounded memory (about 40 MB).
 
     Up to `WHOLE` samples the band is exact. Beyond, the offsets are thinned evenly: about `POINTS` squared differences
-    remain at each size (of the smallest sizes, four times as many, from every stretch of the record). The mean is then good to 0.1 %, and so are the extremes where the rate is white or
-    redder, since neighbouring starts hardly differ. Where white angle noise rules, every start is an independent draw,
-    and the extremes are those of the starts taken. Gaps are refused.
+    remain at each size (of the smallest sizes four times as many, from every stretch of the record). The mean is then
+    good to 0.1 %, and so are the extremes where the rate is white or redder, since neighbouring starts hardly differ.
+    Where white angle noise rules, every start is an independent draw, and the extremes are those of the starts taken.
+    Gaps are refused.
     """
 
     def __init__(
