@@ -25,7 +25,7 @@ ROUTERS = (procedures, jobs, recordings, analyses, units, benches, health)
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> BenchService:
-    """A service that works; `closing` undoes everything in reverse order.
+    """A service that is ready to begin; `closing` undoes everything in reverse order.
 
     With `drive` it holds the bench's lease and runs jobs; without, it reads and analyses beside a process that does.
     Raises `BenchBusy`, `StorageFailure`, `NotMounted`.
@@ -43,7 +43,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
         worker = Worker(JobRunner(stores, planner, driver, code, lease.held), partial(_engine, settings, stores))
     service = BenchService(stores, driver, planner, worker, code)
     closing.callback(service.stop)
-    service.start(warm_up=[figures.warm_up])
+    service.register()
     return service
 
 
@@ -60,6 +60,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncGenerator[None]:
+        service.begin(warm_up=[figures.warm_up])
         try:
             yield
         finally:

@@ -78,15 +78,18 @@ class BenchService:
         """Every method by name."""
         return methods.discover()
 
-    def start(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
-        """Register the bench and its units, then begin to work. The bench's lease must be held.
-
-        `warm_up` is called beside the first answers, once the engine runs and the numerics are loaded.
-        """
+    def register(self) -> None:
+        """Remember the bench and its units, and forget what crashed imports left."""
         self.stores.units.put_bench(self.driver.description)
         self.stores.recordings.discard_open_imports(now() - CRASHED_IMPORT)
         for unit in self.driver.mounted():
             self._register(unit)
+
+    def begin(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
+        """Begin to work, beside the first answers. The bench's lease must be held.
+
+        `warm_up` is called once the engine runs and the numerics are loaded.
+        """
         if self._worker is not None:
             self._worker.begin([lambda: (self.planner.catalog, self.methods), *warm_up])
 
