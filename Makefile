@@ -30,7 +30,7 @@ validate: $(VENV)/.ready  ## Monte Carlo against theory over 1000 simulated unit
 	@$(BIN)/python -m tests.validation.calibration
 
 bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
-	@$(BIN)/python -m tests.benchmarks
+	@$(BIN)/python -m tests.benchmarks; kept=$$?; $(BIN)/python -m tests.benchmarks.allan && exit $$kept
 
 lock: $(VENV)/.ready  ## compile requirements.lock anew
 	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev pyproject.toml -o requirements.lock

@@ -1,4 +1,7 @@
-"""The commands. Each says what it did to standard output, and what went wrong to standard error."""
+"""The commands. Each says what it did to standard output, and what went wrong to standard error.
+
+Tables and progress bars are imported by the commands that show them: a server that starts does not wait for them.
+"""
 
 import json
 import sys
@@ -10,8 +13,6 @@ from rich.console import Console
 
 from bench_service.cli.client import call, connect, sentence
 from bench_service.cli.refusal import Refused
-from bench_service.cli.tables import check_table, job_table
-from bench_service.cli.watching import exit_code, watch
 from bench_service.jobs.errors import ServiceError
 from bench_service.settings import Settings
 
@@ -97,6 +98,9 @@ def run(
     as_json: AsJson = False,
 ) -> int:
     """Run a procedure on a unit and wait for its verdict."""
+    from bench_service.cli.tables import check_table
+    from bench_service.cli.watching import exit_code, watch
+
     body = {"procedure": procedure, "unit": unit, "parameters": dict(map(_parameter, set_)), "seed": seed}
     with connect(context.obj, server, drive=True) as client:
         job = watch(client, call(client, "POST", "/api/v1/jobs", json=body), errors)
@@ -137,6 +141,9 @@ def analyse(
     as_json: AsJson = False,
 ) -> int:
     """Run a method on stored recordings or calibrations."""
+    from bench_service.cli.tables import check_table
+    from bench_service.cli.watching import exit_code
+
     body = {
         "method": method,
         "recordings": recording,
@@ -191,6 +198,8 @@ def jobs(
     as_json: AsJson = False,
 ) -> None:
     """List jobs, newest first."""
+    from bench_service.cli.tables import job_table
+
     query = {k: v for k, v in {"state": state, "unit": unit, "limit": limit}.items() if v is not None}
     with connect(context.obj, server, drive=False) as client:
         page = call(client, "GET", "/api/v1/jobs", params=query)

@@ -18,7 +18,8 @@ with warnings.catch_warnings():
 
 RATE_HZ = 400.0
 SAMPLES = 8_640_000
-SIZES = 200
+SIZES = 226
+"""Log-spaced; 200 of them differ as whole numbers."""
 BAND_SAMPLES = 180_000_000
 BLOCK = 1 << 20
 EXACT = (1, 30, 300, 3_000, 30_000, 300_000, 3_000_000, 30_000_000)

@@ -115,12 +115,13 @@ STABLE32 = [  # statistic, samples, then rows of m, α, least, sigma, greatest a
 def test_the_intervals_that_stable32_prints(statistic: Statistic, count: int, rows: str) -> None:
     """From its own sigma and exponent, so that only degrees of freedom and interval are on trial.
 
-    To the five digits printed, of sigma and limit each (and the four of the edf's tables), where the degrees of freedom are fewer than 100. Above, all
-    its intervals are narrower than ours by 0.6 % of their width: it has an approximate quantile there.
+    To the five digits printed, of sigma and limit each (and the four of the edf's tables), where the degrees of
+    freedom are fewer than 100. Above, all its intervals are narrower than ours by 0.6 % of their width: it has an
+    approximate quantile there.
     """
     for row in rows.splitlines():
         m, alpha, least, sigma, greatest = (float(word) for word in row.split())
-        edf = degrees_of_freedom(statistic, int(alpha), int(m), count)
+        edf = degrees_of_freedom(statistic, int(alpha), int(m), count, averaged=True)
         lower, upper = interval(np.array([sigma]), np.array([edf]), ONE_SIGMA)
         if edf < 100:
             assert (lower[0], upper[0]) == pytest.approx((least, greatest), rel=1.5e-4), row

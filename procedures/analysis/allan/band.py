@@ -26,6 +26,8 @@ POINTS = 1 << 20
 """Of a longer one, half as many to as many points are held; of the sizes below, about so many terms are taken."""
 STARTS = 128
 """Sizes of at least so many held points start at the points; smaller ones at chosen samples, exactly."""
+LONG, THIN = 1 << 11, 4
+"""Sizes of at least `LONG` held points start at every `THIN`-th of them."""
 _CHUNK = 1 << 20
 _CACHED = 1 << 15
 
@@ -47,7 +49,7 @@ class BandStream:
     """The band of one channel from blocks, for sizes with a step in decades; bounded memory (about 40 MB).
 
     Up to `WHOLE` samples the band is exact. Beyond, the offsets are thinned evenly: about `POINTS` squared differences
-    remain at each size (of the smallest sizes four times as many, from every stretch of the record). The mean is then
+    remain at each size (of the smallest sizes twice as many, from every stretch of the record). The mean is then
     good to 0.1 %, and so are the extremes where the rate is white or redder, since neighbouring starts hardly differ.
     Where white angle noise rules, every start is an independent draw, and the extremes are those of the starts taken.
     Gaps are refused.
@@ -68,7 +70,9 @@ class BandStream:
         self._stride = s = 1 if count <= WHOLE else 1 << ceil(log2(count / POINTS))
         self._near = [_Near(int(m), count) for m in wanted if s > 1 and m < STARTS * s]
         far = wanted[len(self._near) :]
-        self._far = np.unique(np.minimum(np.round(far / s).astype(np.int64), (count // s) // 2))
+        thin = np.where((far >= LONG * s) & (s > 1), THIN, 1)
+        far = np.minimum(np.round(far / (thin * s)).astype(np.int64), count // (2 * s * thin)) * thin
+        self._far = np.unique(far)
         self._points = np.zeros(count // s + 1)
         self._x = np.zeros(1)
         self._first, self._index = 0, 1
@@ -104,7 +108,14 @@ class BandStream:
             self._take()
             rows += [_row(near.m, *near.finish(self._x, self._first)) for near in self._near]
             self._x = np.empty(0)
-        rows += [_row(int(m) * self._stride, *start_sums(self._points, int(m))) for m in self._far]
+        thin = self._points[::THIN].copy()
+        for size in self._far:
+            m = int(size)
+            if self._stride > 1 and m >= LONG and m % THIN == 0:
+                sums, terms = start_sums(thin, m // THIN)
+            else:
+                sums, terms = start_sums(self._points, m)
+            rows.append(_row(m * self._stride, sums, terms))
         table = np.array(rows)
         sizes = table[:, 0].astype(np.int64)
         return Band(sizes, sizes / self._rate_hz, table[:, 1], table[:, 2], table[:, 3], table[:, 4].astype(np.int64))
@@ -145,7 +156,7 @@ class _Near:
         self.m = m
         self._offsets = max(1, min(m, POINTS * m // count))
         self._spread = m // self._offsets
-        self._share = min(1.0, 4.0 * POINTS * m / count)
+        self._share = min(1.0, 2.0 * POINTS * m / count)
         self._sums, self._terms = np.zeros(self._offsets), 0
         self._row = 0
 
@@ -156,9 +167,10 @@ class _Near:
         for a in range(0, rows, height):
             shape = (min(height, rows - a) + 2, columns)
             ends = as_strided(x[a * self.m :], shape, (self.m * step, self._spread * step), writeable=False)
-            means = ends[1:] - ends[:-1]
-            d = means[1:] - means[:-1]
-            self._sums[:columns] += np.dot(d[:, 0], d[:, 0]) if columns == 1 else np.einsum("ij,ij->j", d, d)
+            means = np.diff(ends.copy().ravel() if columns == 1 else ends.copy(), axis=0)
+            means[:-1] -= means[1:]
+            d = means[:-1]
+            self._sums[:columns] += np.dot(d, d) if columns == 1 else np.einsum("ij,ij->j", d, d)
 
     def add(self, x: Array, first: int) -> None:
         """Its share of the terms that fit into `x`, which begins at sample `first`, for every offset."""

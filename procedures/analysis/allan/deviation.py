@@ -137,8 +137,8 @@ def deviation(
 ) -> Deviation:
     """The deviation of one channel held in memory, (n,); see `DeviationStream`.
 
-    Where the channel wanders so far that the fast sums would lose more than a millionth, it is differenced term by
-    term.
+    Where the channel wanders so far that the fast sums would lose more than a hundred-thousandth, it is differenced
+    term by term.
     """
     for correlate in (True, False):
         stream = DeviationStream(

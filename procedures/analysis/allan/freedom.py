@@ -49,12 +49,14 @@ _FLICKER = {2: (15.23, 12.0), 3: (47.8, 40.0)}  # d: b0, b1 of Table 3
 
 
 @cache
-def degrees_of_freedom(statistic: Statistic, alpha: int, m: int, count: int) -> float:
+def degrees_of_freedom(statistic: Statistic, alpha: int, m: int, count: int, *, averaged: bool = False) -> float:
     """edf of a member of the family at cluster size m of `count` samples, for the exponent α (see `identification`).
 
     d is the statistic's order, S the starts a cluster (m overlapping, else 1), L the samples of x in one term, M the
     terms, ``r = M/S`` and ``J = min(M, (d + 1)S)``. Every case is ``1/edf = Σ_j w_j s_z(j/S)² / (s_z(0)² M)`` or the
-    fit of it for large J. Raises `BadParameter` where ``α + 2d ≤ 1`` (the variance does not converge).
+    fit of it for large J. The published algorithm (and Stable32) takes x as ``averaged`` over the sample period; an
+    integrated rate is not: a white rate at m = 1 has edf = 2N/3, not 0.78 N. It matters up to m = 33. Raises
+    `BadParameter` where ``α + 2d ≤ 1`` (the variance does not converge).
     """
     d = statistic.order
     if not (-2 * d < alpha - 1 and alpha <= 2):
@@ -63,14 +65,14 @@ def degrees_of_freedom(statistic: Statistic, alpha: int, m: int, count: int) -> 
     length = m * d + (m if statistic.modified else 1)
     terms = 1 + s * (count + 1 - length) // m
     r, j = terms / s, min(terms, (d + 1) * s)
-    if statistic.modified:
+    if statistic.modified and (m > 1 or averaged):
         return 1.0 / _inverse_modified(alpha, d, r, j, terms, s)
     if alpha == 2:
         return 1.0 / _inverse_white_angle(d, r, terms)
     if alpha == 1:
         return 1.0 / _inverse_flicker_angle(d, m, r, j, terms, s)
     if j <= _MOST:
-        return 1.0 / _sum(j, terms, s, m if m * (d + 1) <= _MOST else inf, alpha, d)
+        return 1.0 / _sum(j, terms, s, m if averaged and m * (d + 1) <= _MOST else inf, alpha, d)
     if r >= d + 1:
         a0, a1 = _UNMODIFIED[alpha, d]
         return r / (a0 - a1 / r)

@@ -12,6 +12,8 @@ from procedures.core.arrays import Array
 
 FEWEST = 30
 """Below so many points the method decides nothing."""
+SURE = 120
+"""With so many points a rounded exponent rarely errs."""
 MOST = 4096
 """More points than these do not change a rounded exponent."""
 _HELD = 1 << 17
@@ -58,18 +60,22 @@ class LatePoints:
         self._index += len(piece.x)
 
     def exponents(self, sizes: Sizes, order: int) -> Array:
-        """α rounded at each size (k,), for a statistic's order; where points are too few, that of the smaller size.
+        """α rounded at each size (k,), for a statistic's order, −2 (Allan) or −4 (Hadamard) to 2.
 
-        Clipped to what the statistic can tell apart and converges for: −2 (Allan) or −4 (Hadamard) to 2.
+        Where fewer than `FEWEST` points are left, that of the smaller size. Taking every m-th point folds flicker angle
+        noise into what looks white, and few points scatter, so α does not rise where it is known better already: from
+        flicker to white angle noise, or with fewer than `SURE` points at all.
         """
         alpha = np.zeros(len(sizes))
-        before = 0.0
+        before: float | None = None
         for i, size in enumerate(sizes):
             m = int(size)
             points, step = (self._late, m) if m < self._stride else (self._points, m // self._stride)
             x = points[::-step][:MOST][::-1]
             if len(x) >= FEWEST:
-                least = -2.0 if order == 2 else -4.0
-                before = float(np.clip(np.round(lag1_exponent(x, order)), least, 2.0))
-            alpha[i] = before
+                found = float(np.clip(np.round(lag1_exponent(x, order)), -2.0 if order == 2 else -4.0, 2.0))
+                if before is not None and (before == 1.0 or len(x) < SURE):
+                    found = min(found, before)
+                before = found
+            alpha[i] = before or 0.0
         return alpha

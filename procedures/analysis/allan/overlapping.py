@@ -27,7 +27,9 @@ SMOOTH = 16
 """A modified statistic is smooth over its own cluster: so many starts a cluster are as good as all."""
 FEW = 16
 """Fewer cluster sizes are differenced faster than correlated."""
-ROUNDING = 1e-6
+FIRST_RUN, RUN = 1 << 20, 1 << 23
+"""Starts that are correlated before a new line is taken off the running sum."""
+ROUNDING = 1e-5
 """The worst relative rounding of a sum that passes."""
 
 
@@ -110,6 +112,7 @@ class OverlappingSums:
         self._rest, self._rest_gaps = np.empty(0), None
         direct = statistic.modified or not correlate or len(self._near) < FEW
         self._lagged = None if direct else LaggedProducts()
+        self._run, self._began_at = FIRST_RUN, 0.0
         self.add(Piece(np.zeros(1), None))
 
     def add(self, piece: Piece) -> None:
@@ -131,7 +134,10 @@ class OverlappingSums:
             else:
                 if self._lagged.is_empty:
                     self._lagged.add(self._rest[done : done + BLOCK])
+                    self._began_at = float(self._rest[done])
                 self._lagged.add(self._rest[done + BLOCK : done + 2 * BLOCK])
+                if self._lagged.starts >= self._run:
+                    self._begin_run(self._lagged, float(self._rest[done + BLOCK]))
             done += BLOCK
         self._rest = self._rest[done:]
         self._rest_gaps = None if self._rest_gaps is None else self._rest_gaps[done:]
@@ -152,12 +158,18 @@ class OverlappingSums:
             return sum_of_smoothed_squares(x, missing, m, 3 * m - (not summed), stop)
         return sum_of_squares(x, missing, m, p, stop)
 
+    def _begin_run(self, lagged: LaggedProducts, x: float) -> None:
+        """Ends a run of correlated blocks, and begins one along its mean rate, which x does not leave far."""
+        self._close_lagged(lagged)
+        self._lagged = LaggedProducts(x, (x - self._began_at) / lagged.starts)
+        self._run = RUN
+
     def _close_lagged(self, lagged: LaggedProducts) -> None:
         """Takes over what the correlations gave; the terms after it are differenced one by one."""
         self._lagged = None
         if lagged.starts:
             order = self._statistic.differences
-            sums, squares = lagged.sums(self._near, order, self._rest[:BLOCK])
+            sums, squares = lagged.sums(self._near, order)
             if worst_rounding(sums, squares, order) > ROUNDING:
                 raise RoundingTooLarge
             self._sums[: len(sums)] += sums
