@@ -17,6 +17,7 @@ from sqlalchemy import URL, Connection, create_engine, make_url, text
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.pool import NullPool
 
+from bench_service import wall_clock
 from bench_service.jobs.errors import BenchBusy
 from bench_service.persistence.database import storage_errors
 
@@ -38,6 +39,16 @@ def acquire_lease(database_url: str, bench_id: str) -> BenchLease:
         return ServerLease(url, bench_id)
 
 
+def _written_holder(file: int) -> str:
+    """The process id in a lock file; its holder writes it a moment after it took the lock."""
+    for _ in range(20):
+        holder = os.pread(file, 32, 0).decode(errors="replace").strip()
+        if holder:
+            return holder
+        wall_clock.pause(0.01)
+    return ""
+
+
 class FileLease:
     """A locked file, with the holder's process id in it."""
 
@@ -48,7 +59,7 @@ class FileLease:
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            holder = os.read(self._file, 32).decode(errors="replace").strip()
+            holder = _written_holder(self._file)
             os.close(self._file)
             raise BenchBusy(f"bench {bench_id!r} is driven by {_process(holder)}") from None
         os.ftruncate(self._file, 0)
