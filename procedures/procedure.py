@@ -1,8 +1,8 @@
 """What a catalogue file provides: a procedure is three functions and a little around them."""
 
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
@@ -19,6 +19,10 @@ class Parameters(BaseModel):
     """Base of every parameter model: unknown names are refused, NaN and infinity too."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def filled(self, defaults: Mapping[str, Any]) -> Self:
+        """The same parameters with each None replaced by its default, where there is one."""
+        return self.model_copy(update={name: value for name, value in defaults.items() if getattr(self, name) is None})
 
 
 class Outcome(BaseModel):

@@ -3,6 +3,7 @@
 import os
 import shutil
 import socket
+import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from uuid import uuid4
@@ -13,6 +14,7 @@ import pytest
 import sqlalchemy as sa
 
 from bench_service.persistence import open_stores
+from tests.shared_data import SHARED_DATA
 
 
 @pytest.fixture(scope="session")
@@ -112,10 +114,9 @@ def _drop(server: str, name: str) -> None:
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The real recordings with their reference results; the test is skipped where they are absent."""
-    folder = Path(os.environ.get("SHARED_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
-    if not folder.is_dir():
-        pytest.skip(f"no recordings in {folder}")
-    return folder
+    if not SHARED_DATA.is_dir():
+        pytest.skip(f"no recordings in {SHARED_DATA}")
+    return SHARED_DATA
 
 
 @pytest.fixture(scope="session")
@@ -138,3 +139,18 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 24 MB."""
+    folder = tmp_path / "small"
+    folder.mkdir()
+    mount, umount = shutil.which("mount"), shutil.which("umount")
+    if os.geteuid() != 0 or mount is None or umount is None:
+        pytest.skip("a small file system can only be mounted by root")
+    tried = subprocess.run([mount, "-t", "tmpfs", "-o", "size=24m", "tmpfs", folder], capture_output=True, check=False)
+    if tried.returncode != 0:
+        pytest.skip("a small file system cannot be mounted here")
+    yield folder
+    subprocess.run([umount, "--lazy", folder], check=True)

@@ -83,12 +83,3 @@ def decode_chunk(payload: bytes, names: Sequence[str]) -> RawArray:
     for index, column in enumerate(columns):
         out[:, index] = column
     return out
-
-
-def chunk_place(payload: bytes) -> ChunkPlace:
-    """What a payload says of itself. Raises `UnreadableChunk`."""
-    try:
-        metadata = pq.read_schema(pa.BufferReader(payload)).metadata or {}
-        return ChunkPlace(metadata[b"recording"].decode(), int(metadata[b"start_sample"]), float(metadata[b"rate_hz"]))
-    except (pa.ArrowException, OSError, KeyError, ValueError) as error:
-        raise UnreadableChunk(str(error)) from error

@@ -19,7 +19,6 @@ BYTES_PER_SAMPLE = 2
 """What a stored sample is allowed to weigh (design.md, budgets); a preview says what a plan may need at most."""
 
 CONTEXT = TypeAdapter(Context)
-STATIONS = TypeAdapter(tuple[Station, ...])
 
 AnyProcedure = Procedure[Parameters, Outcome]
 

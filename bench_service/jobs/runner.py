@@ -108,7 +108,7 @@ class JobRunner:
         job = self._stores.jobs.get(job_id)
         procedure = self._planner.procedure(job.procedure)
         try:
-            recordings = [self._stores.recordings.load(r.info.id) for r in self._stores.recordings.of_job(job_id)]
+            recordings = recordings_of(self._stores, job_id)
             result = analysed(job, procedure, job.parameters, recordings, self._code_version)
             stored = self._stores.results.add(
                 result.stored, result.calibrations, idempotency=Idempotency(f"job:{job_id}", job_id)
@@ -166,6 +166,11 @@ class Analysed:
 
     stored: StoredResult
     calibrations: tuple[Any, ...]
+
+
+def recordings_of(stores: Stores, job_id: str) -> list[Recording]:
+    """A job's complete recordings for an analysis, in the order of their stations."""
+    return [stores.recordings.load(stored.info.id) for stored in stores.recordings.of_job(job_id)]
 
 
 def analysed(

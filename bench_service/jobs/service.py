@@ -15,7 +15,7 @@ from bench_service.jobs.driver import BenchDriver, TrueTriad
 from bench_service.jobs.errors import IllegalTransition, NotDriving, NotFound
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.planning import CONTEXT, Plan, Planner
-from bench_service.jobs.runner import analysed
+from bench_service.jobs.runner import analysed, recordings_of
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import Idempotency, NewRecording, RecordingState, StoredResult
 from bench_service.jobs.worker import Worker
@@ -157,7 +157,7 @@ class BenchService:
     def analyse_again(self, job_id: str, parameters: dict[str, Any], key: str | None = None) -> StoredResult:
         """Analyse a job's recordings with other parameters; the first result stays as it is."""
         job = self.stores.jobs.get(job_id)
-        recordings = [self.stores.recordings.load(r.info.id) for r in self.stores.recordings.of_job(job_id)]
+        recordings = recordings_of(self.stores, job_id)
         if len(recordings) < len(job.stations):
             raise UnfitRecording(f"job {job_id} has {len(recordings)} of its {len(job.stations)} recordings")
         merged = {**job.requested_parameters, **parameters}
@@ -169,8 +169,9 @@ class BenchService:
         """Run a method on stored recordings or calibrations. Raises `NotFound`, `DomainError`, `ValidationError`."""
         method = self.method(request.method)
         params = method.params.model_validate(request.parameters)
-        evidence = self._evidence(request)
         used = [self.stores.results.calibration(c) for c in request.calibrations]
+        dated = tuple(DatedCalibration(c.id, c.made_at.isoformat(), c.triads) for c in used)
+        evidence = Evidence(self._complete(request.recordings), dated)
         units = {r.info.unit for r in evidence.recordings} | {c.unit for c in used}
         if len(units) > 1:
             raise UnfitRecording(f"the evidence is of several units: {', '.join(sorted(units))}")
@@ -241,17 +242,13 @@ class BenchService:
             return Report(f"{result.name} is no longer in the catalogue; the document below is as it was stored.")
         return entry.report(entry.result.model_validate(result.document))
 
-    def _evidence(self, request: AnalysisRequest) -> Evidence:
-        recordings: list[Recording] = []
-        for recording_id in request.recordings:
+    def _complete(self, ids: Sequence[str]) -> tuple[Recording, ...]:
+        """Recordings by id. Raises `NotFound`, and `UnfitRecording` for one that was interrupted."""
+        for recording_id in ids:
             stored = self.stores.recordings.get(recording_id)
             if stored.state is not RecordingState.COMPLETE:
                 raise UnfitRecording(f"recording {recording_id} is {stored.state.value}: kept, but not for analysis")
-            recordings.append(self.stores.recordings.load(recording_id))
-        dated = [self.stores.results.calibration(c) for c in request.calibrations]
-        return Evidence(
-            tuple(recordings), tuple(DatedCalibration(c.id, c.made_at.isoformat(), c.triads) for c in dated)
-        )
+        return tuple(self.stores.recordings.load(recording_id) for recording_id in ids)
 
     def _register(self, unit: Unit) -> None:
         """Remember a unit that is met for the first time."""

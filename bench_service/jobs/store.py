@@ -209,12 +209,6 @@ class UnitStore(Protocol):
     def benches(self) -> tuple[BenchDescription, ...]: ...
 
 
-class Lease(Protocol):
-    """The right to drive a bench, held for a process's life."""
-
-    def release(self) -> None: ...
-
-
 @dataclass(frozen=True)
 class Stores:
     """All memory of one service."""

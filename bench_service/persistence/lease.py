@@ -23,7 +23,7 @@ from bench_service.persistence.database import storage_errors
 
 
 class BenchLease(Protocol):
-    """`bench_service.jobs.store.Lease`, and whether it is still ours."""
+    """The right to drive a bench, held for a process's life, and whether it is still ours."""
 
     def held(self) -> bool: ...
 

@@ -43,6 +43,11 @@ class BenchDescription:
     simulated: bool
     title: str = ""
 
+    @property
+    def axis_motion(self) -> tuple[tuple[float, float], ...]:
+        """(rate_deg_s, acceleration_deg_s2) of outer, middle and inner axis."""
+        return tuple((axis.rate_deg_s, axis.acceleration_deg_s2) for axis in (self.outer, self.middle, self.inner))
+
     def violations(self, angles: TableAngles) -> tuple[str, ...]:
         """One sentence for each axis whose limit the angles pass."""
         demands = (

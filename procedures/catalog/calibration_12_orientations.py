@@ -110,8 +110,7 @@ def resolve(params: Params, context: Context) -> Params:
         "pointing_sd_arcsec": accuracy.pointing_sd_arcsec,
         "level_sd_arcsec": accuracy.level_sd_arcsec,
     }
-    missing = {name: value for name, value in defaults.items() if getattr(params, name) is None}
-    return params.model_copy(update=missing)
+    return params.filled(defaults)
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
@@ -132,7 +131,7 @@ def predict(params: Params, context: Context) -> Prediction:
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     _require_scalar(params, plans[1])
     uncertainties = tuple(u for plan in plans for u in _predicted(plan))
-    duration_s = float(windows(stations, _axes(context))[-1, 1])
+    duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1])
     rests_on = basis(plans) if uncertainties else ""
     return Prediction(duration_s, uncertainties, _warnings(params, plans), rests_on)
 
@@ -199,14 +198,11 @@ def _uncertainty(params: Params, context: Context) -> TableUncertainty:
     )
 
 
-def _axes(context: Context) -> tuple[tuple[float, float], ...]:
-    bench = context.bench
-    return tuple((axis.rate_deg_s, axis.acceleration_deg_s2) for axis in (bench.outer, bench.middle, bench.inner))
-
-
 def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
     site, uncertainty = _site(params, context), _uncertainty(params, context)
-    return triad_plan(triad, context.unit, schedule(params), _axes(context), site, uncertainty, params.weighting)
+    return triad_plan(
+        triad, context.unit, schedule(params), context.bench.axis_motion, site, uncertainty, params.weighting
+    )
 
 
 def _require_scalar(params: Params, accelerometer: TriadPlan) -> None:

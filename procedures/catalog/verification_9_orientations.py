@@ -82,8 +82,7 @@ def resolve(params: Params, context: Context) -> Params:
         "azimuth_deg": site.azimuth_deg,
         "azimuth_sd_arcsec": site.azimuth_sd_arcsec,
     }
-    missing = {name: value for name, value in defaults.items() if getattr(params, name) is None}
-    return params.model_copy(update=missing)
+    return params.filled(defaults)
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
@@ -108,7 +107,7 @@ def predict(params: Params, context: Context) -> Prediction:
     params = resolve(params, context)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     uncertainties = tuple(u for plan in plans for u in _predicted(plan))
-    duration_s = float(windows(schedule(params), _axes(context))[-1, 1])
+    duration_s = float(windows(schedule(params), context.bench.axis_motion)[-1, 1])
     rests_on = basis(plans) if uncertainties else ""
     return Prediction(duration_s, uncertainties, _warnings(plans, params.limits), rests_on)
 
@@ -142,16 +141,11 @@ def _site(params: Params, context: Context) -> Site:
     return site_with(context.bench.site, p.latitude_deg, p.gravity_m_s2, p.azimuth_deg, p.azimuth_sd_arcsec)
 
 
-def _axes(context: Context) -> tuple[tuple[float, float], ...]:
-    bench = context.bench
-    return tuple((axis.rate_deg_s, axis.acceleration_deg_s2) for axis in (bench.outer, bench.middle, bench.inner))
-
-
 def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
     """Magnitudes do not see where the table really stands, so its uncertainty stays out."""
     calibration_of(context.unit, triad)
     site = _site(params, context)
-    return triad_plan(triad, context.unit, schedule(params), _axes(context), site, TableUncertainty())
+    return triad_plan(triad, context.unit, schedule(params), context.bench.axis_motion, site, TableUncertainty())
 
 
 def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:

@@ -1,8 +1,5 @@
 """Scalar calibration of two real units, held against what others found from the same recordings."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,8 +7,8 @@ from procedures.analysis.still import StillSettings, still_stretches
 from procedures.core.recording import ACCELEROMETER, Channel, MemoryRecording, Quantity, RecordingInfo
 from procedures.methods.scalar_calibration import METHOD, Result
 from procedures.procedure import Evidence
+from tests.shared_data import SHARED_DATA as DATA
 
-DATA = Path(os.environ.get("SHARED_DATA", Path(__file__).parents[3] / "shared" / "data"))
 pytestmark = [
     pytest.mark.shared_data,
     pytest.mark.skipif(not DATA.is_dir(), reason="the shared recordings are absent"),

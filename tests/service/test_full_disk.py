@@ -1,8 +1,6 @@
 """A database that cannot grow: what runs fails in words, the service still answers, and works again with space."""
 
-import os
 import shutil
-import subprocess
 from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
@@ -90,21 +88,6 @@ def test_a_job_that_fills_the_database_fails_in_words_and_the_next_one_succeeds(
         ceiling.spare_pages = None
         assert client.import_files(DESCRIPTION, noise_file(20_000)).status_code == 201
         assert client.wait(client.submit(seed=3)["id"])["state"] == "succeeded"
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Generator[Path]:
-    """A file system of 24 MB."""
-    folder = tmp_path / "small"
-    folder.mkdir()
-    mount, umount = shutil.which("mount"), shutil.which("umount")
-    if os.geteuid() != 0 or mount is None or umount is None:
-        pytest.skip("a small file system can only be mounted by root")
-    tried = subprocess.run([mount, "-t", "tmpfs", "-o", "size=24m", "tmpfs", folder], capture_output=True, check=False)
-    if tried.returncode != 0:
-        pytest.skip("a small file system cannot be mounted here")
-    yield folder
-    subprocess.run([umount, "--lazy", folder], check=True)
 
 
 @pytest.fixture

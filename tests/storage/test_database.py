@@ -111,21 +111,6 @@ def test_a_process_killed_in_mid_recording_leaves_whole_chunks(
 
 
 @pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A file system of 24 MB."""
-    folder = tmp_path / "small"
-    folder.mkdir()
-    mount, umount = shutil.which("mount"), shutil.which("umount")
-    if os.geteuid() != 0 or mount is None or umount is None:
-        pytest.skip("a small file system can only be mounted by root")
-    tried = subprocess.run([mount, "-t", "tmpfs", "-o", "size=24m", "tmpfs", folder], capture_output=True, check=False)
-    if tried.returncode != 0:
-        pytest.skip("a small file system cannot be mounted here")
-    yield folder
-    subprocess.run([umount, "--lazy", folder], check=True)
-
-
-@pytest.fixture
 def full_sqlite(small_disk: Path) -> str:
     return f"sqlite:///{small_disk / 'bench.sqlite'}"
 

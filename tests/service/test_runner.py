@@ -1,0 +1,111 @@
+"""Steps of a job that end badly: the lease is lost, the bench cannot be made safe, the engine does not start."""
+
+from collections.abc import Callable, Generator
+from typing import Any
+
+import pytest
+
+from bench_service.drivers.simulated import SimulatedDriver
+from bench_service.jobs.errors import NotDriving
+from bench_service.jobs.job import Job, JobState
+from bench_service.jobs.planning import Planner
+from bench_service.jobs.runner import JobRunner
+from bench_service.jobs.service import BenchService, JobRequest
+from bench_service.jobs.store import Stores
+from bench_service.jobs.worker import Worker
+from bench_service.persistence import open_stores
+from procedures.bench import Bench
+from procedures.bench.errors import DeviceFault
+from tests.service.client import FAST
+
+
+class IdleEngine:
+    """An engine that takes jobs and never runs them: here the test takes the steps."""
+
+    def launch(self) -> None: ...
+
+    def enqueue(self, job: Job) -> None: ...
+
+    def shut_down(self) -> None: ...
+
+
+class JammedDriver(SimulatedDriver):
+    """A bench whose table does not obey the last demand."""
+
+    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None) -> Bench:
+        bench = super().open(unit, seed, checkpoint)
+
+        async def refuse() -> None:
+            raise DeviceFault("the table's brake does not close")
+
+        bench.turntable.make_safe = refuse  # type: ignore[method-assign]
+        return bench
+
+
+@pytest.fixture
+def stores(sqlite_url: str) -> Generator[Stores]:
+    made, database = open_stores(sqlite_url)
+    yield made
+    database.dispose()
+
+
+def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], bool]) -> tuple[JobRunner, Job]:
+    """A runner, and a job of its that has begun."""
+    planner = Planner(stores, driver)
+    runner = JobRunner(stores, planner, driver, "test", lease_held)
+    worker = Worker(runner, lambda _: IdleEngine())
+    service = BenchService(stores, driver, planner, worker, "test")
+    service.register()
+    service.begin()
+    job = service.submit(JobRequest("calibration_12_orientations", "SIM-0001", parameters=FAST, seed=1))
+    assert runner.prepare(job.id) == 12
+    return runner, job
+
+
+def test_without_the_lease_no_station_is_begun(stores: Stores) -> None:
+    runner, job = prepared(stores, SimulatedDriver("sim"), lambda: False)
+    outcome = runner.acquire(job.id, 0)
+    assert outcome.failure is not None
+    assert (outcome.failure.kind, outcome.failure.station) == ("LeaseLost", 0)
+    assert runner.running_job() is None
+    runner.end_badly(job.id, outcome)
+    assert stores.jobs.get(job.id).state is JobState.FAILED
+    assert stores.recordings.of_job(job.id) == ()
+
+
+def test_a_bench_that_cannot_be_made_safe_fails_the_job_and_keeps_its_recording(stores: Stores) -> None:
+    runner, job = prepared(stores, JammedDriver("sim"), lambda: True)
+    assert runner.acquire(job.id, 0).good
+    outcome = runner.make_safe(job.id)
+    assert outcome.failure is not None
+    assert outcome.failure.kind == "NotSafe"
+    assert "brake does not close" in outcome.failure.message
+    runner.end_badly(job.id, outcome)
+    ended = stores.jobs.get(job.id)
+    assert ended.failure is not None
+    assert (ended.state, ended.failure.kind) == (JobState.FAILED, "NotSafe")
+    assert len(stores.recordings.of_job(job.id)) == 1
+    assert any("brake" in str(event.data) for event in stores.jobs.events(job.id) if event.kind == "note")
+
+
+def test_a_bench_is_made_safe_after_a_restart_in_which_nothing_was_driven(stores: Stores) -> None:
+    runner, job = prepared(stores, JammedDriver("sim"), lambda: True)
+    outcome = runner.make_safe(job.id)
+    assert outcome.failure is not None
+    assert outcome.failure.kind == "NotSafe"  # it was asked, and said no
+
+
+def test_an_engine_that_does_not_start_is_told_to_whoever_needs_it(stores: Stores) -> None:
+    driver = SimulatedDriver("sim")
+    planner = Planner(stores, driver)
+
+    def fail(_: JobRunner) -> IdleEngine:
+        raise OSError("no books")
+
+    worker = Worker(JobRunner(stores, planner, driver, "test", lambda: True), fail)
+    service = BenchService(stores, driver, planner, worker, "test")
+    service.register()
+    service.begin()
+    with pytest.raises(NotDriving, match="did not start: no books"):
+        service.ready()
+    service.stop()
