@@ -6,7 +6,10 @@ from procedures.core.recording import Station
 
 
 async def record_station(bench: Bench, station: Station) -> Stream:
-    """Power on (no-op where it is on), move, settle, and begin the station's recording."""
+    """Power off for as long as the station wants, on (no-op where it is on), move, settle, begin its recording."""
+    if station.power_off_s > 0.0:
+        await bench.supply.switch_off()
+        await bench.clock.sleep(station.power_off_s)
     await bench.supply.switch_on()
     if station.angles is not None:
         await bench.turntable.move_to(station.angles)

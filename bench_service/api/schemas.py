@@ -134,6 +134,7 @@ class RecordingView(BaseModel):
     count: int
     duration_s: float
     start_s: float
+    launched_s: float | None = Field(description="Bench time at which the unit was switched on; null: not known")
     content_hash: str = Field(description="SHA-256 of samples and channel description, whatever the chunks")
     simulated: bool
     stored_bytes: int
@@ -157,6 +158,7 @@ class RecordingView(BaseModel):
             count=info.count,
             duration_s=info.duration_s,
             start_s=info.start_s,
+            launched_s=info.launched_s,
             content_hash=info.content_hash,
             simulated=info.simulated,
             stored_bytes=stored.stored_bytes,

@@ -119,6 +119,7 @@ class BenchSession:
                 job_id=self.job.id,
                 bench=self.job.bench,
                 station=station,
+                launched_s=stream.launched_s,
             )
         )
         try:

@@ -69,6 +69,7 @@ class NewRecording:
     bench: str | None = None
     station: Station | None = None
     source: dict[str, Any] = field(default_factory=dict[str, Any])
+    launched_s: float | None = None
     idempotency: Idempotency | None = None
     """A client's key, remembered when the recording is sealed."""
 

@@ -28,6 +28,7 @@ def info_of_row(row: RecordingRow) -> RecordingInfo:
         station=station_of_row(row),
         content_hash=row.content_hash,
         simulated=row.simulated,
+        launched_s=row.launched_s,
     )
 
 
@@ -56,6 +57,7 @@ def fill_row(row: RecordingRow, new: NewRecording) -> None:
     row.channels = list(CHANNELS.dump_python(new.channels, mode="json"))
     row.rate_hz = new.rate_hz
     row.start_s = new.start_s
+    row.launched_s = new.launched_s
     row.sample_type = np.dtype(new.dtype).name
     row.simulated = new.simulated
     row.source = new.source

@@ -150,6 +150,7 @@ class RecordingRow(Table):
     channels: Mapped[list[Any]]
     rate_hz: Mapped[float] = mapped_column(Float(53))
     start_s: Mapped[float] = mapped_column(Float(53))
+    launched_s: Mapped[float | None] = mapped_column(Float(53))
     sample_type: Mapped[str]
     samples: Mapped[int] = mapped_column(BigInteger)
     chunk_rows: Mapped[int]

@@ -31,7 +31,7 @@ class StationMeans:
     mean_sd: Array
     """Standard uncertainty of the mean from the scatter of batch means within the dwell, shape (n, 3)."""
     windows: Array
-    """[start, stop] of each dwell in bench time [s], shape (n, 2)."""
+    """[start, stop] of each dwell since the first one's launch [s], shape (n, 2)."""
     counts: tuple[int, ...]
     labels: tuple[str, ...]
     angles: tuple[TableAngles | None, ...]
@@ -64,10 +64,21 @@ def station_means(recordings: Sequence[Recording], triad: str) -> StationMeans:
         np.array([s.mean for s in summaries]),
         np.array([s.scatter_sd for s in summaries]),
         np.array([s.mean_sd for s in summaries]),
-        np.array([[i.start_s, i.start_s + i.duration_s] for i in infos]),
+        np.array([[i.start_s, i.start_s + i.duration_s] for i in infos]) - (infos[0].launched_s or 0.0),
         tuple(i.count for i in infos),
         tuple(i.station.label if i.station else i.id for i in infos),
         tuple(i.station.angles if i.station else None for i in infos),
+    )
+
+
+def launch_warnings(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """A sentence where the recordings are of several launches of the unit, which an analysis takes for one."""
+    launches = {r.info.launched_s for r in recordings if r.info.launched_s is not None}
+    if len(launches) < 2:
+        return ()
+    return (
+        f"the recordings come from {len(launches)} launches of the unit: it was switched off in between, and what its "
+        "coefficients change from launch to launch is in the result but not in its uncertainties",
     )
 
 

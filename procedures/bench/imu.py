@@ -19,6 +19,8 @@ class Stream:
     start_s: float
     blocks: AsyncIterator[NDArray[np.int32]]
     station: Station | None = None
+    launched_s: float | None = None
+    """Bench time at which the unit was switched on for this launch [s]; None where unknown."""
 
 
 class Imu(Protocol):

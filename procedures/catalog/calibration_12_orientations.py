@@ -27,6 +27,7 @@ from procedures.analysis.calibration_summary import TriadSummary, coefficient_un
 from procedures.analysis.estimator import Weighting
 from procedures.analysis.reference import INPUT_UNITS, TRIAD_NAMES, site_with
 from procedures.analysis.scalar import require_scalar_determined
+from procedures.analysis.station_means import launch_warnings
 from procedures.analysis.station_plan import windows
 from procedures.analysis.table_errors import TableUncertainty
 from procedures.bench import Bench
@@ -161,7 +162,8 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
         for triad in TRIAD_NAMES
     )
     checks = tuple(c for t in triads for c in _checks(t, params.limits))
-    return Result(checks=checks, verdict=verdict(checks), warnings=_warnings(params, plans), triads=triads)
+    warnings = _warnings(params, plans) + launch_warnings(recordings)
+    return Result(checks=checks, verdict=verdict(checks), warnings=warnings, triads=triads)
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:

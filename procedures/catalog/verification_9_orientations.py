@@ -15,6 +15,7 @@ from procedures import steps
 from procedures.analysis import calibration_report as pictures
 from procedures.analysis.calibration_plan import TriadPlan, basis, in_run_unresolved, triad_plan
 from procedures.analysis.reference import TRIAD_NAMES, site_with
+from procedures.analysis.station_means import launch_warnings
 from procedures.analysis.station_plan import windows
 from procedures.analysis.table_errors import TableUncertainty
 from procedures.analysis.verification import predicted_sd
@@ -125,7 +126,8 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     triads = tuple(verify_triad(recordings, triad, site, context.unit) for triad in TRIAD_NAMES)
     checks = tuple(c for t in triads for c in _checks(t, params.limits))
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
-    return Result(checks=checks, verdict=verdict(checks), warnings=_warnings(plans, params.limits), triads=triads)
+    warnings = _warnings(plans, params.limits) + launch_warnings(recordings)
+    return Result(checks=checks, verdict=verdict(checks), warnings=warnings, triads=triads)
 
 
 def report(result: Result) -> Report:

@@ -84,6 +84,8 @@ class Station:
     temperature_c: float | None = None
     settle_s: float = 0.0
     record_s: float = 0.0
+    power_off_s: float = 0.0
+    """Above zero: the unit is switched off for so long before, so that the station is a launch of its own."""
 
 
 @dataclass(frozen=True)
@@ -100,10 +102,17 @@ class RecordingInfo:
     station: Station | None = None
     content_hash: str = ""
     simulated: bool = False
+    launched_s: float | None = None
+    """Bench time at which the unit was switched on for this launch [s]; None where nobody knows."""
 
     @property
     def duration_s(self) -> float:
         return self.count / self.rate_hz
+
+    @property
+    def since_launch_s(self) -> float:
+        """Time from switching the unit on to the first sample [s]; where the launch is not known, `start_s`."""
+        return self.start_s - (self.launched_s or 0.0)
 
     def column(self, name: str) -> int:
         """Index of a channel by name. Raises `MissingChannel`."""

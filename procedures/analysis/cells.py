@@ -1,0 +1,91 @@
+"""Means of a recording's rates over short cells: what every slow question is asked of. One pass, bounded memory."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.recording import INCREMENTS, RawArray, Recording, RecordingInfo
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Cell means of some channels; the last samples, less than a cell, are left out."""
+
+    channels: tuple[str, ...]
+    rates: Array
+    """Shape (channels, n), each in its channel's `rate_unit`."""
+    cell_s: float
+    since_launch_s: float
+    """From switching the unit on to the beginning of the first cell [s]."""
+
+
+def cell_samples(rate_hz: float, cell_s: float) -> int:
+    """Samples a cell: the whole number nearest to `cell_s`, at least one. Raises `BadParameter`."""
+    if not 0.0 < cell_s < float("inf"):
+        raise BadParameter("cell_s", cell_s, "finite and positive")
+    return max(1, round(rate_hz * cell_s))
+
+
+def channel_rows(info: RecordingInfo, names: Sequence[str], blocks: Iterator[RawArray]) -> Iterator[Array]:
+    """The blocks of a recording as nominal rates, channel by channel, each (channels, n), in `rate_unit`.
+
+    ``scale·(raw − offset)``, times the sample rate where the channel gives increments.
+    """
+    columns = [info.column(name) for name in names]
+    channels = [info.channels[c] for c in columns]
+    per_second = [info.rate_hz if c.quantity in INCREMENTS else 1.0 for c in channels]
+    scale = (np.array([c.scale for c in channels]) * np.array(per_second))[:, None]
+    offset = np.array([c.offset for c in channels])[:, None]
+    for block in blocks:
+        rows = np.ascontiguousarray(block.T[columns], dtype=np.float64)
+        if np.any(offset):
+            rows -= offset
+        rows *= scale
+        yield rows
+
+
+class CellStream:
+    """Gathers cell means from rows of rates."""
+
+    def __init__(self, info: RecordingInfo, names: Sequence[str], cell_s: float) -> None:
+        """Raises `UnfitRecording` where there is not one whole cell, `BadParameter`."""
+        self._info, self._names = info, tuple(names)
+        self._samples = cell_samples(info.rate_hz, cell_s)
+        count = info.count // self._samples
+        if count < 1:
+            raise UnfitRecording(f"recording {info.id}: {info.count} samples are less than one cell of {cell_s:g} s")
+        self._means = np.empty((len(self._names), count))
+        self._filled = 0
+        self._rest = np.empty((len(self._names), 0))
+
+    def add(self, rows: Array) -> None:
+        """The next samples, (channels, n)."""
+        if self._rest.shape[1]:
+            rows = np.concatenate([self._rest, rows], axis=1)
+        cells = rows.shape[1] // self._samples
+        used = cells * self._samples
+        part = rows[:, :used].reshape(len(rows), cells, self._samples)
+        self._means[:, self._filled : self._filled + cells] = part.mean(axis=2)
+        self._filled += cells
+        self._rest = rows[:, used:].copy()
+
+    def finish(self) -> Cells:
+        """All cells, once every sample came. Raises `UnfitRecording`."""
+        info = self._info
+        if self._filled != self._means.shape[1]:
+            raise UnfitRecording(
+                f"recording {info.id}: {self._filled * self._samples + self._rest.shape[1]} samples where "
+                f"{info.count} are announced"
+            )
+        return Cells(self._names, self._means, self._samples / info.rate_hz, info.since_launch_s)
+
+
+def cell_means(recording: Recording, names: Sequence[str], cell_s: float) -> Cells:
+    """Cell means of some channels of a recording. Raises `MissingChannel`, `UnfitRecording`, `BadParameter`."""
+    stream = CellStream(recording.info, names, cell_s)
+    for rows in channel_rows(recording.info, names, recording.blocks()):
+        stream.add(rows)
+    return stream.finish()
