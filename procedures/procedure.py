@@ -90,6 +90,10 @@ def _no_calibrations(_: Any) -> tuple[TriadCalibration, ...]:
     return ()
 
 
+def _nothing_learnt(_: Any, unit: Unit, _origin: str) -> Unit:
+    return unit
+
+
 @dataclass(frozen=True)
 class Procedure(Generic[P, R]):
     """A recipe: what to do on the bench, and what the recordings then say.
@@ -114,6 +118,8 @@ class Procedure(Generic[P, R]):
     calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
     uses_calibration: bool = False
     """Whether the result rests on the unit's current calibration, which then belongs to its lineage."""
+    learns: Callable[[R, Unit, str], Unit] = _nothing_learnt
+    """The unit's record with what a job's result found of it; the text names that result as its origin."""
 
 
 @dataclass(frozen=True)

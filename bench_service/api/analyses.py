@@ -8,7 +8,7 @@ from bench_service.api.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.errors import made, problems
 from bench_service.api.requests import AnalysisSubmission
 from bench_service.api.schemas import ResultPage, ResultView
-from bench_service.jobs.service import AnalysisRequest
+from bench_service.jobs.analyses import AnalysisRequest
 
 router = APIRouter(prefix="/api/v1", tags=["analyses"])
 
@@ -21,7 +21,7 @@ def run_method(
 ) -> ResultView:
     """Run a method on given recordings or calibrations of one unit."""
     request = AnalysisRequest(body.method, tuple(body.recordings), tuple(body.calibrations), body.parameters)
-    result = service.run_method(request, key)
+    result = service.analyses.run_method(request, key)
     response.headers["Location"] = f"/api/v1/results/{result.id}"
     return ResultView.of(result)
 

@@ -5,6 +5,7 @@ from pydantic import BaseModel, Field
 
 from bench_service.api.dependencies import Service
 from bench_service.api.errors import problems
+from bench_service.api.requests import StopRequest
 from bench_service.jobs.errors import NotFound
 from bench_service.jobs.service import BenchService
 from procedures.bench import BenchDescription
@@ -17,7 +18,8 @@ class BenchView(BaseModel):
 
     id: str
     description: BenchDescription
-    state: str = Field(description='"idle" or "busy"')
+    state: str = Field(description='"idle", "busy", or "stopped" until it is released')
+    stopped: str | None = Field(description="Why it is stopped")
     job: str | None = Field(description="The job that drives it")
     units: list[str] = Field(description="Units that it can test")
 
@@ -32,10 +34,12 @@ class Stopping(BaseModel):
 
 def _view(service: BenchService) -> BenchView:
     running = service.running_job()
+    stop = service.stores.units.bench_stop(service.driver.description.id)
     return BenchView(
         id=service.driver.description.id,
         description=service.driver.description,
-        state="idle" if running is None else "busy",
+        state="stopped" if stop else "idle" if running is None else "busy",
+        stopped=None if stop is None else f"{stop.at.isoformat()}: {stop.reason}",
         job=None if running is None else running.id,
         units=[unit.serial for unit in service.driver.mounted()],
     )
@@ -55,8 +59,15 @@ def read_bench(bench_id: str, service: Service) -> BenchView:
     return _view(service)
 
 
-@router.post("/{bench_id}/stop", status_code=202, responses=problems(404))
-def stop(bench_id: str, service: Service) -> Stopping:
-    """Software stop: end the running job, stop the table, switch the unit off."""
-    job = service.stop_bench(bench_id)
+@router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 507))
+def stop(bench_id: str, service: Service, body: StopRequest | None = None) -> Stopping:
+    """Software stop: end the running job, stop the table, switch the unit off; until the bench is released."""
+    job = service.stop_bench(bench_id, (body or StopRequest.model_validate({})).reason)
     return Stopping(bench=bench_id, job=None if job is None else job.id)
+
+
+@router.post("/{bench_id}/release", responses=problems(404, 507))
+def release(bench_id: str, service: Service) -> BenchView:
+    """Let a stopped bench work again: the jobs that wait in its queue go on."""
+    service.release_bench(bench_id)
+    return _view(service)

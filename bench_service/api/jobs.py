@@ -9,10 +9,12 @@ from starlette.concurrency import run_in_threadpool
 
 from bench_service.api.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.errors import made, problems
+from bench_service.api.job_schemas import EventView, JobPage, JobView
 from bench_service.api.requests import JobSubmission, Reanalysis
-from bench_service.api.schemas import EventView, JobPage, JobView, ResultPage, ResultView, Truth
+from bench_service.api.schemas import ResultPage, ResultView, Truth
 from bench_service.jobs.job import FINAL, JobState
-from bench_service.jobs.service import BenchService, JobRequest
+from bench_service.jobs.request import JobRequest
+from bench_service.jobs.service import BenchService
 from bench_service.wall_clock import pause_async
 
 router = APIRouter(prefix="/api/v1/jobs", tags=["jobs"])
@@ -29,18 +31,43 @@ EVENT_STREAM: dict[int | str, dict[str, object]] = {
 }
 
 
+OF_A_JOB = ("read_job", "cancel", "pause", "resume", "events", "read_result", "read_truth", "analyse_again")
+"""What can be asked of a job once there is one."""
+
+
 @router.post(
     "",
     status_code=202,
     responses={
         **problems(404, 409, 507),
-        **made(202, "job_id", "read_job", "cancel", "events", "read_result", "read_truth", "analyse_again"),
+        **made(
+            202,
+            "job_id",
+            "read_job",
+            "cancel",
+            "pause",
+            "resume",
+            "events",
+            "read_result",
+            "read_truth",
+            "analyse_again",
+        ),
     },
 )
 def submit(body: JobSubmission, service: Service, response: Response, key: IdempotencyKey = None) -> JobView:
     """Queue a job. The same `Idempotency-Key` with the same body gives the job that the first one made."""
     job = service.submit(
-        JobRequest(body.procedure, body.unit, body.bench, body.parameters, body.priority, body.labels, body.seed), key
+        JobRequest(
+            body.procedure,
+            body.unit,
+            body.bench,
+            body.parameters,
+            body.priority,
+            body.labels,
+            body.seed,
+            body.deadline_at,
+        ),
+        key,
     )
     response.headers["Location"] = f"/api/v1/jobs/{job.id}"
     return JobView.of(job)
@@ -70,6 +97,18 @@ def read_job(job_id: str, service: Service) -> JobView:
 def cancel(job_id: str, service: Service) -> JobView:
     """End a job: a queued one at once, a running one as soon as its bench is safe. Its recordings are kept."""
     return JobView.of(service.cancel(job_id))
+
+
+@router.post("/{job_id}/pause", status_code=202, responses=problems(404, 409))
+def pause(job_id: str, service: Service) -> JobView:
+    """Put a job aside: a queued one at once, a running one before its next station. The bench is then safe and free."""
+    return JobView.of(service.pause(job_id))
+
+
+@router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409))
+def resume(job_id: str, service: Service) -> JobView:
+    """Queue a paused or interrupted job again; it goes on with the stations that remain."""
+    return JobView.of(service.resume(job_id))
 
 
 @router.get("/{job_id}/events", response_class=StreamingResponse, responses={**problems(404), **EVENT_STREAM})
@@ -128,7 +167,7 @@ def analyse_again(
     job_id: str, body: Reanalysis, service: Service, response: Response, key: IdempotencyKey = None
 ) -> ResultView:
     """Analyse the job's recordings with other parameters. No bench is needed; the first result stays."""
-    result = service.analyse_again(job_id, body.parameters, key)
+    result = service.analyses.analyse_again(job_id, body.parameters, key)
     response.headers["Location"] = f"/api/v1/results/{result.id}"
     return ResultView.of(result)
 

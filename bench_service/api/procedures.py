@@ -55,4 +55,4 @@ def preview(name: str, request: PreviewRequest, service: Service) -> Preview:
 @router.get("/methods", tags=["analyses"])
 def list_methods(service: Service) -> list[ProcedureView]:
     """Every method that can be run on recordings or calibrations, with its JSON Schemas."""
-    return [_view(method) for method in service.methods.values()]
+    return [_view(method) for method in service.analyses.methods.values()]

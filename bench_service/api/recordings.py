@@ -93,6 +93,6 @@ def import_recording(
     if size > limit:
         raise BadParameter("files", f"{size} bytes", f"at most {limit} bytes (BENCH_MAX_IMPORT_MB)")
     parts = [ImportFile(file.filename or f"file {number}", file.file) for number, file in enumerate(files)]
-    info = service.import_recording(parts, wanted, key)
+    info = service.analyses.import_recording(parts, wanted, key)
     response.headers["Location"] = f"/api/v1/recordings/{info.id}"
     return RecordingView.of(service.stores.recordings.get(info.id))

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from procedures.core.recording import Channel
 from procedures.core.unit import TriadRecord
@@ -32,6 +32,7 @@ class JobSubmission(PreviewRequest):
     priority: int = Field(10, ge=1, le=1000, description="Smaller runs first")
     labels: Labels = Field(default_factory=Labels, max_length=50)
     seed: int | None = Field(None, ge=0, lt=2**48, description="Of a simulated bench: same seed, same bytes")
+    deadline_at: AwareDatetime | None = Field(None, description="No station begins later; the job then fails")
 
 
 class AnalysisSubmission(Request):
@@ -47,6 +48,12 @@ class Reanalysis(Request):
     """Other parameters for a job's recordings; those left out stay as they were requested."""
 
     parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+
+
+class StopRequest(Request):
+    """Why a bench is stopped."""
+
+    reason: str = Field("stopped by an operator", min_length=1, max_length=500)
 
 
 class UnitDeclaration(Request):

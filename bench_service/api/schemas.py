@@ -6,7 +6,6 @@ from typing import Any
 from pydantic import BaseModel, Field
 
 from bench_service.jobs.driver import TrueTriad
-from bench_service.jobs.job import Event, Failure, Job, JobState
 from bench_service.jobs.stored import RecordingState, StoredCalibration, StoredRecording, StoredResult
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
@@ -41,83 +40,6 @@ class Preview(BaseModel):
     basis: str = Field(description="What the prediction rests on: a calibration, or nominal scale factors")
     warnings: list[str]
     violations: list[str]
-
-
-class Progress(BaseModel):
-    """How far a job is."""
-
-    station: int = Field(description="Stations finished")
-    stations: int
-    fraction: float
-    eta_s: float | None = Field(description="Bench time left, by the plan")
-
-
-class JobView(BaseModel):
-    """A job."""
-
-    id: str
-    procedure: str
-    procedure_version: str
-    unit: str
-    bench: str
-    state: JobState
-    verdict: Verdict | None
-    progress: Progress
-    priority: int
-    labels: Labels
-    requested_parameters: dict[str, Any]
-    parameters: dict[str, Any]
-    simulated: bool
-    seed: int | None
-    code_version: str
-    created_at: datetime
-    started_at: datetime | None
-    finished_at: datetime | None
-    duration_s: float = Field(description="Predicted bench time")
-    error: Failure | None
-    result: str | None = Field(description="Id of the result that gave the verdict")
-    page: str = Field(description="Path of the page for an eye")
-
-    @classmethod
-    def of(cls, job: Job) -> "JobView":
-        stations = len(job.stations)
-        open_state = job.state in (JobState.QUEUED, JobState.RUNNING, JobState.PAUSED)
-        fraction = 1.0 if job.state is JobState.SUCCEEDED else job.stations_done / stations if stations else 0.0
-        return cls(
-            **{name: getattr(job, name) for name in _SAME_IN_JOB},
-            progress=Progress(
-                station=job.stations_done,
-                stations=stations,
-                fraction=fraction,
-                eta_s=job.duration_s * (1 - fraction) if open_state else None,
-            ),
-            error=job.failure,
-            result=job.result_id,
-            page=f"/jobs/{job.id}",
-        )
-
-
-_SAME_IN_JOB = tuple(name for name in JobView.model_fields if name in Job.__dataclass_fields__)
-
-
-class JobPage(BaseModel):
-    """Jobs, newest first."""
-
-    items: list[JobView]
-    next: str | None = Field(description="Cursor: pass it as `after` for the next page")
-
-
-class EventView(BaseModel):
-    """Something that happened to a job: the `data` of a server-sent event."""
-
-    sequence: int
-    at: datetime
-    kind: str
-    data: dict[str, Any]
-
-    @classmethod
-    def of(cls, event: Event) -> "EventView":
-        return cls(sequence=event.sequence, at=event.at, kind=event.kind, data=event.data)
 
 
 class RecordingView(BaseModel):

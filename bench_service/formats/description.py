@@ -58,7 +58,9 @@ class ImportDescription(_Strict):
     header: bool = Field(True, description="whether a line of column names follows (text files)")
     delimiter: Literal[",", ";", "tab", "whitespace"] = ","
     gap_tolerance: float = Field(0.2, gt=0, lt=1, description="of a time step against the median, relative")
-    rate_tolerance: float = Field(0.005, gt=0, lt=1, description="of rate_hz against the time column, relative")
+    rate_tolerance: float = Field(
+        0.005, gt=0, lt=1, description="of rate_hz, and of every 256 rows, against the time column, relative"
+    )
     simulated: bool = False
     reference_values: dict[str, float] = Field(default_factory=dict, description="known truths, kept with the source")
 

@@ -21,6 +21,8 @@ from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.recording import Channel, RawArray
 
 _INT32 = np.iinfo(np.int32)
+STRETCH = 256
+"""Steps of time whose mean is compared with that of all: jitter of a fifth of a step is 0.2 % of it."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,7 @@ class _Survey:
         self._description = description
         self.count = 0
         self.steps = [TimeSteps(file.name, description.gap_tolerance) for file in files]
+        self._stretches = _Stretches(files[0].name, description)
         self._integral = True
         self._outside: str | None = None
 
@@ -96,6 +99,7 @@ class _Survey:
                 steps.add(part[:, 0] * scale)
             for steps in self.steps[1:]:
                 steps.agree_with(self.steps[0])
+            self._stretches.add(parts[0][:, 0] * scale)
         samples = _samples(parts, self._description)
         if self._integral and not np.array_equal(samples, np.rint(samples)):
             self._integral = False
@@ -118,18 +122,76 @@ class _Survey:
         return np.int32 if self._integral else np.float64
 
     def rate_hz(self) -> float:
-        """The rate that was declared, or that of the time column. Raises `BadParameter`, `UnreadableFile`."""
+        """The rate that was declared, or that of the time column.
+
+        Raises `BadParameter`, `UnreadableFile`, and `UnfitRecording` where the time column's own rate wanders.
+        """
         declared = self._description.rate_hz
         if not self.count:
             raise UnreadableFile(self._files[0].name, "has no rows of data")
         if self._description.time_column is None:
             return float(declared or 0.0)
         measured = self.steps[0].rate_hz()
+        self._stretches.require(measured)
         if declared is None:
             return measured
         if abs(measured / declared - 1.0) > self._description.rate_tolerance:
             raise BadParameter("rate_hz", declared, f"the time column of {self._files[0].name} says {measured:.6g} Hz")
         return declared
+
+
+class _Stretches:
+    """Whether the rate of a time column stays what it is: steps may each be within the tolerance of a gap, and yet a
+    clock that slows down makes a recording that no single rate describes.
+    """
+
+    def __init__(self, name: str, description: ImportDescription) -> None:
+        self._name = name
+        self._allowed = description.rate_tolerance
+        self._jitter = description.gap_tolerance
+        self._rows = 0
+        self._begin_s = self._last_s = 0.0
+        self._extremes: list[tuple[float, int]] = []
+        """The shortest and the longest whole stretch [s], with the row of its beginning, counted from 0."""
+
+    def add(self, time_s: Array) -> None:
+        """The next rows."""
+        first = -self._rows % STRETCH
+        begins = time_s[first::STRETCH]
+        if len(begins):
+            row = self._rows + first
+            known = np.concatenate([[self._begin_s], begins]) if self._rows else begins
+            durations = np.diff(known)
+            row -= STRETCH if self._rows else 0
+            for k in {int(np.argmin(durations)), int(np.argmax(durations))} if len(durations) else ():
+                self._extremes.append((float(durations[k]), row + k * STRETCH))
+            self._extremes = [min(self._extremes), max(self._extremes)] if self._extremes else []
+            self._begin_s = float(begins[-1])
+        self._rows += len(time_s)
+        self._last_s = float(time_s[-1])
+
+    def require(self, rate_hz: float) -> None:
+        """Every stretch has the rate of the whole, but for jitter of its ends. Raises `UnfitRecording`."""
+        rest = (self._rows - 1) % STRETCH
+        last = self._rows - 1 - rest
+        stretches = [(duration, row, STRETCH) for duration, row in self._extremes]
+        stretches += [(self._last_s - self._begin_s, last, rest)] if rest else []
+
+        def allowed(steps: int) -> float:
+            return self._allowed + 2.0 * self._jitter / steps
+
+        def off(stretch: tuple[float, int, int]) -> float:
+            """Parts of what is allowed."""
+            return abs(stretch[0] * rate_hz / stretch[2] - 1.0) / allowed(stretch[2])
+
+        worst = max(stretches, key=off)
+        if off(worst) > 1.0:
+            duration, row, steps = worst
+            raise UnfitRecording(
+                f"{self._name}: the rate is not uniform: rows {row + 1} to {row + steps + 1} take {duration:.6g} s where "
+                f"{steps / rate_hz:.6g} s ± {100.0 * allowed(steps):.2g} % are expected at the mean rate of "
+                f"{rate_hz:.6g} Hz"
+            )
 
 
 def _samples(parts: Sequence[Array], description: ImportDescription) -> Array:

@@ -88,10 +88,10 @@ class Engine:
         DBOS(config=config)
 
         @DBOS.workflow(name="run_job", max_recovery_attempts=MAX_RECOVERIES)
-        def run_job(job_id: str) -> None:
+        def run_job(job_id: str, attempt: int = 1) -> None:
             self._idle.clear()
             try:
-                self._run_job(job_id)
+                self._run_job(job_id, attempt)
             finally:
                 self._idle.set()
 
@@ -111,9 +111,9 @@ class Engine:
         self._reconcile()
 
     def enqueue(self, job: Job) -> None:
-        """Queue a job; queueing the same job twice is a no-op."""
-        with SetWorkflowID(job.id), SetEnqueueOptions(priority=job.priority):
-            DBOS.enqueue_workflow(self._queue, self._workflow, job.id)
+        """Queue a job's present attempt; queueing it twice is a no-op."""
+        with SetWorkflowID(_workflow_id(job)), SetEnqueueOptions(priority=job.priority):
+            DBOS.enqueue_workflow(self._queue, self._workflow, job.id, job.attempt)
 
     def shut_down(self) -> None:
         """Stop working, once the running job has left the bench safe; it goes on after the next start."""
@@ -121,11 +121,14 @@ class Engine:
         self._idle.wait(SHUT_DOWN_S)
         DBOS.destroy(destroy_registry=True)
 
-    def _run_job(self, job_id: str) -> None:
+    def _run_job(self, job_id: str, attempt: int) -> None:
         runner = self._runner
+        runner.wait_for_release(job_id)
         try:
             self._last = StepOutcome()
-            count: int = _step("prepare", lambda: runner.prepare(job_id))
+            count: int = _step("prepare", lambda: runner.prepare(job_id, attempt))
+            if count < 0:
+                return
             outcome = self._stations(job_id, count)
             if count > 0:
                 safe = self._checked("safe", lambda: runner.make_safe(job_id))
@@ -147,7 +150,7 @@ class Engine:
         """Note a bad end, as soon as it can be: while the disk is full the job waits, and the bench is safe already."""
         while True:
             try:
-                return self._runner.end_badly(job_id, outcome)
+                return self._runner.end_early(job_id, outcome)
             except ServiceError as error:
                 log.warning("the end of job %s cannot be noted yet: %s", job_id, error)
             if self._ending.wait(RETRY_S):
@@ -168,7 +171,7 @@ class Engine:
             outcome = self._checked(f"station {index}", lambda k=index: runner.acquire(job_id, k))
             if not outcome.good:
                 return outcome
-        return StepOutcome(cancelled=count < 0)
+        return StepOutcome()
 
     def _reconcile(self) -> None:
         """Make our jobs and the engine's workflows agree after a crash or a change of version."""
@@ -185,7 +188,7 @@ class Engine:
     def _reconcile_job(self, job: Job) -> None:
         if f"bench:{job.bench}" != self._queue:
             return
-        status = DBOS.get_workflow_status(job.id)
+        status = DBOS.get_workflow_status(_workflow_id(job))
         if status is None:
             self.enqueue(job)
         elif status.status in ("ERROR", "CANCELLED", "MAX_RECOVERY_ATTEMPTS_EXCEEDED"):
@@ -196,6 +199,11 @@ class Engine:
                 "OtherVersion", f"begun by version {status.app_version} of the procedures, this is {PROCEDURE_ABI}"
             )
             self._jobs.transition(job.id, JobState.INTERRUPTED, at=now(), failure=failure)
+
+
+def _workflow_id(job: Job) -> str:
+    """The first attempt has the job's own id, each later one its number with it."""
+    return job.id if job.attempt == 1 else f"{job.id}:{job.attempt}"
 
 
 def _step(name: str, work: Any) -> Any:

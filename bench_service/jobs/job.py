@@ -10,9 +10,9 @@ from procedures.core.recording import Station
 
 
 class JobState(StrEnum):
-    """Where a job is. `FINAL` says which states are the last; an interrupted job may be queued again.
+    """Where a job is. `FINAL` says which states are the last; a paused or interrupted job may be queued again.
 
-    Pausing and queueing again have their place here and come with the queue's own issue.
+    A paused job holds no bench: the bench is safe, and others may use it until the job is resumed.
     """
 
     QUEUED = "queued"
@@ -27,11 +27,13 @@ class JobState(StrEnum):
 FINAL = frozenset({JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLED})
 
 LEGAL: dict[JobState, frozenset[JobState]] = {
-    JobState.QUEUED: frozenset({JobState.RUNNING, JobState.CANCELLED, JobState.FAILED, JobState.INTERRUPTED}),
+    JobState.QUEUED: frozenset(
+        {JobState.RUNNING, JobState.PAUSED, JobState.CANCELLED, JobState.FAILED, JobState.INTERRUPTED}
+    ),
     JobState.RUNNING: frozenset(
         {JobState.PAUSED, JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLED, JobState.INTERRUPTED}
     ),
-    JobState.PAUSED: frozenset({JobState.RUNNING, JobState.CANCELLED, JobState.FAILED, JobState.INTERRUPTED}),
+    JobState.PAUSED: frozenset({JobState.QUEUED, JobState.CANCELLED}),
     JobState.INTERRUPTED: frozenset({JobState.QUEUED, JobState.CANCELLED}),
     JobState.SUCCEEDED: frozenset(),
     JobState.FAILED: frozenset(),
@@ -79,6 +81,11 @@ class Job:
     verdict: Verdict | None = None
     stations_done: int = 0
     cancel_requested: bool = False
+    pause_requested: bool = False
+    attempt: int = 1
+    """How often it was queued: once, and again at each resume."""
+    deadline_at: datetime | None = None
+    """No station begins later; the job then fails."""
     started_at: datetime | None = None
     finished_at: datetime | None = None
     result_id: str | None = None

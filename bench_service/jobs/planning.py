@@ -91,7 +91,13 @@ class Planner:
         return Plan(procedure, parameters, context, stations, prediction, data_bytes, violations)
 
     def refreshed(self, context: Context) -> Context:
-        """The same unit and bench with the calibration that is current now."""
-        now_known = self._stores.units.unit(context.unit.serial)
-        calibrated = replace(context.unit, calibrations=now_known.calibrations, calibration_id=now_known.calibration_id)
-        return replace(context, unit=calibrated)
+        """The same bench, and the unit as it is known now: its noise, and the calibration that is current."""
+        return replace(context, unit=self._stores.units.unit(context.unit.serial))
+
+
+def register(stores: Stores, unit: Unit) -> None:
+    """Remember a unit that is met for the first time."""
+    try:
+        stores.units.unit(unit.serial)
+    except NotFound:
+        stores.units.put_unit(unit)

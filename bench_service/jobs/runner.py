@@ -17,6 +17,10 @@ from procedures.bench.errors import BenchError, Stopped
 from procedures.core.errors import DomainError
 from procedures.core.limits import Verdict
 from procedures.core.recording import Recording
+from procedures.procedure import Outcome
+
+RELEASE_CHECK_S = 0.2
+"""How often a waiting job asks whether its bench was released [s]."""
 
 
 @dataclass(frozen=True)
@@ -25,10 +29,11 @@ class StepOutcome:
 
     failure: Failure | None = None
     cancelled: bool = False
+    paused: bool = False
 
     @property
     def good(self) -> bool:
-        return self.failure is None and not self.cancelled
+        return self.failure is None and not self.cancelled and not self.paused
 
 
 class JobRunner:
@@ -51,11 +56,28 @@ class JobRunner:
         self._session: BenchSession | None = None
         self._ending = Event()
 
-    def prepare(self, job_id: str) -> int:
-        """Note what is known of the unit now, and start. How many stations there are; 0 stations, nothing moves."""
+    def wait_for_release(self, job_id: str) -> None:
+        """While a person's stop stands, the job waits in its queue. Raises `ShuttingDown` when the service ends."""
+        jobs, told = self._stores.jobs, False
+        while True:
+            job = jobs.get(job_id)
+            stop = self._stores.units.bench_stop(job.bench)
+            if stop is None or job.state is not JobState.QUEUED:
+                return
+            if not told:
+                jobs.note(job_id, "note", now(), {"text": f"bench {job.bench} is stopped: {stop.reason}"})
+                told = True
+            if self._ending.wait(RELEASE_CHECK_S):
+                raise ShuttingDown
+
+    def prepare(self, job_id: str, attempt: int) -> int:
+        """Note what is known of the unit now, and start. How many stations there are; 0 stations, nothing moves.
+
+        -1 where there is nothing to do: the job has ended, is put aside, or was queued again since.
+        """
         jobs = self._stores.jobs
         job = jobs.get(job_id)
-        if job.state in FINAL:
+        if job.state not in (JobState.QUEUED, JobState.RUNNING) or job.attempt != attempt:
             return -1
         context = self._planner.refreshed(CONTEXT.validate_python(job.context))
         job = jobs.set_context(job_id, CONTEXT.dump_python(context, mode="json"))
@@ -73,12 +95,18 @@ class JobRunner:
         if index in {r.info.station.index for r in recordings.of_job(job_id) if r.info.station}:
             jobs.station_done(job_id, index, now(), {})
             return StepOutcome()
-        if jobs.cancel_requested(job_id) or jobs.get(job_id).state in FINAL:
+        job = jobs.get(job_id)
+        if job.cancel_requested or job.state in FINAL:
             return StepOutcome(cancelled=True)
+        if job.pause_requested:
+            return StepOutcome(paused=True)
+        if job.deadline_at is not None and now() > job.deadline_at:
+            late = f"the job's deadline, {job.deadline_at.isoformat()}, has passed before station {index} began"
+            return StepOutcome(Failure("DeadlinePassed", late, index))
         if not self._lease_held():
             return StepOutcome(Failure("LeaseLost", "another process may drive this bench now", index))
         try:
-            info = self._session_of(jobs.get(job_id)).record(index)
+            info = self._session_of(job).record(index)
         except Stopped:
             return StepOutcome(cancelled=True)
         except (BenchError, DomainError, ServiceError) as error:
@@ -113,17 +141,21 @@ class JobRunner:
             stored = self._stores.results.add(
                 result.stored, result.calibrations, idempotency=Idempotency(f"job:{job_id}", job_id)
             )
+            self._remember(procedure, result.outcome, stored)
         except (DomainError, ServiceError) as error:
             return StepOutcome(Failure(type(error).__name__, str(error)))
         self._stores.jobs.transition(job_id, JobState.SUCCEEDED, at=now(), verdict=stored.verdict, result_id=stored.id)
         return StepOutcome()
 
-    def end_badly(self, job_id: str, outcome: StepOutcome) -> None:
-        """End a job that was cancelled or failed; its complete recordings are kept."""
+    def end_early(self, job_id: str, outcome: StepOutcome) -> None:
+        """End a job that was cancelled or failed, or put it aside; its complete recordings are kept."""
         job = self._stores.jobs.get(job_id)
         if job.state in FINAL:
             return
         self._stores.recordings.interrupt_open(job_id)
+        if outcome.paused:
+            self._stores.jobs.transition(job_id, JobState.PAUSED, at=now())
+            return
         to = JobState.CANCELLED if outcome.cancelled else JobState.FAILED
         verdict = None if outcome.cancelled else Verdict.ERROR
         self._stores.jobs.transition(job_id, to, at=now(), verdict=verdict, failure=outcome.failure)
@@ -138,6 +170,15 @@ class JobRunner:
     def running_job(self) -> Job | None:
         """The job that drives the bench now."""
         return None if self._session is None else self._stores.jobs.get(self._session.job.id)
+
+    def _remember(self, procedure: AnyProcedure, outcome: Outcome, stored: StoredResult) -> None:
+        """Put what a result found of its unit into the unit's record; said again after a crash, it changes nothing."""
+        if stored.unit is None:
+            return
+        unit = self._stores.units.unit(stored.unit)
+        found = procedure.learns(outcome, unit, f"result {stored.id}")
+        if found != unit:
+            self._stores.units.put_unit(found)
 
     def _not_safe(self, job_id: str, why: str) -> StepOutcome:
         text = f"the bench could not be made safe: {why}"
@@ -164,6 +205,7 @@ class JobRunner:
 class Analysed:
     """A result ready to be stored, with the calibrations that it gives."""
 
+    outcome: Outcome
     stored: StoredResult
     calibrations: tuple[Any, ...]
 
@@ -203,4 +245,4 @@ def analysed(
         seed=job.seed,
         context=job.context,
     )
-    return Analysed(stored, procedure.calibrations(outcome))
+    return Analysed(outcome, stored, procedure.calibrations(outcome))

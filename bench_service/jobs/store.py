@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench_service.jobs.job import Event, Failure, Job, JobState
-from bench_service.jobs.stored import Idempotency, NewRecording, Page, StoredCalibration, StoredRecording, StoredResult
+from bench_service.jobs.stored import (
+    BenchStop,
+    Idempotency,
+    NewRecording,
+    Page,
+    StoredCalibration,
+    StoredRecording,
+    StoredResult,
+)
 from procedures.bench import BenchDescription
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
@@ -139,6 +147,20 @@ class JobStore(Protocol):
 
     def cancel_requested(self, job_id: str) -> bool: ...
 
+    def request_pause(self, job_id: str, at: datetime) -> Job:
+        """Ask a job to be put aside: a queued one is paused at once, a running one before its next station.
+
+        Raises `IllegalTransition` for a job that has ended or was interrupted; for a paused one it is a no-op.
+        """
+        ...
+
+    def resume(self, job_id: str, at: datetime) -> Job:
+        """Queue a paused or interrupted job again, as its next attempt; from a running one a wish to pause is taken.
+
+        Raises `IllegalTransition` for a job in another state.
+        """
+        ...
+
     def note(self, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
         """Append an event that changes no state."""
         ...
@@ -207,6 +229,18 @@ class UnitStore(Protocol):
         ...
 
     def benches(self) -> tuple[BenchDescription, ...]: ...
+
+    def stop_bench(self, stop: BenchStop) -> None:
+        """Note that a bench was stopped; it stays so until it is released. A second stop changes nothing."""
+        ...
+
+    def release_bench(self, bench_id: str) -> None:
+        """Let the bench work again; one that is not stopped stays as it is."""
+        ...
+
+    def bench_stop(self, bench_id: str) -> BenchStop | None:
+        """Why the bench stands still, if a person stopped it."""
+        ...
 
 
 @dataclass(frozen=True)

@@ -75,6 +75,15 @@ class NewRecording:
 
 
 @dataclass(frozen=True)
+class BenchStop:
+    """A software stop of a bench, until a person releases it."""
+
+    bench: str
+    at: datetime
+    reason: str
+
+
+@dataclass(frozen=True)
 class StoredResult:
     """What an analysis said, and everything that made it."""
 

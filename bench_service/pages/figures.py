@@ -1,5 +1,6 @@
 """A `Figure` of the domain as an SVG, drawn by matplotlib. Imported beside the first answers, not before."""
 
+from functools import lru_cache
 from io import StringIO
 
 from procedures.core.report import Figure, Series
@@ -14,8 +15,9 @@ def warm_up() -> None:
     svg(Figure("", "", "", (Series("", (0.0, 1.0), (0.0, 1.0)),)))
 
 
+@lru_cache(maxsize=200)
 def svg(figure: Figure) -> str:
-    """The figure as an inline `<svg>` element."""
+    """The figure as an inline `<svg>` element; drawn once, because a result never changes."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure as Canvas
@@ -48,6 +50,9 @@ def _draw(axes: "object", series: Series, colour: str, mark: str) -> None:
     assert isinstance(axes, Axes)
     if series.style == "reference":
         axes.plot(series.x, series.y, linestyle="--", linewidth=1.0, color="#444444", label=series.name)
+        return
+    if series.style == "band":
+        axes.fill_between(series.x, series.y, series.upper, color=colour, alpha=0.18, linewidth=0.0, label=series.name)
         return
     line = "-" if series.style in ("line", "line_points") else "none"
     marker = "none" if series.style == "line" else mark

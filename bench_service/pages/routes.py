@@ -7,12 +7,14 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from fastapi.templating import Jinja2Templates
 
-from bench_service.jobs.job import FINAL, JobState
+from bench_service.jobs.job import FINAL, Job, JobState
 from bench_service.jobs.service import BenchService
 from bench_service.pages.figures import svg
 from procedures.core.imu_model import COEFFICIENT_NAMES
+from procedures.core.recording import TRIADS
 from procedures.core.report import Figure, Report
-from procedures.core.units import DISPLAY
+from procedures.core.unit import Unit
+from procedures.core.units import DISPLAY, NOISE_DISPLAY
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 templates = Jinja2Templates(Path(__file__).parent / "templates")
@@ -28,6 +30,14 @@ def number(value: Any) -> str:
 
 
 templates.env.filters["number"] = number
+
+_VERBS = {
+    JobState.QUEUED: (("pause", "Pause"), ("cancel", "Cancel")),
+    JobState.RUNNING: (("pause", "Pause"), ("cancel", "Cancel")),
+    JobState.PAUSED: (("resume", "Resume"), ("cancel", "Cancel")),
+    JobState.INTERRUPTED: (("resume", "Resume"), ("cancel", "Cancel")),
+}
+"""What a person can do to a job, by its state."""
 
 
 def _service(request: Request) -> BenchService:
@@ -46,6 +56,36 @@ def _sections(report: Report) -> list[dict[str, Any]]:
     ]
 
 
+def _noise_rows(unit: Unit) -> list[list[str]]:
+    """A row a channel: its noise coefficients in the units people read, a dash for what is absent."""
+    rows: list[list[str]] = []
+    for triad, rate_unit in (("gyro", "rad/s"), ("accelerometer", "m/s^2")):
+        record = unit.triad(triad)
+        for name, noise in zip(TRIADS[triad], record.noise if record else (), strict=False):
+            cells = [
+                f"{value / size:.4g} {label}" if (value := getattr(noise, process)) else "–"
+                for process, (label, size) in NOISE_DISPLAY[rate_unit].items()
+            ]
+            rows.append([name, *cells, record.noise_origin if record else ""])
+    return rows
+
+
+def _explanation(job: Job) -> str:
+    """What a job's state means to the person in front of the bench."""
+    nothing = "The bench is safe: the table stands still, the unit is switched off."
+    if job.state is JobState.PAUSED:
+        return (
+            f"Put aside. {nothing} Other jobs may use it; resumed, this one goes on with station {job.stations_done}."
+        )
+    if job.state is JobState.INTERRUPTED:
+        return f"The service could not go on with it. Its recordings are kept; resumed, it goes on. {nothing}"
+    if job.state is JobState.RUNNING and job.cancel_requested:
+        return "It is being cancelled: the bench is not free before it is safe."
+    if job.state is JobState.RUNNING and job.pause_requested:
+        return "It pauses before its next station."
+    return ""
+
+
 @router.get("/")
 def home(request: Request) -> HTMLResponse:
     """The bench, its units, the latest jobs."""
@@ -55,6 +95,7 @@ def home(request: Request) -> HTMLResponse:
         "home.html",
         bench=service.driver.description,
         running=service.running_job(),
+        stop=service.stores.units.bench_stop(service.driver.description.id),
         jobs=service.stores.jobs.list(limit=50).items,
         units=service.stores.units.units(),
     )
@@ -70,11 +111,13 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
         request,
         "job.html",
         job=job,
-        open=job.state not in FINAL and job.state is not JobState.INTERRUPTED,
+        open=job.state not in FINAL,
+        verbs=_VERBS.get(job.state, ()),
+        explanation=_explanation(job),
         recordings=service.stores.recordings.of_job(job_id),
         result=result,
-        sections=_sections(service.report(result)) if result else [],
-        report=service.report(result) if result else None,
+        sections=_sections(service.analyses.report(result)) if result else [],
+        report=service.analyses.report(result) if result else None,
     )
 
 
@@ -83,7 +126,7 @@ def result_page(result_id: str, request: Request) -> HTMLResponse:
     """A result: verdict, checks, tables, plots, lineage."""
     service = _service(request)
     result = service.stores.results.get(result_id)
-    report = service.report(result)
+    report = service.analyses.report(result)
     return _page(request, "result.html", result=result, report=report, sections=_sections(report))
 
 
@@ -91,10 +134,12 @@ def result_page(result_id: str, request: Request) -> HTMLResponse:
 def unit_page(serial: str, request: Request) -> HTMLResponse:
     """A unit: its record and its calibrations."""
     service = _service(request)
+    unit = service.stores.units.unit(serial)
     return _page(
         request,
         "unit.html",
-        unit=service.stores.units.unit(serial),
+        unit=unit,
+        noise=_noise_rows(unit),
         calibrations=service.stores.results.calibrations(serial).items,
         jobs=service.stores.jobs.list(unit=serial).items,
         names=COEFFICIENT_NAMES,

@@ -106,12 +106,34 @@ class SqlJobStore:
             state = JobState(row.state)
             if state in FINAL:
                 raise IllegalTransition(f"job {job_id} has ended: it is {state.value}, and cannot be cancelled")
-            if state in (JobState.QUEUED, JobState.INTERRUPTED):
+            if state in (JobState.QUEUED, JobState.PAUSED, JobState.INTERRUPTED):
                 row.cancel_requested = True
                 _move(session, row, JobState.CANCELLED, at, None, None, None)
             elif not row.cancel_requested:
                 row.cancel_requested = True
                 _append(session, job_id, "note", at, {"cancel_requested": True})
+            return job_of_row(row)
+
+    def request_pause(self, job_id: str, at: datetime) -> Job:
+        with self._database.write() as session:
+            row = _found(session, job_id, lock=True)
+            state = JobState(row.state)
+            if state is JobState.RUNNING:
+                if not row.pause_requested:
+                    row.pause_requested = True
+                    _append(session, job_id, "note", at, {"pause_requested": True})
+            elif state is not JobState.PAUSED:
+                _move(session, row, JobState.PAUSED, at, None, None, None)
+            return job_of_row(row)
+
+    def resume(self, job_id: str, at: datetime) -> Job:
+        with self._database.write() as session:
+            row = _found(session, job_id, lock=True)
+            if JobState(row.state) is JobState.RUNNING and row.pause_requested:
+                row.pause_requested = False
+                _append(session, job_id, "note", at, {"pause_requested": False})
+                return job_of_row(row)
+            _move(session, row, JobState.QUEUED, at, None, None, None)
             return job_of_row(row)
 
     def cancel_requested(self, job_id: str) -> bool:
@@ -167,7 +189,8 @@ def _move(
     data: dict[str, Any] = {"state": to.value, "before": before.value}
     if to is JobState.QUEUED:
         row.verdict = row.failure = row.finished_at = row.result_id = None
-        row.cancel_requested = False
+        row.cancel_requested = row.pause_requested = False
+        row.attempt += 1
     elif to is JobState.RUNNING:
         row.started_at = row.started_at or at
     elif to is not JobState.PAUSED:

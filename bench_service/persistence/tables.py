@@ -82,6 +82,16 @@ class BenchRow(Table):
     updated_at: Mapped[datetime]
 
 
+class BenchStopRow(Table):
+    """A bench that was stopped and not released yet."""
+
+    __tablename__ = "bench_stops"
+
+    bench: Mapped[str] = mapped_column(Id, primary_key=True)
+    at: Mapped[datetime]
+    reason: Mapped[str]
+
+
 class JobRow(Table):
     __tablename__ = "jobs"
     __table_args__ = (
@@ -110,6 +120,9 @@ class JobRow(Table):
     verdict: Mapped[str | None]
     stations_done: Mapped[int]
     cancel_requested: Mapped[bool]
+    pause_requested: Mapped[bool]
+    attempt: Mapped[int]
+    deadline_at: Mapped[datetime | None]
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
     result_id: Mapped[str | None] = mapped_column(Id)

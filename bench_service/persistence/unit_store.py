@@ -3,13 +3,14 @@
 from typing import Any
 
 from pydantic import TypeAdapter
-from sqlalchemy import select
+from sqlalchemy import delete, select
 
 from bench_service import wall_clock
 from bench_service.jobs.errors import NotFound
+from bench_service.jobs.stored import BenchStop
 from bench_service.persistence.database import Database
 from bench_service.persistence.result_rows import TRIADS
-from bench_service.persistence.tables import BenchRow, CalibrationRow, UnitRow
+from bench_service.persistence.tables import BenchRow, BenchStopRow, CalibrationRow, UnitRow
 from procedures.bench import BenchDescription
 from procedures.core.unit import Unit
 
@@ -57,6 +58,20 @@ class SqlUnitStore:
         with self._database.read() as session:
             rows = session.scalars(select(BenchRow).order_by(BenchRow.id)).all()
         return tuple(BENCH.validate_python(row.document) for row in rows)
+
+    def stop_bench(self, stop: BenchStop) -> None:
+        with self._database.write() as session:
+            if session.get(BenchStopRow, stop.bench) is None:
+                session.add(BenchStopRow(bench=stop.bench, at=stop.at, reason=stop.reason))
+
+    def release_bench(self, bench_id: str) -> None:
+        with self._database.write() as session:
+            session.execute(delete(BenchStopRow).where(BenchStopRow.bench == bench_id))
+
+    def bench_stop(self, bench_id: str) -> BenchStop | None:
+        with self._database.read() as session:
+            row = session.get(BenchStopRow, bench_id)
+            return None if row is None else BenchStop(row.bench, row.at, row.reason)
 
 
 _UNITS = select(UnitRow.document, CalibrationRow.triads, CalibrationRow.id).outerjoin(

@@ -21,7 +21,7 @@ def move_time_s(degrees: float, rate_deg_s: float, acceleration_deg_s2: float) -
 
 
 def windows(stations: Sequence[Station], axes: Sequence[tuple[float, float]]) -> Array:
-    """[start, stop] of each station's record since launch [s], shape (n, 2), the table starting from its zero.
+    """[start, stop] of each station's record in bench time [s], shape (n, 2), the table starting from its zero.
 
     `axes` are (rate_deg_s, acceleration_deg_s2) of outer, middle, inner, which turn together.
     """
@@ -31,6 +31,7 @@ def windows(stations: Sequence[Station], axes: Sequence[tuple[float, float]]) ->
         to = station.angles or at
         turns = (to.outer_deg - at.outer_deg, to.middle_deg - at.middle_deg, to.inner_deg - at.inner_deg)
         now += max(move_time_s(turn, *axis) for turn, axis in zip(turns, axes, strict=True)) + station.settle_s
+        now += station.power_off_s
         spans.append((now, now + station.record_s))
         now, at = spans[-1][1], to
     return np.array(spans).reshape(-1, 2)

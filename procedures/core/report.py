@@ -17,14 +17,15 @@ class Table:
 
 @dataclass(frozen=True)
 class Series:
-    """One line or set of marks. `error` are half-lengths of error bars, same length as `y`."""
+    """One line or set of marks. `error` are half-lengths of error bars, same length as `y`; so is `upper`, of a band."""
 
     name: str
     x: tuple[float, ...]
     y: tuple[float, ...]
     error: tuple[float, ...] = ()
     style: str = "points"
-    """"points", "line", "line_points" or "reference" (a thin dashed line)."""
+    """"points", "line", "line_points", "reference" (a thin dashed line) or "band" (the area from `y` to `upper`)."""
+    upper: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,32 @@ MICRO_G = 1e-6 * STANDARD_GRAVITY
 EARTH_RATE = 7.292115e-5
 """Earth's rotation rate [rad/s], WGS 84 (NIMA TR8350.2); 15.041067 deg/h."""
 
+_NOISE_OF_RATE = {
+    "quantization": ("arcsec", ARCSEC),
+    "random_walk": ("deg/√h", DEG_PER_SQRT_HOUR),
+    "bias_instability": ("deg/h", DEG_PER_HOUR),
+    "rate_random_walk": ("deg/h/√h", DEG_PER_HOUR_PER_SQRT_HOUR),
+    "rate_ramp": ("deg/h/h", DEG_PER_HOUR_PER_HOUR),
+}
+_NOISE_OF_FORCE = {
+    "quantization": ("µg·s", MICRO_G),
+    "random_walk": ("µg·√s", MICRO_G),
+    "bias_instability": ("µg", MICRO_G),
+    "rate_random_walk": ("µg/√s", MICRO_G),
+    "rate_ramp": ("µg/s", MICRO_G),
+}
+_NOISE_OF_COUNTS = {
+    "quantization": ("count·s", 1.0),
+    "random_walk": ("count·√s", 1.0),
+    "bias_instability": ("count", 1.0),
+    "rate_random_walk": ("count/√s", 1.0),
+    "rate_ramp": ("count/s", 1.0),
+}
+NOISE_DISPLAY = {"rad/s": _NOISE_OF_RATE, "m/s^2": _NOISE_OF_FORCE, "count": _NOISE_OF_COUNTS}
+"""Rate unit of a channel -> noise coefficient -> (the unit people read, its size in SI)."""
+DEVIATION_DISPLAY = {"rad/s": ("deg/h", DEG_PER_HOUR), "m/s^2": ("µg", MICRO_G), "count": ("count", 1.0)}
+"""Rate unit of a channel -> (the unit people read a deviation of it in, its size in SI)."""
+
 DISPLAY = {
     "rad/s": ("deg/h", DEG_PER_HOUR),
     "rad": ("arcsec", ARCSEC),

@@ -9,8 +9,9 @@ from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs.errors import NotDriving
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.planning import Planner
+from bench_service.jobs.request import JobRequest
 from bench_service.jobs.runner import JobRunner
-from bench_service.jobs.service import BenchService, JobRequest
+from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
 from bench_service.jobs.worker import Worker
 from bench_service.persistence import open_stores
@@ -58,7 +59,7 @@ def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], b
     service.register()
     service.begin()
     job = service.submit(JobRequest("calibration_12_orientations", "SIM-0001", parameters=FAST, seed=1))
-    assert runner.prepare(job.id) == 12
+    assert runner.prepare(job.id, 1) == 12
     return runner, job
 
 
@@ -68,7 +69,7 @@ def test_without_the_lease_no_station_is_begun(stores: Stores) -> None:
     assert outcome.failure is not None
     assert (outcome.failure.kind, outcome.failure.station) == ("LeaseLost", 0)
     assert runner.running_job() is None
-    runner.end_badly(job.id, outcome)
+    runner.end_early(job.id, outcome)
     assert stores.jobs.get(job.id).state is JobState.FAILED
     assert stores.recordings.of_job(job.id) == ()
 
@@ -80,7 +81,7 @@ def test_a_bench_that_cannot_be_made_safe_fails_the_job_and_keeps_its_recording(
     assert outcome.failure is not None
     assert outcome.failure.kind == "NotSafe"
     assert "brake does not close" in outcome.failure.message
-    runner.end_badly(job.id, outcome)
+    runner.end_early(job.id, outcome)
     ended = stores.jobs.get(job.id)
     assert ended.failure is not None
     assert (ended.state, ended.failure.kind) == (JobState.FAILED, "NotSafe")

@@ -1,0 +1,90 @@
+"""What a client is told of a job: its state, its progress, what happened to it."""
+
+from datetime import datetime
+from typing import Any
+
+from pydantic import BaseModel, Field
+
+from bench_service.api.requests import Labels
+from bench_service.jobs.job import Event, Failure, Job, JobState
+from procedures.core.limits import Verdict
+
+
+class Progress(BaseModel):
+    """How far a job is."""
+
+    station: int = Field(description="Stations finished")
+    stations: int
+    fraction: float
+    eta_s: float | None = Field(description="Bench time left, by the plan")
+
+
+class JobView(BaseModel):
+    """A job."""
+
+    id: str
+    procedure: str
+    procedure_version: str
+    unit: str
+    bench: str
+    state: JobState
+    verdict: Verdict | None
+    progress: Progress
+    priority: int
+    attempt: int = Field(description="How often it was queued: once, and again at each resume")
+    pause_requested: bool = Field(description="It pauses before its next station")
+    deadline_at: datetime | None = Field(description="No station begins later")
+    labels: Labels
+    requested_parameters: dict[str, Any]
+    parameters: dict[str, Any]
+    simulated: bool
+    seed: int | None
+    code_version: str
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+    duration_s: float = Field(description="Predicted bench time")
+    error: Failure | None
+    result: str | None = Field(description="Id of the result that gave the verdict")
+    page: str = Field(description="Path of the page for an eye")
+
+    @classmethod
+    def of(cls, job: Job) -> "JobView":
+        stations = len(job.stations)
+        open_state = job.state in (JobState.QUEUED, JobState.RUNNING, JobState.PAUSED)
+        fraction = 1.0 if job.state is JobState.SUCCEEDED else job.stations_done / stations if stations else 0.0
+        return cls(
+            **{name: getattr(job, name) for name in _SAME_IN_JOB},
+            progress=Progress(
+                station=job.stations_done,
+                stations=stations,
+                fraction=fraction,
+                eta_s=job.duration_s * (1 - fraction) if open_state else None,
+            ),
+            error=job.failure,
+            result=job.result_id,
+            page=f"/jobs/{job.id}",
+        )
+
+
+_SAME_IN_JOB = tuple(name for name in JobView.model_fields if name in Job.__dataclass_fields__)
+
+
+class JobPage(BaseModel):
+    """Jobs, newest first."""
+
+    items: list[JobView]
+    next: str | None = Field(description="Cursor: pass it as `after` for the next page")
+
+
+class EventView(BaseModel):
+    """Something that happened to a job: the `data` of a server-sent event."""
+
+    sequence: int
+    at: datetime
+    kind: str
+    data: dict[str, Any]
+
+    @classmethod
+    def of(cls, event: Event) -> "EventView":
+        return cls(sequence=event.sequence, at=event.at, kind=event.kind, data=event.data)

@@ -1,0 +1,27 @@
+"""A job as a client asks for it, and how a repeated request is recognised."""
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any
+
+
+@dataclass(frozen=True)
+class JobRequest:
+    """A job as a client asks for it."""
+
+    procedure: str
+    unit: str
+    bench: str | None = None
+    parameters: dict[str, Any] = field(default_factory=dict[str, Any])
+    priority: int = 10
+    labels: dict[str, str] = field(default_factory=dict[str, str])
+    seed: int | None = None
+    deadline_at: datetime | None = None
+    """No station begins later."""
+
+
+def fingerprint(request: object) -> str:
+    """A digest of what a client asked, the same for the same request."""
+    return hashlib.sha256(json.dumps(request, sort_keys=True, default=vars).encode()).hexdigest()
