@@ -188,8 +188,8 @@ class _Stretches:
         if off(worst) > 1.0:
             duration, row, steps = worst
             raise UnfitRecording(
-                f"{self._name}: the rate is not uniform: rows {row + 1} to {row + steps + 1} take {duration:.6g} s where "
-                f"{steps / rate_hz:.6g} s ± {100.0 * allowed(steps):.2g} % are expected at the mean rate of "
+                f"{self._name}: the rate is not uniform: rows {row + 1} to {row + steps + 1} take {duration:.6g} s "
+                f"where {steps / rate_hz:.6g} s ± {100.0 * allowed(steps):.2g} % are expected at the mean rate of "
                 f"{rate_hz:.6g} Hz"
             )
 

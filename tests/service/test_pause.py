@@ -2,12 +2,9 @@
 
 from collections.abc import Generator
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 import pytest
 
-from bench_service.cli.client import connect
-from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, now, pause
 from tests.service.client import FAST, Client
 
@@ -53,24 +50,6 @@ def test_a_paused_job_goes_on_where_it_was_and_gives_the_same(client: Client, un
     assert hashes(client, job["id"]) == hashes(client, undisturbed["id"])
     results = [client.http.get(f"/api/v1/jobs/{i}/result").json()["document"] for i in (job["id"], undisturbed["id"])]
     assert results[0]["triads"] == results[1]["triads"]
-
-
-def test_a_pause_survives_the_service_and_a_resume_its_restart(
-    tmp_path: Path, undisturbed: dict, client: Client
-) -> None:
-    settings = Settings(database_url=f"sqlite:///{tmp_path / 'bench.sqlite'}")
-    with connect(settings, None, drive=True) as http:
-        first = Client(http)
-        job = first.submit(seed=5, parameters=SLOW)["id"]
-        until_station(first, job, 4)
-        first.http.post(f"/api/v1/jobs/{job}/pause")
-        first.wait(job, "paused")
-    with connect(settings, None, drive=True) as http:
-        second = Client(http)
-        assert second.job(job)["state"] == "paused"
-        assert second.http.post(f"/api/v1/jobs/{job}/resume").status_code == 202
-        assert second.wait(job)["state"] == "succeeded"
-        assert hashes(second, job) == hashes(client, undisturbed["id"])
 
 
 def test_a_queued_job_is_paused_at_once_and_a_wish_can_be_taken_back(client: Client) -> None:
@@ -137,20 +116,6 @@ def test_a_stopped_bench_stays_stopped_until_it_is_released(client: Client) -> N
     events = client.http.get(f"/api/v1/jobs/{waiting}/events").text
     assert "smoke from the supply" in events  # why it had to wait
     assert client.http.post("/api/v1/benches/none/release").status_code == 404
-
-
-def test_a_stop_outlives_the_service(tmp_path: Path) -> None:
-    settings = Settings(database_url=f"sqlite:///{tmp_path / 'bench.sqlite'}")
-    with connect(settings, None, drive=True) as http:
-        http.post("/api/v1/benches/sim/stop")
-        job = Client(http).submit("no_operation")["id"]
-    with connect(settings, None, drive=True) as http:
-        after = Client(http)
-        assert http.get("/api/v1/benches/sim").json()["state"] == "stopped"
-        pause(0.5)
-        assert after.job(job)["state"] == "queued"
-        http.post("/api/v1/benches/sim/release")
-        assert after.wait(job)["state"] == "succeeded"
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -1,0 +1,117 @@
+"""Saturated: samples pile up at the largest or the smallest value of a channel."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import binom
+
+from procedures.analysis.fitness.pieces import Mask, Samples
+from procedures.core.arrays import Array
+
+NEIGHBOURS = 8
+"""Levels that must exist beside the outermost one: a counter that says −1, 0, 1 has no tail to be cut off."""
+STEEPEST = 2.5
+"""The outermost level may hold so many times its neighbours: more than the √2 + 1 of a sine wave's crest."""
+CLIFF = 4.0
+"""Where the next level holds so many times those behind it, the noise is narrower than a level: no tail either."""
+BUSY = 0.3
+"""So large a part of exact repeats off the edge says the same."""
+CHANCE = 1e-10
+"""Allowed of a false alarm of one edge."""
+RAILS = frozenset((2**15 - 1, -(2**15), 2**16 - 1, 2**23 - 1, -(2**23), 2**24 - 1, 2**31 - 1, -(2**31)))
+"""Where the counts of converters of 16, 24 and 32 bits end, signed and unsigned."""
+FEW = 64
+"""Counts that a piece may span to be sorted by counting."""
+
+VERY_FEW = 12
+"""Counts that a piece may span for one comparison each to be faster than that."""
+
+Levels = tuple[Array, NDArray[np.int64]]
+
+
+@dataclass
+class Edge:
+    """The outermost levels at one end of one channel. `sign` +1: the largest values; −1: the smallest."""
+
+    sign: int
+    levels: dict[float, int] = field(default_factory=dict[float, int])
+    """How often samples stand at each, outermost first, at most `NEIGHBOURS` + 1."""
+    first_index: int = 0
+    pairs: int = 0
+    """Exact repeats that stand at the outermost level."""
+
+    @property
+    def extreme(self) -> float:
+        """The outermost level."""
+        return next(iter(self.levels))
+
+    @property
+    def count(self) -> int:
+        """Samples that stand there."""
+        return self.levels[self.extreme]
+
+    @property
+    def near(self) -> int:
+        """The most that stand at any of the next three levels."""
+        return max(list(self.levels.values())[1:4], default=0)
+
+    def add(self, x: Samples, extreme: float, same: Mask, start: int, few: Levels | None) -> None:
+        """New samples (n,) from index `start`, and the outermost of them.
+
+        `same` says which repeat the one before, (n,) or (n − 1,); `few`: all levels of them, where these are few.
+        """
+        full = len(self.levels) > NEIGHBOURS
+        innermost = next(reversed(self.levels)) if self.levels else extreme
+        if full and self.sign * extreme < self.sign * innermost:
+            return
+        at_extreme = x == extreme
+        if not self.levels or self.sign * extreme > self.sign * self.extreme:
+            self.first_index, self.pairs = start + int(np.argmax(at_extreme)), 0
+        if few is None and full:
+            x = x[x >= innermost] if self.sign > 0 else x[x <= innermost]
+        self._merge(few or _sorted(x))
+        if self.extreme == extreme:
+            self.pairs += int(np.count_nonzero(at_extreme[len(at_extreme) - len(same) :] & same))
+
+    def piles_up(self, repeats: int, count: int, other: "Edge") -> bool:
+        """Whether the outermost level holds more than a tail can, beyond chance.
+
+        A tail does not rise outwards: of the n samples at the outermost level and the fullest of the next three the
+        former holds at most ``STEEPEST/(1 + STEEPEST)``, binomial. `repeats`: exact repeats in the whole channel.
+        """
+        if len(self.levels) <= NEIGHBOURS:
+            return False
+        outermost, next_one, *behind = list(self.levels.values())[:4]
+        inside = count - outermost - other.count
+        if repeats - self.pairs - other.pairs > BUSY * inside or next_one > CLIFF * max(behind):
+            return False
+        return bool(binom.sf(outermost - 1, outermost + self.near, STEEPEST / (1.0 + STEEPEST)) < CHANCE)
+
+    def _merge(self, found: Levels) -> None:
+        """Levels, ascending, that are whole as far inward as the kept ones reach."""
+        keep = slice(-NEIGHBOURS - 1, None) if self.sign > 0 else slice(NEIGHBOURS + 1)
+        new = False
+        for level, count in zip(found[0][keep].tolist(), found[1][keep].tolist(), strict=True):
+            new = new or level not in self.levels
+            self.levels[level] = self.levels.get(level, 0) + count
+        if new:
+            order = sorted(self.levels, reverse=self.sign > 0)
+            self.levels = {level: self.levels[level] for level in order[: NEIGHBOURS + 1]}
+
+
+def counted(x: Samples, low: int, high: int) -> Levels | None:
+    """All levels of integer samples (n,) between `low` and `high` and how often they stand there, where few."""
+    if high - low >= FEW:
+        return None
+    if high - low < VERY_FEW:
+        counts = np.array([np.count_nonzero(x == np.int32(level)) for level in range(low, high + 1)], np.int64)
+    else:
+        counts = np.bincount(x - np.int32(low)).astype(np.int64)
+    levels = np.flatnonzero(counts)
+    return (levels + low).astype(np.float64), counts[levels]
+
+
+def _sorted(x: Samples) -> Levels:
+    levels, counts = np.unique(x, return_counts=True)
+    return levels.astype(np.float64), counts.astype(np.int64)

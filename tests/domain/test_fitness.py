@@ -1,0 +1,243 @@
+"""Each fault that is put into a sound recording is found where it was put, and nothing else is."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from procedures.analysis.fitness.findings import Finding, FitnessSettings, Kind, Severity, require_fit
+from procedures.analysis.fitness.stream import FitnessStream, inspect
+from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.recording import ACCELEROMETER, GYRO, Channel, MemoryRecording, Quantity, RecordingInfo
+from tests.domain.fitness_samples import COUNTERS, COUNTS, RATE_HZ, SI, Samples, dithered, found, generator, look, wide
+
+
+def _only(samples: Samples, channel: str, kind: Kind, **settings: Any) -> Finding:
+    """The finding of that kind in that channel, which must be all there is."""
+    flaws = found(look(samples, **settings))
+    assert list(flaws) == [channel], flaws
+    assert [f.kind for f in flaws[channel]] == [kind], flaws
+    finding = flaws[channel][0]
+    assert f"channel {channel}" in finding.sentence
+    return finding
+
+
+def test_a_constant_channel_is_refused() -> None:
+    samples = wide()
+    samples[:, 1] = 17
+    finding = _only(samples, "gyro_y", Kind.CONSTANT)
+    assert finding.severity is Severity.REFUSE
+    assert "reads 17 throughout all 50000 samples" in finding.sentence
+
+
+def test_a_silent_counter_may_be_let_through() -> None:
+    samples = dithered()
+    samples[:, 2] = 0
+    assert _only(samples, "gyro_z", Kind.CONSTANT, channels=COUNTERS).severity is Severity.REFUSE
+    warned = _only(samples, "gyro_z", Kind.CONSTANT, channels=COUNTERS, counters_may_rest=True)
+    assert warned.severity is Severity.WARN
+    samples[:, 2] = 32767
+    railed = _only(samples, "gyro_z", Kind.CONSTANT, channels=COUNTERS, counters_may_rest=True)
+    assert railed.severity is Severity.REFUSE
+    assert "the end of its range" in railed.sentence
+
+
+@pytest.mark.parametrize("n", [0, 1, 10, 19])
+def test_too_few_samples_are_counted(n: int) -> None:
+    fitness = look(wide(n))
+    for channel in fitness:
+        assert Kind.TOO_FEW in [f.kind for f in channel.findings]
+    with pytest.raises(UnfitRecording, match=rf"recording r: .*{n} samples are too few, at least 20"):
+        require_fit("r", fitness)
+    assert not found(look(wide(20)))
+
+
+def test_a_recording_cut_short_is_refused() -> None:
+    stream = FitnessStream(COUNTS, RATE_HZ, 60_000)
+    stream.add(wide())
+    for channel in stream.finish():
+        assert [f.kind for f in channel.findings] == [Kind.INCOMPLETE]
+        assert "50000 samples where 60000 are announced" in channel.findings[0].sentence
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("index", [0, 16_383, 16_384, 49_999])
+def test_a_single_sample_that_is_no_number_is_named(value: float, index: int) -> None:
+    samples = wide().astype(np.float64)
+    samples[index, 4] = value
+    finding = _only(samples, "accelerometer_y", Kind.NOT_FINITE)
+    assert (finding.first_index, finding.count, finding.severity) == (index, 1, Severity.REFUSE)
+    assert f"sample {index} ({index / RATE_HZ:.6g} s)" in finding.sentence
+    assert _only(samples, "accelerometer_y", Kind.NOT_FINITE, gaps="aware").severity is Severity.WARN
+
+
+def test_a_channel_without_any_number_is_only_that() -> None:
+    samples = wide().astype(np.float64)
+    samples[:, 0] = np.nan
+    assert _only(samples, "gyro_x", Kind.NOT_FINITE).count == 50_000
+
+
+@pytest.mark.parametrize("end", [1, -1])
+@pytest.mark.parametrize("sigmas", [-1.0, 0.0, 1.0, 2.0])
+@pytest.mark.parametrize("dtype", [np.int32, np.float64])
+def test_a_clipped_channel_is_found(end: int, sigmas: float, dtype: type) -> None:
+    samples = wide(sd=30.0).astype(dtype)
+    limit = round(-438 + end * sigmas * 30.0)
+    samples[:, 0] = np.minimum(samples[:, 0], limit) if end > 0 else np.maximum(samples[:, 0], limit)
+    finding = _only(samples, "gyro_x", Kind.SATURATED)
+    assert finding.severity is Severity.REFUSE
+    assert finding.count == np.count_nonzero(samples[:, 0] == limit)
+    assert finding.first_index == np.argmax(samples[:, 0] == limit)
+    assert f"at {limit}, the {'largest' if end > 0 else 'smallest'}" in finding.sentence
+
+
+@pytest.mark.parametrize("rail", [32767, -32768, 65535, 2**31 - 1, -(2**31)])
+def test_the_end_of_a_converters_range_needs_no_pile(rail: int) -> None:
+    samples = wide()
+    samples[20_000, 0] = rail
+    warned = [f for f in found(look(samples))["gyro_x"] if f.kind is Kind.SATURATED]
+    assert [(f.severity, f.first_index, f.count) for f in warned] == [(Severity.WARN, 20_000, 1)]
+    samples[20_001, 0] = rail
+    refused = [f for f in found(look(samples))["gyro_x"] if f.kind is Kind.SATURATED]
+    assert [(f.severity, f.count) for f in refused] == [(Severity.REFUSE, 2)]
+
+
+@pytest.mark.parametrize("bit", [1, 2, 3, 4])
+@pytest.mark.parametrize("value", [0, 1])
+def test_a_stuck_bit_is_found(bit: int, value: int) -> None:
+    # The least of the noise's spreads is 20 counts, so that bit 5, of 32, still has bits above it that change.
+    samples = wide(sd=40.0)
+    samples[:, 2] = samples[:, 2] | (1 << bit) if value else samples[:, 2] & ~(1 << bit)
+    finding = _only(samples, "gyro_z", Kind.STUCK_BIT)
+    assert finding.severity is Severity.REFUSE
+    assert f"bit {bit} (of {1 << bit} counts) is stuck at {value}" in finding.sentence
+
+
+@pytest.mark.parametrize("shift", [1, 3])
+@pytest.mark.parametrize("rest", [0, 1])
+def test_values_that_share_a_factor_have_a_coarse_resolution(shift: int, rest: int) -> None:
+    samples = wide()
+    samples[:, 3] = (samples[:, 3] << shift) + rest
+    finding = _only(samples, "accelerometer_x", Kind.RESOLUTION)
+    assert finding.severity is Severity.WARN
+    assert f"its resolution is {1 << shift} counts" in finding.sentence
+
+
+def test_a_hung_data_link_is_found() -> None:
+    samples = dithered()
+    # A row of six dithered channels repeats the one before about once in a hundred, 60 repeats are beyond all chance.
+    samples[16_350:16_410] = samples[16_349]
+    fitness = look(samples, COUNTERS)
+    kinds = {f.kind for c in fitness for f in c.findings}
+    assert kinds == {Kind.REPEATED}
+    finding = fitness[3].findings[0]
+    assert finding.severity is Severity.REFUSE
+    assert abs((finding.first_index or 0) - 16_350) <= 1
+    assert 60 <= finding.count <= 62  # its neighbours may be equal by chance
+
+
+@pytest.mark.parametrize("times", [2, 10])
+def test_rows_sent_more_than_once_are_found(times: int) -> None:
+    fitness = look(np.repeat(wide(20_000), times, axis=0))
+    for channel in fitness:
+        assert [f.kind for f in channel.findings] == [Kind.REPEATED]
+        assert channel.findings[0].count == pytest.approx(20_000 * (times - 1), abs=2)
+
+
+@pytest.mark.parametrize("index", [8, 16_383, 16_384, 16_392, 32_770, 49_990])
+def test_an_outlier_and_a_step_are_told_apart(index: int) -> None:
+    samples = wide()
+    samples[index, 5] += 900
+    outlier = _only(samples, "accelerometer_z", Kind.OUTLIER)
+    assert (outlier.first_index, outlier.count, outlier.severity) == (index, 1, Severity.WARN)
+    samples = wide()
+    samples[index:, 5] += 900
+    step = _only(samples, "accelerometer_z", Kind.STEP)
+    assert (step.first_index, step.count, step.severity) == (index, 1, Severity.WARN)
+    assert not found(look(samples, at_rest=False))
+
+
+def _resting() -> Samples:
+    """A good unit at rest, x up, in SI: Earth rate with a little noise, gravity."""
+    rest = np.array([5.6e-5, 4.6e-5, 0.0, 9.81, 0.02, -0.03])
+    return rest + generator(3).normal(0.0, 1.0, (2000, 6)) * ([1e-6] * 3 + [1e-3] * 3)
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(1 / 9.80665, "looks like g"), (1000 / 9.80665, "looks like mg"), (100.0, "cm/s²"), (1 / RATE_HZ, "increments")],
+)
+def test_gravity_in_another_unit_is_recognised(factor: float, words: str) -> None:
+    samples = _resting()
+    samples[:, 3:] *= factor
+    flaws = found(look(samples, SI))
+    assert sorted(flaws) == sorted(ACCELEROMETER)
+    (finding,) = flaws["accelerometer_x"]
+    assert (finding.kind, finding.severity) == (Kind.WRONG_UNIT, Severity.REFUSE)
+    assert words in finding.sentence
+    assert f"together read {9.81 * factor:.4g} m/s^2" in finding.sentence
+
+
+def test_an_unknown_factor_of_gravity_is_only_warned_of() -> None:
+    samples = _resting()
+    samples[:, 3:] *= 5.0
+    (finding,) = found(look(samples, SI, gravity_m_s2=9.8155))["accelerometer_x"]
+    assert finding.severity is Severity.WARN
+    assert "49.05 m/s^2 where gravity, 9.8155 m/s² ± 30 % was expected" in finding.sentence
+
+
+def test_a_good_gyro_shows_degrees() -> None:
+    assert not found(look(_resting(), SI, gyro_rest_rad_s=1e-4))
+    for factor, words in ((180 / np.pi, "deg/s"), (3600 * 180 / np.pi, "deg/h")):
+        samples = _resting()
+        samples[:, :3] *= factor
+        flaws = found(look(samples, SI, gyro_rest_rad_s=1e-4))
+        assert sorted(flaws) == sorted(GYRO)
+        assert words in flaws["gyro_x"][0].sentence
+        assert flaws["gyro_x"][0].severity is Severity.REFUSE
+
+
+def test_a_poor_gyro_shows_no_more_than_that_something_is_wrong() -> None:
+    samples = _resting()
+    samples[:, 0] += 3.3
+    (finding,) = found(look(samples, SI))["gyro_x"]
+    assert finding.severity is Severity.WARN
+    assert "less than 0.5 rad/s at rest" in finding.sentence
+
+
+def test_kelvins_are_recognised() -> None:
+    channels = (Channel("case", Quantity.TEMPERATURE, "degC"),)
+    readings = generator().normal(22.0, 0.01, (1000, 1))
+    assert not found(look(readings, channels))
+    assert "kelvins" in found(look(readings + 273.15, channels))["case"][0].sentence
+
+
+@pytest.mark.parametrize("cut", [1, 17, 16_384, 40_000])
+def test_blocks_do_not_matter(cut: int) -> None:
+    samples = wide(40_000, sd=40.0).astype(np.float64)
+    samples[16_400, 0] = np.nan
+    samples[16_384:, 1] += 5000.0
+    samples[:, 2] = np.minimum(samples[:, 2], -60.0)
+    samples[16_380:16_390] = samples[16_380]
+    assert look(samples, cut=cut) == look(samples)
+
+
+def test_a_recording_is_inspected_and_warnings_are_handed_on() -> None:
+    samples = wide()
+    samples[100, 0] += 2000
+    recording = MemoryRecording(RecordingInfo("r", "U", COUNTS, RATE_HZ, len(samples)), samples)
+    (sentence,) = require_fit("r", inspect(recording))
+    assert "channel gyro_x: 1 of 50000 samples far from both neighbours; the first is sample 100 (1 s)" in sentence
+
+
+def test_what_cannot_be_inspected_is_named() -> None:
+    stream = FitnessStream(COUNTS, RATE_HZ)
+    with pytest.raises(BadParameter, match=r"must be of shape \(n, 6\)"):
+        stream.add(np.zeros((5, 3)))
+    stream.add(wide(10))
+    with pytest.raises(BadParameter, match="of one type, int32"):
+        stream.add(np.zeros((5, 6)))
+    with pytest.raises(BadParameter, match="rate_hz"):
+        FitnessStream(COUNTS, 0.0)
+    with pytest.raises(BadParameter, match="gravity_m_s2"):
+        FitnessSettings(gravity_m_s2=1.0)
