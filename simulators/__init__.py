@@ -6,8 +6,8 @@ Simulated
   are not quite square, a base that is not quite level, an azimuth that is not quite the declared one, pointing
   errors, axis wobble.
 * A unit of three gyros and three accelerometers: biases, a full 3×3 matrix a triad, asymmetry and a quadratic term,
-  run-to-run changes, start-up transient, angle random walk, bias instability, rate random walk, ramp, and an integer
-  counter whose phase is carried from the moment of power-up.
+  run-to-run changes, start-up transient, self-heating, residue of the mechanical dither, angle random walk, bias
+  instability, rate random walk, ramp, and a dithered integer counter whose phase is carried from the moment of power-up.
 * A supply, and a clock: time passes only in ``clock.sleep`` and while a recording is read.
 
 Not simulated

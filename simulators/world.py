@@ -22,7 +22,7 @@ from simulators.turntable.device import SETTLE_S, SimTurntable, pointing_error_r
 from simulators.turntable.kinematics import at_rest, attitude
 from simulators.turntable.profile import move_ticks
 
-CHECKPOINT_VERSION = 1
+CHECKPOINT_VERSION = 2
 
 
 @dataclass(frozen=True)

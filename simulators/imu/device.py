@@ -5,18 +5,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from procedures.bench.errors import DeviceFault, NotPowered, OutOfRange
 from procedures.bench.imu import Stream
 from procedures.core.recording import Channel, Station
 from simulators.clock import Motion, SimClock
+from simulators.imu.counter import Counts
 from simulators.imu.sensor import TRIADS, TriadSensor
 from simulators.truth import UnitTruth, unit_channels
 
 BLOCK_S = 10.0
-
-Counts = NDArray[np.int32]
 
 
 @dataclass
@@ -77,14 +75,12 @@ class SimImu:
         """Go through some motion; nothing happens while off."""
         if not self._sensors:
             return
-        gyro = self._sensors["gyro"].feel(self._ticks, motion.ticks, motion.angle_rad)
-        accelerometer = self._sensors["accelerometer"].feel(self._ticks, motion.ticks, motion.velocity_m_s)
+        counts = np.empty((motion.ticks, 6), dtype=np.int32)
+        self._sensors["gyro"].feel(self._ticks, motion.ticks, motion.angle_rad, counts[:, :3].T)
+        self._sensors["accelerometer"].feel(self._ticks, motion.ticks, motion.velocity_m_s, counts[:, 3:].T)
         self._ticks += motion.ticks
-        if self._tapes:
-            counts = np.empty((motion.ticks, 6), dtype=np.int32)
-            counts[:, :3], counts[:, 3:] = gyro.T, accelerometer.T
-            for tape in self._tapes:
-                tape.put(counts)
+        for tape in self._tapes:
+            tape.put(counts)
 
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
         """Begin a recording now; see the port. Time passes while its blocks are read."""
@@ -93,7 +89,9 @@ class SimImu:
             raise OutOfRange(f"duration_s = {duration_s!r} must be finite and not negative")
         samples = round(duration_s * self.rate_hz)
         start = self._clock.ticks
-        return Stream(self._channels, self.rate_hz, start / self.rate_hz, self._blocks(samples, start), station)
+        launched_s = (start - self._ticks) / self.rate_hz
+        blocks = self._blocks(samples, start)
+        return Stream(self._channels, self.rate_hz, start / self.rate_hz, blocks, station, launched_s)
 
     async def _blocks(self, samples: int, start: int) -> AsyncIterator[Counts]:
         if self._clock.ticks != start:
@@ -124,9 +122,8 @@ class SimImu:
         return self._sensors[triad]
 
     def checkpoint(self) -> dict[str, Any]:
-        """State to resume from: time since power-up, counters' phases, slow noise; empty while off."""
-        triads = {n: {"phase": s.counter.phase, "noise": s.noise.checkpoint()} for n, s in self._sensors.items()}
-        return {"ticks": self._ticks, "triads": triads}
+        """State to resume from: time since power-up, counters, slow noise; empty while off."""
+        return {"ticks": self._ticks, "triads": {name: sensor.checkpoint() for name, sensor in self._sensors.items()}}
 
     def resume(self, launch: int, state: dict[str, Any]) -> None:
         """Go on with a launch from a checkpoint; `launch` 0 is an unpowered unit."""
@@ -135,6 +132,4 @@ class SimImu:
         self.power_up(launch)
         self._ticks = int(state["ticks"])
         for name, sensor in self._sensors.items():
-            triad = state["triads"][name]
-            sensor.noise.resume(triad["noise"])
-            sensor.counter.resume(triad["phase"])
+            sensor.resume(state["triads"][name])

@@ -1,9 +1,10 @@
 """Noise of one triad, a function of (seed, launch, triad, channel, process, block): streamed, resumable, bounded.
 
 Time is counted in ticks (sample intervals) since power-up. White noise is drawn in canonical blocks of 10 s. The slow
-processes (bias instability, rate random walk, ramp, start-up transient) are made as averages over *cells* of half a
-second, exactly those of the continuous process, held through the cell; their canonical block is 1000 cells, and what
-is carried from one to the next is the state at its start.
+processes (bias instability, rate random walk, ramp, start-up, self-heating) are made as averages over *cells* of half
+a second, exactly those of the continuous process, held through the cell; their canonical block is 1000 cells, and
+what is carried from one to the next is the state at its start. The residue of the mechanical dither is a function of
+the tick: a sinusoid of the integrated output, as it stands at the ticks.
 
 Bias instability is a bank of M Gauss-Markov processes, two a decade, relaxation times at the middles of M equal
 log-intervals of the flicker band, each of variance ``(B²/π)·ln(τ₂/τ₁)/M`` and started stationary
@@ -13,12 +14,14 @@ log-intervals of the flicker band, each of variance ``(B²/π)·ln(τ₂/τ₁)/
 """
 
 from dataclasses import dataclass
-from math import ceil, log, log10, pi, sqrt
+from functools import cached_property
+from math import ceil, cos, expm1, fmod, log, log10, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
 
-from simulators.truth import Array, TriadTruth, keyed_generator
+from simulators.imu.blocks import Blocks
+from simulators.truth import Array, KeyedBlocks, TriadTruth, keyed_generator
 
 CELL_S = 0.5
 CELLS_PER_WHITE_BLOCK = 20
@@ -76,26 +79,29 @@ class TriadNoise:
         self._truth = truth
         self._seed, self._labels = key[0], key[1:]
         self._bank = GaussMarkovBank.over(truth.flicker_band_s, self.cell_s)
-        self._white_block = -1
-        self._white: Array = np.empty((3, 0))
+        self._blocks = Blocks(self.cell_ticks * CELLS_PER_WHITE_BLOCK, np.float64, self._fill_block)
+        self._streams: dict[tuple[int, str], KeyedBlocks] = {}
+        self._draw = np.empty(self._blocks.ticks)
+        self._residue = DitherResidue(truth, rate_hz, self._blocks.ticks, key)
         self._slow_block = -1
         self._slow: Array = np.empty((3, 0))
         self._next = self._first_state()
         self._start = self._next
 
+    @property
+    def block_ticks(self) -> int:
+        """Ticks of a canonical block."""
+        return self._blocks.ticks
+
+    def add_increments(self, total: Array, tick: int) -> None:
+        """Add the noise of the integrated output in each of the ticks from `tick` on to `total`, (3, n) [rate·s]."""
+        self._blocks.add_to(total, tick)
+
     def increments(self, tick: int, ticks: int) -> Array:
-        """Noise of the integrated output in each of some ticks from `tick` on, shape (3, ticks) [rate·s]."""
-        parts: list[Array] = []
-        length = self.cell_ticks * CELLS_PER_WHITE_BLOCK
-        while ticks > 0:
-            block, begin = divmod(tick, length)
-            if block != self._white_block:
-                self._white, self._white_block = self._make_block(block), block
-            step = min(ticks, length - begin)
-            parts.append(self._white[:, begin : begin + step])
-            tick += step
-            ticks -= step
-        return parts[0] if len(parts) == 1 else np.concatenate(parts or [np.empty((3, 0))], axis=1)
+        """That noise alone, shape (3, ticks) [rate·s]."""
+        total = np.zeros((3, ticks))
+        self.add_increments(total, tick)
+        return total
 
     def slow_integral(self, ticks: Array) -> Array:
         """Integral of the slow processes from power-up to each of some (real) ticks, shape (3, n) [rate·s].
@@ -108,6 +114,10 @@ class TriadNoise:
         total = np.concatenate([np.zeros((3, 1)), np.cumsum(rates, axis=1)], axis=1) * self.cell_s
         knots = np.arange(total.shape[1]) * float(self.cell_ticks)
         return np.array([np.interp(ticks, knots, row) for row in total])
+
+    def residue_angle(self, ticks: Array) -> Array:
+        """Residue of the dither at the end of each of some ticks, counted from power-up, shape (3, n) [rate·s]."""
+        return self._residue.angle(ticks)
 
     def white_integral(self, seconds: Array, purpose: str) -> Array:
         """Random walk over separate stretches, each one normal draw of variance ``N²·seconds``, (3, n) [rate·s]."""
@@ -123,10 +133,14 @@ class TriadNoise:
         bank = np.array(state["bank"], dtype=np.float64).reshape(-1, 3)
         self._next = SlowState(int(state["block"]), bank, np.array(state["walk"], dtype=np.float64))
         self._start = self._next
-        self._slow_block = self._white_block = -1
+        self._slow_block = -1
+        self._blocks.forget()
 
     def _rng(self, channel: int, process: str, block: int = 0) -> np.random.Generator:
-        return keyed_generator(self._seed, *self._labels, channel, process, block=block)
+        name = channel, process
+        if name not in self._streams:
+            self._streams[name] = KeyedBlocks(self._seed, *self._labels, *name)
+        return self._streams[name].at(block)
 
     def _draws(self, process: str, shape: tuple[int, ...], block: int) -> Array:
         """Standard normal, channel by channel, shape (*shape, 3)."""
@@ -139,19 +153,18 @@ class TriadNoise:
             bank = self._draws("flicker start", (members,), 0)
         return SlowState(0, bank, np.zeros(3))
 
-    def _make_block(self, block: int) -> Array:
-        """Noise increments of one canonical white block, shape (3, ticks of a block)."""
-        ticks = self.cell_ticks * CELLS_PER_WHITE_BLOCK
+    def _fill_block(self, block: int, noise: Array) -> None:
+        """Noise increments of one canonical block into `noise`, shape (3, ticks of a block)."""
         slow_block, part = divmod(block, CELLS_PER_SLOW_BLOCK // CELLS_PER_WHITE_BLOCK)
         slow = self._slow_rates(slow_block)
         cells = slow[:, part * CELLS_PER_WHITE_BLOCK : (part + 1) * CELLS_PER_WHITE_BLOCK]
-        noise = np.repeat(cells / self.rate_hz, self.cell_ticks, axis=1)
+        noise.reshape(3, CELLS_PER_WHITE_BLOCK, -1)[...] = (cells / self.rate_hz)[:, :, None]
         for channel, walk in enumerate(self._truth.random_walk):
             if walk > 0.0:
-                white = self._rng(channel, "random walk", block).standard_normal(ticks)
-                white *= walk / sqrt(self.rate_hz)
-                noise[channel] += white
-        return noise
+                self._rng(channel, "random walk", block).standard_normal(out=self._draw)
+                self._draw *= walk / sqrt(self.rate_hz)
+                noise[channel] += self._draw
+        self._residue.add_block(block, noise)
 
     def _slow_rates(self, block: int) -> Array:
         """Cell means of all slow processes in one slow block, shape (3, CELLS_PER_SLOW_BLOCK) [rate]."""
@@ -204,9 +217,51 @@ class TriadNoise:
         return sums, end
 
     def _deterministic(self, block: int) -> Array:
-        """Ramp and start-up transient as cell means, shape (cells, 3): ``R·t + A·(T/Δ)(1 − e^{−Δ/T})·e^{−t₀/T}``."""
-        truth = self._truth
-        begin = (block * CELLS_PER_SLOW_BLOCK + np.arange(CELLS_PER_SLOW_BLOCK)[:, None]) * self.cell_s
-        ratio = self.cell_s / truth.startup_time_s
-        decay = np.exp(-begin / truth.startup_time_s) * (-np.expm1(-ratio) / ratio)
-        return np.array(truth.rate_ramp) * (begin + 0.5 * self.cell_s) + np.array(truth.startup) * decay
+        """Ramp, start-up and self-heating as cell means, (cells, 3): ``R·t + Σ A·(T/Δ)(1 − e^{−Δ/T})·e^{−t₀/T}``."""
+        cells = block * CELLS_PER_SLOW_BLOCK + np.arange(CELLS_PER_SLOW_BLOCK, dtype=np.float64)
+        begin = cells[:, None] * self.cell_s
+        rates: Array = np.array(self._truth.rate_ramp) * (begin + 0.5 * self.cell_s)
+        for amplitude, time_s in self._truth.transients:
+            if any(amplitude):
+                weight = -expm1(-self.cell_s / time_s) * time_s / self.cell_s
+                np.add(rates, weight * np.array(amplitude) * np.exp(-begin / time_s), out=rates)
+        return rates
+
+
+class DitherResidue:
+    """What the notch filter leaves of the mechanical dither: ``A·sin(2πft + φ)`` on each channel's integrated output.
+
+    φ is drawn anew for each launch. Seen at the ticks only, so a frequency above half the sample rate shows itself
+    where it folds to. An increment is ``2A·sin(πf/r)·cos(2πf(k + ½)/r + φ)`` (tick k, rate r); within a block it is a
+    table of cosines and sines turned by the phase at the block's beginning.
+    """
+
+    def __init__(self, truth: TriadTruth, rate_hz: float, block_ticks: int, key: tuple[int, int, str]) -> None:
+        self._amplitude = np.array(truth.dither_residue)
+        self._cycles = np.array(truth.dither_frequency_hz) / rate_hz
+        self._phase = np.zeros(3)
+        if any(truth.dither_residue):
+            self._phase = keyed_generator(*key, "dither residue").uniform(0.0, 2.0 * pi, 3)
+        self._block_ticks = block_ticks
+
+    def angle(self, ticks: Array) -> Array:
+        """The residue at the end of each of some ticks, counted from power-up, shape (3, n) [rate·s]."""
+        turns = np.mod(self._cycles[:, None] * ticks, 1.0)
+        return self._amplitude[:, None] * np.sin(2.0 * pi * turns + self._phase[:, None])
+
+    def add_block(self, block: int, noise: Array) -> None:
+        """Add the increments of one canonical block to `noise`, shape (3, ticks of a block) [rate·s]."""
+        for channel, (cosine, sine) in self._tables:
+            phase = 2.0 * pi * fmod(self._cycles[channel] * self._block_ticks * block, 1.0) + self._phase[channel]
+            noise[channel] += cosine * cos(phase) + sine * sin(phase)
+
+    @cached_property
+    def _tables(self) -> list[tuple[int, Array]]:
+        """Channel, and its increments in a block for phases of 0 and 90°, (2, ticks); none without residue."""
+        middle = 2.0 * pi * (np.arange(self._block_ticks) + 0.5)
+        tables: list[tuple[int, Array]] = []
+        for channel in np.flatnonzero(self._amplitude).tolist():
+            turn, swing = middle * self._cycles[channel], 2.0 * self._amplitude[channel]
+            table = np.array([np.cos(turn), -np.sin(turn)]) * (swing * np.sin(pi * self._cycles[channel]))
+            tables.append((channel, table))
+        return tables

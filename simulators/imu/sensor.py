@@ -1,25 +1,22 @@
 """Forward model of a triad: true motion in, integer counts out.
 
 ``U = b + a + ½·asymmetry·|a| + nonlinearity·a²/reference`` with ``a = K·v`` (thesis 3.30, 3.34, plus two even terms),
-integrated over a sample, plus noise, into a counter that keeps its phase: ``count = floor(phase/LSB)`` differences.
+integrated over a sample, plus noise, into a dithered counter that keeps its phase.
 Written without sight of the inverse that the analysis uses.
 """
 
 from dataclasses import dataclass
-from math import ldexp
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from procedures.bench.errors import DeviceFault
 from procedures.core import units
+from simulators.imu.blocks import Dither
+from simulators.imu.counter import FRACTION_BITS, Counter, Counts
 from simulators.imu.noise import TriadNoise
 from simulators.truth import Array, TriadTruth, keyed_generator
 
 TRIADS = ("gyro", "accelerometer")
-FRACTION_BITS = 36
-LARGEST_COUNT = 2**26
-"""Counts in one sample beyond which the counter overflows."""
 
 
 @dataclass(frozen=True)
@@ -54,40 +51,6 @@ def launch_coefficients(truth: TriadTruth, seed: int, launch: int, triad: str) -
     )
 
 
-class Counter:
-    """Three counters that carry their phase, in units of 2⁻³⁶ pulse so that sums are exact in any grouping."""
-
-    def __init__(self, pulse: tuple[float, float, float], phase: list[int]) -> None:
-        """`pulse`: weight of a count [rate·s]; `phase`: carried fraction of each channel, 0 … 2³⁶ − 1."""
-        self._per_pulse = ldexp(1.0, FRACTION_BITS) / np.array(pulse)[:, None]
-        self._phase = np.array(phase, dtype=np.int64)
-
-    @property
-    def phase(self) -> list[int]:
-        """The carried fractions."""
-        return [int(p) for p in self._phase]
-
-    def resume(self, phase: list[int]) -> None:
-        """Go on from carried fractions."""
-        self._phase = np.array(phase, dtype=np.int64)
-
-    def count(self, increments: Array) -> NDArray[np.int64]:
-        """Counts of each sample, shape (3, n), from increments of shape (3, n) [rate·s]."""
-        fixed = increments * self._per_pulse
-        largest = float(np.max(np.abs(fixed), initial=0.0))
-        if not largest < ldexp(float(LARGEST_COUNT), FRACTION_BITS):
-            raise DeviceFault(f"a sample of {ldexp(largest, -FRACTION_BITS):.3g} counts overflows the counter")
-        steps = np.rint(fixed, out=fixed).astype(np.int64)
-        # The carried fraction is a sum modulo 2^36, so that overflow of the 64-bit sum does no harm.
-        ends = self._phase[:, None] + np.cumsum(steps, axis=1)
-        ends &= (1 << FRACTION_BITS) - 1
-        counts = steps
-        counts[:, 0] += self._phase
-        counts[:, 1:] += ends[:, :-1]
-        self._phase = ends[:, -1].copy()
-        return np.right_shift(counts, FRACTION_BITS, out=counts)
-
-
 class TriadSensor:
     """One triad during one launch: coefficients, noise, counter."""
 
@@ -96,31 +59,68 @@ class TriadSensor:
         self.coefficients = launch_coefficients(truth, *key)
         self.noise = TriadNoise(truth, rate_hz, key)
         self._rate_hz = rate_hz
-        start = keyed_generator(*key, "phase").integers(0, 1 << FRACTION_BITS, 3)
-        self.counter = Counter(truth.pulse, start.tolist())
+        self._total = np.empty((3, 0))
+        self._rest = np.full((1, 3), np.nan), np.full((3, 1), np.nan)
+        start = keyed_generator(*key, "phase")
+        phase = start.integers(0, 1 << FRACTION_BITS, 3)
+        if truth.dithered:
+            dither = Dither(key, self.noise.block_ticks, FRACTION_BITS)
+            first = start.integers(0, 1 << FRACTION_BITS, (2, 3)).sum(axis=0)
+            ahead = ((phase + first) >> FRACTION_BITS).tolist()
+            self.counter = Counter(truth.pulse, phase.tolist(), dither.blocks, ahead)
+        else:
+            self.counter = Counter(truth.pulse, phase.tolist())
 
-    def feel(self, tick: int, ticks: int, increments: Array) -> NDArray[np.int64]:
-        """Counts (3, ticks) of the ticks from `tick` since power-up; true `increments` (ticks, 3) or (1, 3)."""
-        output = self.coefficients.output(increments * self._rate_hz) / self._rate_hz
-        return self.counter.count(output + self.noise.increments(tick, ticks))
+    def feel(self, tick: int, ticks: int, increments: Array, out: Counts | None = None) -> Counts:
+        """Counts (3, ticks) of the ticks from `tick` since power-up, perhaps into `out`; true `increments` (ticks, 3).
+
+        Or (1, 3) where every tick is alike.
+        """
+        if self._total.shape[1] != ticks:
+            self._total = np.empty((3, ticks))
+        self._total[...] = self._output(increments)
+        self.noise.add_increments(self._total, tick)
+        return self.counter.count(self._total, tick, out)
+
+    def _output(self, increments: Array) -> Array:
+        """Noise-free increments of the integrated output; kept, because a table at rest sends the same for hours."""
+        if len(increments) != 1:
+            return self.coefficients.output(increments * self._rate_hz) / self._rate_hz
+        if not np.array_equal(increments, self._rest[0]):
+            self._rest = increments.copy(), self.coefficients.output(increments * self._rate_hz) / self._rate_hz
+        return self._rest[1]
+
+    def checkpoint(self) -> dict[str, Any]:
+        """State to resume from, JSON-ready."""
+        return {"phase": self.counter.phase, "ahead": self.counter.ahead, "noise": self.noise.checkpoint()}
+
+    def resume(self, state: dict[str, Any]) -> None:
+        """Go on from a checkpoint."""
+        self.noise.resume(state["noise"])
+        self.counter.resume(state["phase"], state["ahead"])
 
 
 def station_means(truth: TriadTruth, rate_hz: float, key: tuple[int, int, str], ticks: Array, v: Array) -> Array:
     """Mean nominal output at each station, shape (n, 3) [rate], without making the samples.
 
     `ticks`: beginning and end of each station in ticks since power-up, shape (n, 2), ascending, not overlapping;
-    `v`: true constant input at each, (n, 3) [rate]. ``Ū = LSB·(⌊φ + ΔΘ/LSB⌋ − ⌊φ⌋)/T`` where ΔΘ holds the output
-    of the coefficients, the *same draws* of the slow processes as the full path, and the random walk as one normal
-    number a station. φ, the counter's phase when the station begins, is drawn uniform: between two stations the unit
-    turns through many thousands of pulses. So for the same key means differ from those of the full path by white
-    noise and phase, and over many seeds they have the same distribution.
+    `v`: true constant input at each, (n, 3) [rate]. ``Ū = LSB·(⌊φ + d₁ + ΔΘ/LSB⌋ − ⌊φ + d₀⌋)/T`` where ΔΘ holds the
+    output of the coefficients, the *same draws* of the slow processes and the same residue of the mechanical dither as
+    the full path, and the random walk as one normal number a station. d₀ and d₁ are the counter's dither (zero without
+    it). φ, the counter's phase when the station begins, is drawn uniform: between two stations the unit turns through
+    many thousands of pulses. So for the same key means differ from those of the full path by white noise, dither and
+    phase, and over many seeds they have the same distribution.
     """
     noise = TriadNoise(truth, rate_hz, key)
     seconds = (ticks[:, 1] - ticks[:, 0]) / rate_hz
     total = launch_coefficients(truth, *key).output(v) * seconds
-    slow = noise.slow_integral(ticks.ravel()).reshape(3, -1, 2)
-    total += slow[:, :, 1] - slow[:, :, 0]
+    known = (noise.slow_integral(ticks.ravel()) + noise.residue_angle(ticks.ravel())).reshape(3, -1, 2)
+    total += known[:, :, 1] - known[:, :, 0]
     total += noise.white_integral(seconds, "station white")
     pulse = np.array(truth.pulse)[:, None]
-    phase = keyed_generator(*key, "station phase").random((3, len(seconds)))
-    return (pulse * np.floor(phase + total / pulse) / seconds).T
+    start = keyed_generator(*key, "station phase").random((3, len(seconds)))
+    end = start + total / pulse
+    if truth.dithered:
+        dither = keyed_generator(*key, "station dither").random((4, 3, len(seconds)))
+        start, end = start + dither[0] + dither[1], end + dither[2] + dither[3]
+    return (pulse * (np.floor(end) - np.floor(start)) / seconds).T

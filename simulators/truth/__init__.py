@@ -1,6 +1,6 @@
 """What is true of the simulated world: values, the files they live in, and chance keyed by seed."""
 
-from simulators.truth.chance import keyed_generator, random_table_truth, random_unit_truth
+from simulators.truth.chance import KeyedBlocks, keyed_generator, random_table_truth, random_unit_truth
 from simulators.truth.data_sheet import declared_unit, unit_channels
 from simulators.truth.files import (
     default_bench,
@@ -10,16 +10,18 @@ from simulators.truth.files import (
     save_bench,
     save_unit,
 )
-from simulators.truth.values import Array, BenchTruth, SiteTruth, TableTruth, TriadTruth, TruthError, UnitTruth
+from simulators.truth.values import Array, BenchTruth, SiteTruth, TableTruth, TriadTruth, TruthError, UnitTruth, Vector
 
 __all__ = [
     "Array",
     "BenchTruth",
+    "KeyedBlocks",
     "SiteTruth",
     "TableTruth",
     "TriadTruth",
     "TruthError",
     "UnitTruth",
+    "Vector",
     "declared_unit",
     "default_bench",
     "default_unit",

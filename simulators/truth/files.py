@@ -2,7 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from importlib.resources import files
 from json import dumps
 from pathlib import Path
@@ -37,6 +37,11 @@ def _triad_keys(
         f"quantization_{integral}": Key("quantization", integral_size, *pulse),
         f"startup_{rate}": Key("startup", rate_s, -1e5, 1e5),
         "startup_time_s": Key("startup_time_s", 1.0, 1.0, 1e6, "number"),
+        "self_heating_1_time_s": Key("self_heating_1_time_s", 1.0, 1.0, 1e6, "number"),
+        "self_heating_2_time_s": Key("self_heating_2_time_s", 1.0, 1.0, 1e6, "number"),
+        "dithered": Key("dithered", 1.0, 0.0, 1.0, "flag"),
+        f"dither_residue_{integral}": Key("dither_residue", integral_size, 0.0, pulse[1]),
+        "dither_frequency_hz": Key("dither_frequency_hz", 1.0, 0.0, 1e5),
         "scale_factor_asymmetry_ppm": Key("scale_factor_asymmetry_ppm", 1.0, -1e5, 1e5),
         "scale_factor_nonlinearity_ppm": Key("scale_factor_nonlinearity_ppm", 1.0, -1e5, 1e5),
         f"bias_run_to_run_sd_{rate}": Key("bias_run_to_run_sd", rate_s, 0.0, 1e5, "number"),
@@ -51,6 +56,8 @@ KEYS: dict[str, dict[str, Key]] = {
         "random_walk_deg_sqrt_h": Key("random_walk", units.DEG_PER_SQRT_HOUR, 0.0, 100.0),
         "bias_instability_deg_h": Key("bias_instability", units.DEG_PER_HOUR, 0.0, 1e4),
         "rate_random_walk_deg_h_sqrt_h": Key("rate_random_walk", units.DEG_PER_HOUR_PER_SQRT_HOUR, 0.0, 1e4),
+        "self_heating_1_deg_h": Key("self_heating_1", units.DEG_PER_HOUR, -1e5, 1e5),
+        "self_heating_2_deg_h": Key("self_heating_2", units.DEG_PER_HOUR, -1e5, 1e5),
         "rate_ramp_deg_h_h": Key("rate_ramp", units.DEG_PER_HOUR_PER_HOUR, -1e4, 1e4),
         "nonlinearity_reference_deg_s": Key("nonlinearity_reference", units.DEG, 1e-3, 1e4, "number"),
     },
@@ -59,6 +66,8 @@ KEYS: dict[str, dict[str, Key]] = {
         "random_walk_ug_sqrt_s": Key("random_walk", units.MICRO_G, 0.0, 1e5),
         "bias_instability_ug": Key("bias_instability", units.MICRO_G, 0.0, 1e5),
         "rate_random_walk_ug_per_sqrt_s": Key("rate_random_walk", units.MICRO_G, 0.0, 1e5),
+        "self_heating_1_ug": Key("self_heating_1", units.MICRO_G, -1e5, 1e5),
+        "self_heating_2_ug": Key("self_heating_2", units.MICRO_G, -1e5, 1e5),
         "rate_ramp_ug_s": Key("rate_ramp", units.MICRO_G, -1e5, 1e5),
         "nonlinearity_reference_m_s2": Key("nonlinearity_reference", 1.0, 1e-3, 1e4, "number"),
     },
@@ -75,6 +84,10 @@ def _only(where: str, table: Table, known: set[str], needed: set[str]) -> None:
 
 def _shaped(where: str, value: Any, key: Key) -> Any:
     """A value of a key in SI, each number inside the key's range."""
+    if key.shape == "flag":
+        if not isinstance(value, bool):
+            raise TruthError(f"{where} = {value!r} must be true or false")
+        return value
     if key.shape == "number":
         return within(where, value, key.low, key.high) * key.size
     length = 2 if key.shape == "pair" else 3
@@ -121,14 +134,21 @@ def _record(kind: type[Any], where: str, table: Any, needed: set[str]) -> Any:
 def _description(table: Table) -> BenchDescription:
     axes = {"outer", "middle", "inner"}
     _only("description", table, {"id", "title", "site", "accuracy", *axes}, {"id", "site", *axes})
-    limits = {f.name for f in fields(AxisLimits)}
-    outer, middle, inner = (
-        _record(AxisLimits, f"description.{axis}", table[axis], limits) for axis in ("outer", "middle", "inner")
-    )
+    outer, middle, inner = (_axis(f"description.{axis}", table[axis]) for axis in ("outer", "middle", "inner"))
     site = _record(Site, "description.site", table["site"], {"latitude_deg", "gravity_m_s2"})
     accuracy = _record(TableAccuracy, "description.accuracy", table.get("accuracy", {}), set())
     title = str(table.get("title", ""))
     return BenchDescription(str(table["id"]), site, outer, middle, inner, accuracy, simulated=True, title=title)
+
+
+def _axis(where: str, table: Any) -> AxisLimits:
+    """Four numbers, and whether the axis has slip rings; none where it is not said."""
+    continuous = table.get("continuous", False) if isinstance(table, dict) else False
+    if not isinstance(continuous, bool):
+        raise TruthError(f"{where}.continuous = {continuous!r} must be true or false")
+    numbers = {k: v for k, v in table.items() if k != "continuous"} if isinstance(table, dict) else table
+    needed = {f.name for f in fields(AxisLimits)} - {"continuous"}
+    return replace(_record(AxisLimits, where, numbers, needed), continuous=continuous)
 
 
 def parse_bench(text: str) -> BenchTruth:
@@ -198,11 +218,17 @@ def save_bench(truth: BenchTruth, path: Path) -> None:
         "table_truth": truth.table,
     }
     for name, record in sections.items():
-        lines += ["", f"[{name}]", *(f"{f.name} = {float(getattr(record, f.name))!r}" for f in fields(record))]
+        lines += ["", f"[{name}]", *(f"{f.name} = {_written(getattr(record, f.name))}" for f in fields(record))]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+def _written(value: float | bool) -> str:
+    return str(value).lower() if isinstance(value, bool) else repr(float(value))
+
+
 def _text(value: Any, size: float) -> str:
+    if isinstance(value, bool):
+        return dumps(value)
     if isinstance(value, tuple):
         return "[" + ", ".join(_text(item, size) for item in value) + "]"
     return repr(float(value) / size)

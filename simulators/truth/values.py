@@ -109,7 +109,8 @@ class TriadTruth:
     """Three channels x, y, z of one kind. SI: *rate* is angular rate [rad/s] or specific force [m/s²].
 
     With ``a = K·v``: ``U_i = b_i + a_i + ½·asymmetry_i·|a_i| + nonlinearity_i·a_i²/reference`` (both relative).
-    Noise after IEEE Std 952; `startup` is a bias that decays as ``amplitude·exp(−t/time)`` from power-up.
+    Noise after IEEE Std 952; `startup` is a bias that decays as ``amplitude·exp(−t/time)`` from power-up. `dithered` is
+    the random part of a gyro's mechanical dither, or the comparator's noise of a charge-balancing converter.
     """
 
     bias: Vector
@@ -117,7 +118,7 @@ class TriadTruth:
     matrix: Matrix
     """K, output per input, dimensionless."""
     quantization: Vector
-    """Q [rate·s]; the counter's pulse is Q·√12."""
+    """Q [rate·s]: standard deviation of a reading's whole error; the pulse follows, see `pulse`."""
     random_walk: Vector = ZERO
     """N [rate·√s]."""
     bias_instability: Vector = ZERO
@@ -129,6 +130,20 @@ class TriadTruth:
     startup: Vector = ZERO
     """Amplitude of the start-up transient [rate]."""
     startup_time_s: float = 200.0
+    self_heating_1: Vector = ZERO
+    """Self-heating as thesis 3.1.3 fits it, ``A₁·exp(−t/T₁) + A₂·exp(−t/T₂)`` from power-up: A₁ [rate]."""
+    self_heating_1_time_s: float = 1200.0
+    """T₁."""
+    self_heating_2: Vector = ZERO
+    """A₂ [rate]."""
+    self_heating_2_time_s: float = 5400.0
+    """T₂."""
+    dithered: bool = True
+    """Whether a triangular dither of one pulse either way precedes the counter, a new one at each reading."""
+    dither_residue: Vector = ZERO
+    """Amplitude of the mechanical dither's residue on the integrated output, after the notch filter [rate·s]."""
+    dither_frequency_hz: Vector = ZERO
+    """Its frequency; above half the sample rate it is seen folded."""
     scale_factor_asymmetry_ppm: Vector = ZERO
     """Scale factor for positive less that for negative input."""
     scale_factor_nonlinearity_ppm: Vector = ZERO
@@ -142,8 +157,10 @@ class TriadTruth:
     """Shortest and longest relaxation time of the bias instability."""
 
     def __post_init__(self) -> None:
-        signed = ("bias", "rate_ramp", "startup", "scale_factor_asymmetry_ppm", "scale_factor_nonlinearity_ppm")
-        positive = ("quantization", "random_walk", "bias_instability", "rate_random_walk")
+        even = ("scale_factor_asymmetry_ppm", "scale_factor_nonlinearity_ppm")
+        signed = ("bias", "rate_ramp", "startup", "self_heating_1", "self_heating_2", *even)
+        noise = ("quantization", "random_walk", "bias_instability", "rate_random_walk")
+        positive = (*noise, "dither_residue", "dither_frequency_hz")
         for name in signed + positive:
             value = getattr(self, name)
             if len(value) != 3 or not all(isfinite(v) for v in value):
@@ -160,6 +177,8 @@ class TriadTruth:
             raise TruthError(f"flicker_band_s = {self.flicker_band_s!r} must be 0 < shortest < longest")
         limits = {
             "startup_time_s": (1e-3, 1e7),
+            "self_heating_1_time_s": (1e-3, 1e7),
+            "self_heating_2_time_s": (1e-3, 1e7),
             "nonlinearity_reference": (1e-12, 1e6),
             "bias_run_to_run_sd": (0.0, 1e6),
             "scale_factor_run_to_run_sd_ppm": (0.0, 1e5),
@@ -168,9 +187,22 @@ class TriadTruth:
 
     @property
     def pulse(self) -> Vector:
-        """Weight of one count [rate·s]: Q·√12 for each channel."""
-        x, y, z = (q * sqrt(12.0) for q in self.quantization)
+        """Weight of one count [rate·s]: 2·Q for each channel, Q·√12 without dither.
+
+        A reading's error has the variance pulse²/12 of the rounding and, dithered, twice that of the dither.
+        """
+        factor = 2.0 if self.dithered else sqrt(12.0)
+        x, y, z = (q * factor for q in self.quantization)
         return x, y, z
+
+    @property
+    def transients(self) -> tuple[tuple[Vector, float], ...]:
+        """All that decays from power-up: amplitudes [rate] and times [s] of start-up and self-heating."""
+        return (
+            (self.startup, self.startup_time_s),
+            (self.self_heating_1, self.self_heating_1_time_s),
+            (self.self_heating_2, self.self_heating_2_time_s),
+        )
 
 
 @dataclass(frozen=True)

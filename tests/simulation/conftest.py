@@ -18,9 +18,9 @@ EARTH = 7.292115e-5
 
 @pytest.fixture
 def quiet_unit() -> UnitTruth:
-    """K is the identity, no bias, no noise; a gyro pulse is 3.5e-9 rad, an accelerometer pulse 3.5e-8 m/s."""
-    gyro = TriadTruth((0.0, 0.0, 0.0), IDENTITY, quantization=(1e-9, 1e-9, 1e-9))
-    accelerometer = TriadTruth((0.0, 0.0, 0.0), IDENTITY, quantization=(1e-8, 1e-8, 1e-8))
+    """K is the identity, no bias, no noise, no dither; a gyro pulse is 3.5e-9 rad, an accelerometer's 3.5e-8 m/s."""
+    gyro = TriadTruth((0.0, 0.0, 0.0), IDENTITY, quantization=(1e-9, 1e-9, 1e-9), dithered=False)
+    accelerometer = TriadTruth((0.0, 0.0, 0.0), IDENTITY, quantization=(1e-8, 1e-8, 1e-8), dithered=False)
     return UnitTruth("QUIET", gyro, accelerometer, 100.0)
 
 

@@ -7,8 +7,8 @@ from math import exp, log, pi, sqrt
 import numpy as np
 import pytest
 
+from simulators.imu.counter import Counter
 from simulators.imu.noise import TriadNoise, cell_mean
-from simulators.imu.sensor import Counter
 from simulators.truth import TriadTruth
 
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -20,6 +20,10 @@ EVERYTHING = replace(
     rate_random_walk=(0.1, 0.0, 0.2),
     rate_ramp=(1e-3, 0.0, -1e-3),
     startup=(1.0, 0.0, 2.0),
+    self_heating_1=(0.0, 3.0, 1.0),
+    self_heating_2=(1.0, -1.0, 0.0),
+    dither_residue=(0.5, 0.0, 2.0),
+    dither_frequency_hz=(3.3, 4.0, 17.1),
 )
 BLOCK = 500  # seconds of a slow block
 
@@ -48,9 +52,9 @@ def test_angle_random_walk_shows_its_coefficient() -> None:
     assert np.max(np.abs(np.corrcoef(steps) - np.eye(3))) < 4 / sqrt(40000)
 
 
-def test_quantization_shows_its_coefficient() -> None:
+def test_quantization_without_dither_shows_its_coefficient() -> None:
     q = 0.7
-    counter = Counter((q * sqrt(12.0),) * 3, [0, 10**9, 3 * 10**10])
+    counter = Counter((q * sqrt(12.0),) * 3, [0, 10**9, 3 * 10**9])
     rate = np.array([[0.1234], [2.71828], [-1.41421]])
     read = np.cumsum(counter.count(np.repeat(rate, 30000, axis=1)), axis=1) * q * sqrt(12.0)
     error = read - rate * np.arange(1, 30001)
@@ -105,6 +109,23 @@ def test_a_start_up_transient_integrates_to_amplitude_times_its_time() -> None:
     np.testing.assert_allclose(total, np.array([1.0, -2.0, 0.0]) * 100.0 * (1.0 - exp(-6.0)), rtol=1e-9)
 
 
+def test_self_heating_is_the_curve_that_the_thesis_fits() -> None:
+    amplitudes = {"self_heating_1": (3.0, 0.0, -1.0), "self_heating_2": (2.0, 5.0, 0.5)}
+    truth = replace(SILENT, **amplitudes, self_heating_1_time_s=70.0, self_heating_2_time_s=900.0)
+    ticks = np.array([1, 10, 333, 5000, 12000, 20000])
+    got = np.cumsum(noise(truth).increments(0, 20000), axis=1)[:, ticks - 1]
+    # The integral of A₁·e^(−t/T₁) + A₂·e^(−t/T₂) from power-up; a mean over half a second is held, so whole cells.
+    t = np.ceil(ticks / 5) * 0.5
+    inside = (ticks / 10 - (t - 0.5)) / 0.5
+
+    def integral(a, b, at):
+        return a * 70.0 * (1.0 - np.exp(-at / 70.0)) + b * 900.0 * (1.0 - np.exp(-at / 900.0))
+
+    for row, a, b in zip(got, *amplitudes.values(), strict=True):
+        before, after = integral(a, b, t - 0.5), integral(a, b, t)
+        np.testing.assert_allclose(row, before + inside * (after - before), rtol=1e-9)
+
+
 @pytest.mark.parametrize("rate_hz", [1.0, 25.0, 400.0])
 def test_any_pieces_give_the_same_bytes(rate_hz: float) -> None:
     whole = noise(EVERYTHING, rate_hz).increments(0, 30000)
@@ -126,14 +147,14 @@ def test_a_resumed_noise_goes_on_with_the_same_bytes(tick: int) -> None:
 
 
 def test_seeds_launches_and_channels_have_noise_of_their_own() -> None:
-    truth = replace(EVERYTHING, random_walk=(1.0, 1.0, 1.0))
+    truth = replace(EVERYTHING, random_walk=(1.0, 1.0, 1.0), dither_residue=(0.0, 0.0, 0.0))
     draws = np.concatenate([noise(truth, seed=s, launch=n).increments(0, 20000) for s in (1, 2) for n in (1, 2)])
     white = np.diff(draws, axis=1)
     assert np.max(np.abs(np.corrcoef(white) - np.eye(12))) < 5 / sqrt(20000)
 
 
 def test_the_integral_is_that_of_the_increments() -> None:
-    truth = replace(EVERYTHING, random_walk=(0.0, 0.0, 0.0))
+    truth = replace(EVERYTHING, random_walk=(0.0, 0.0, 0.0), dither_residue=(0.0, 0.0, 0.0))
     ticks = np.array([1.0, 4.0, 5.0, 77.0, 5000.0, 7123.0])
     sums = np.cumsum(noise(truth).increments(0, 8000), axis=1)[:, ticks.astype(int) - 1]
     np.testing.assert_allclose(noise(truth).slow_integral(ticks), sums, rtol=1e-9, atol=1e-9)

@@ -42,8 +42,10 @@ def test_the_shipped_unit_has_the_published_figures() -> None:
     np.testing.assert_allclose(np.array(unit.gyro.bias) / units.DEG_PER_HOUR, [0.1856, 0.026498, -0.027218])
     assert unit.gyro.matrix[2][1] == -0.0091769
     assert unit.accelerometer.matrix[1] == (-0.0010369, 0.85883, -0.005538)
-    assert unit.gyro.pulse[0] / units.ARCSEC == pytest.approx(1.342339)  # 0.3875·√12
-    assert unit.accelerometer.pulse[0] == pytest.approx(3.736836e-4)  # 11e-6·9.80665·√12
+    assert unit.gyro.pulse[0] / units.ARCSEC == pytest.approx(0.775)  # 2·0.3875: dithered
+    assert unit.accelerometer.pulse[0] == pytest.approx(2.157463e-4)  # 2·11e-6·9.80665
+    bare = replace(unit.gyro, dithered=False)
+    assert bare.pulse[0] / units.ARCSEC == pytest.approx(1.342339)  # 0.3875·√12
 
 
 def test_the_shipped_bench_is_true_within_what_it_declares() -> None:
@@ -72,6 +74,27 @@ def test_the_shipped_bench_is_true_within_what_it_declares() -> None:
         ("[1.0, 1.0, 1.0]", "[1.0, 1.0]", "gyro.quantization_arcsec = .* must be a list of 3"),
         ("[10.0, 10.0, 10.0]", "[10.0, 0.0, 10.0]", r"quantization_ug_s\[1\] = 0.0 must be"),
         ("[0.0, 0.0, 1.0]]", "[0.0, 1.0, 0.0]]", "gyro: matrix = .* invertible"),
+        ("[10.0, 10.0, 10.0]", "[10.0, 10.0, 10.0]\ndithered = 1", "accelerometer.dithered = 1 must be true or false"),
+        (
+            "[1.0, 1.0, 1.0]",
+            "[1.0, 1.0, 1.0]\ndither_residue_arcsec = [0.1, -0.1, 0.1]",
+            r"gyro.dither_residue_arcsec\[1\] = -0.1 must be a number within 0 … 1000",
+        ),
+        (
+            "[1.0, 1.0, 1.0]",
+            "[1.0, 1.0, 1.0]\ndither_frequency_hz = [0.1, nan, 0.1]",
+            r"gyro.dither_frequency_hz\[1\] = nan must be a number within 0 … 100000",
+        ),
+        (
+            "[10.0, 10.0, 10.0]",
+            "[10.0, 10.0, 10.0]\nself_heating_1_time_s = 0.0",
+            "accelerometer.self_heating_1_time_s = 0.0 must be a number within 1 … 1e",
+        ),
+        (
+            "[10.0, 10.0, 10.0]",
+            '[10.0, 10.0, 10.0]\nself_heating_2_ug = [1.0, "2", 1.0]',
+            r"accelerometer.self_heating_2_ug\[1\] = '2' must be a number within",
+        ),
         ('"U"', '"U"\nsample_rate_hz = "fast"', "sample_rate_hz = 'fast' must be a number"),
         ("[gyro]", "[gyro", "not a TOML file"),
     ],
@@ -79,6 +102,20 @@ def test_the_shipped_bench_is_true_within_what_it_declares() -> None:
 def test_a_refused_truth_names_field_value_and_range(old: str, new: str, message: str) -> None:
     with pytest.raises(TruthError, match=message):
         parse_unit(UNIT.replace(old, new))
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("dither_residue", (0.0, -1e-9, 0.0)),
+        ("dither_frequency_hz", (float("nan"), 1.0, 1.0)),
+        ("self_heating_1", (float("inf"), 0.0, 0.0)),
+        ("self_heating_2_time_s", 0.0),
+    ],
+)
+def test_values_made_in_code_are_refused_by_name_too(field: str, value: object) -> None:
+    with pytest.raises(TruthError, match=rf"{field} = .* must"):
+        replace(default_unit().gyro, **{field: value})
 
 
 def test_a_refused_bench_names_its_field(tmp_path: Path) -> None:
@@ -96,6 +133,7 @@ def test_a_refused_bench_names_its_field(tmp_path: Path) -> None:
 
 def test_a_saved_truth_is_read_back(tmp_path: Path) -> None:
     unit = replace(random_unit_truth(4), serial='odd "name"')
+    unit = replace(unit, gyro=replace(unit.gyro, dithered=False, self_heating_2=(1e-9, 2e-9, -3e-9)))
     save_unit(unit, tmp_path / "unit.toml")
     back = load_unit(tmp_path / "unit.toml")
     assert back.serial == unit.serial

@@ -39,6 +39,7 @@ def test_after_a_checkpoint_at_any_station_the_rest_is_the_same_bytes(record) ->
         woken = build(CONFIG, state)
         assert woken.clock.now_s() == broken.clock.now_s()
         assert woken.supply.launches == 1
+        assert woken.imu.record(1.0).launched_s == 0.0
         rest = record(woken, STATIONS[done:])
         assert [r.tobytes() for r in rest] == [r.tobytes() for r in undisturbed[done:]]
 
@@ -91,6 +92,7 @@ def test_a_recording_has_exactly_its_samples_in_blocks_of_ten_seconds() -> None:
         await bench.clock.sleep(2.0)
         stream = bench.imu.record(23.456)
         assert stream.start_s == 2.0
+        assert stream.launched_s == 0.0
         assert stream.rate_hz == 100.0
         blocks = [b async for b in stream.blocks]
         assert all(b.dtype == np.int32 for b in blocks)
@@ -134,7 +136,9 @@ def test_two_launches_have_their_own_coefficients_and_noise(record) -> None:
     [first] = record(bench, [Station(0, "", None, None, 0.0, 5.0)])
     bias = bench.true_calibration()["gyro"][0]
     asyncio.run(bench.supply.switch_off())
+    asyncio.run(bench.clock.sleep(3600.0))
     [second] = record(bench, [Station(0, "", None, None, 0.0, 5.0)])
+    assert bench.imu.record(1.0).launched_s == 3605.0
     assert np.all(bias != bench.true_calibration()["gyro"][0])
     assert first.tobytes() != second.tobytes()
 
