@@ -4,7 +4,7 @@ Simulated
 ---------
 * A three-axis table (MuJoCo bodies and servo): moves within rate and acceleration limits, settling, lock; axes that
   are not quite square, a base that is not quite level, an azimuth that is not quite the declared one, pointing
-  errors, axis wobble.
+  errors, axis wobble; whole turns of one axis at a constant rate, while the unit is recorded.
 * A unit of three gyros and three accelerometers: biases, a full 3×3 matrix a triad, asymmetry and a quadratic term,
   run-to-run changes, start-up transient, self-heating, residue of the mechanical dither, angle random walk, bias
   instability, rate random walk, ramp, and a dithered integer counter whose phase is carried from the moment of power-up.

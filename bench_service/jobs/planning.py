@@ -83,7 +83,7 @@ class Planner:
             f"station {s.index} ({s.label}): {sentence}"
             for s in stations
             if s.angles is not None
-            for sentence in context.bench.violations(s.angles)
+            for sentence in context.bench.violations(s.angles, s.turn)
         )
         prediction = procedure.predict(parameters, context)
         samples = sum(round(s.record_s * context.unit.sample_rate_hz) for s in stations)

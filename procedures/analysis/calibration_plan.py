@@ -21,7 +21,8 @@ BIASES = (0, 4, 8)
 SCALE_FACTORS = (1, 6, 11)
 
 _TURNS = (
-    "whole turns of the table at a known rate determine it instead (±n·360°, the Earth's rate cancels; IEEE Std 647)"
+    "whole turns of the table at a known rate determine it instead (procedure scale_factor_whole_turns: ±n·360°, the "
+    "Earth's rate cancels; IEEE Std 647)"
 )
 
 

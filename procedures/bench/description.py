@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
+from procedures.core.turn import AxisName, Turn
 
 
 @dataclass(frozen=True)
@@ -14,6 +15,8 @@ class AxisLimits:
     maximum_deg: float
     rate_deg_s: float
     acceleration_deg_s2: float
+    continuous: bool = False
+    """Whether slip rings let it turn without end; then the range limits position demands alone."""
 
 
 @dataclass(frozen=True)
@@ -48,15 +51,37 @@ class BenchDescription:
         """(rate_deg_s, acceleration_deg_s2) of outer, middle and inner axis."""
         return tuple((axis.rate_deg_s, axis.acceleration_deg_s2) for axis in (self.outer, self.middle, self.inner))
 
-    def violations(self, angles: TableAngles) -> tuple[str, ...]:
-        """One sentence for each axis whose limit the angles pass."""
+    def axis(self, name: AxisName) -> AxisLimits:
+        """Limits of an axis by name."""
+        return {"outer": self.outer, "middle": self.middle, "inner": self.inner}[name]
+
+    def violations(self, angles: TableAngles, turn: Turn | None = None) -> tuple[str, ...]:
+        """One sentence for each limit that the angles pass, or whole turns that begin at them."""
         demands = (
             ("outer", self.outer, angles.outer_deg),
             ("middle", self.middle, angles.middle_deg),
             ("inner", self.inner, angles.inner_deg),
         )
-        return tuple(
+        beyond = tuple(
             f"{name}_deg = {value:g} is outside {limits.minimum_deg:g} … {limits.maximum_deg:g}"
             for name, limits, value in demands
             if not limits.minimum_deg <= value <= limits.maximum_deg
         )
+        return beyond if turn is None else beyond + self._turn_violations(angles, turn)
+
+    def _turn_violations(self, angles: TableAngles, turn: Turn) -> tuple[str, ...]:
+        limits = self.axis(turn.axis)
+        begin = {"outer": angles.outer_deg, "middle": angles.middle_deg, "inner": angles.inner_deg}[turn.axis]
+        end = begin + turn.angle_deg
+        rate, acceleration = turn.rate_deg_s, turn.acceleration_deg_s2
+        found: list[str] = []
+        if rate > limits.rate_deg_s:
+            found.append(f"{turn.axis} rate of {rate:g} deg/s is above {limits.rate_deg_s:g}")
+        if acceleration > limits.acceleration_deg_s2:
+            found.append(f"{turn.axis} ramps of {acceleration:g} deg/s^2 are above {limits.acceleration_deg_s2:g}")
+        if not limits.continuous and not limits.minimum_deg <= end <= limits.maximum_deg:
+            found.append(
+                f"{turn.turns} turns of the {turn.axis} axis from {begin:g} deg end outside "
+                f"{limits.minimum_deg:g} … {limits.maximum_deg:g}: it has no slip rings"
+            )
+        return tuple(found)

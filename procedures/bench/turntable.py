@@ -3,13 +3,30 @@
 from typing import Protocol
 
 from procedures.core.table_angles import TableAngles
+from procedures.core.turn import Turn
 
 
 class Turntable(Protocol):
-    """Verbs tell time: `move_to` returns when the axes are at rest and locked, `read_angles` at once."""
+    """Verbs tell time: `move_to` returns when the axes are at rest and locked, `command_turn` and `read_angles` at
+    once.
+    """
 
     async def move_to(self, angles: TableAngles) -> None:
         """Move all axes, settle, lock. Raises `OutOfRange` before anything moves, `NotSettled`, `DeviceFault`."""
+        ...
+
+    def command_turn(self, turn: Turn) -> None:
+        """Begin whole turns of one axis, the others held; the table does the rest while time passes elsewhere.
+
+        Raises `OutOfRange` before anything moves, `DeviceFault` where the table moves already.
+        """
+        ...
+
+    async def settle(self) -> None:
+        """Return when what was commanded is done and the axes are at rest and locked; at once where they are.
+
+        Raises `NotSettled`, `DeviceFault`, `Stopped` where another demand took over.
+        """
         ...
 
     def read_angles(self) -> TableAngles:

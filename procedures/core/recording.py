@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from procedures.core.arrays import Array
 from procedures.core.errors import MissingChannel
 from procedures.core.table_angles import TableAngles
+from procedures.core.turn import Turn
 
 RawArray = NDArray[np.int32] | NDArray[np.float64]
 
@@ -86,6 +87,8 @@ class Station:
     record_s: float = 0.0
     power_off_s: float = 0.0
     """Above zero: the unit is switched off for so long before, so that the station is a launch of its own."""
+    turn: Turn | None = None
+    """Whole turns of one axis that begin with the recording and are over, at rest again, before its end; None: none."""
 
 
 @dataclass(frozen=True)

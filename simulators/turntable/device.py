@@ -1,9 +1,11 @@
 """A three-axis table on a simulated bench: implements `procedures.bench.turntable.Turntable`.
 
 Time moves the table (`advance`, called by the clock); its verbs only give it profiles and let time pass. At rest it is
-locked: not stepped, its attitude constant. Angles are wrapped by whole turns at standstill, the turns kept aside.
+locked: not stepped, its attitude constant. Angles are wrapped by whole turns at standstill and while turning, the turns
+kept aside; an axis with slip rings forgets them when it has turned, as an encoder of one turn does.
 """
 
+from dataclasses import replace
 from math import ceil
 from typing import Any
 
@@ -13,12 +15,14 @@ from procedures.bench.description import BenchDescription
 from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
 from procedures.core import units
 from procedures.core.table_angles import TableAngles
+from procedures.core.turn import Turn
 from simulators.clock import Motion, SimClock
 from simulators.truth import Array, BenchTruth, TableTruth, keyed_generator
 from simulators.turntable.kinematics import at_rest, attitude, path_increments
 from simulators.turntable.plant import Plant
-from simulators.turntable.profile import Profile, Quintic, RampDown, deceleration_rad_s2, move_ticks
+from simulators.turntable.profile import Profile, Quintic, RampDown, Spin, deceleration_rad_s2, move_ticks
 
+AXES = ("outer", "middle", "inner")
 SLICE_S = 0.25
 SETTLE_SLICE_S = 0.05
 SETTLED_ERROR_RAD = 1e-3 * units.ARCSEC
@@ -49,6 +53,7 @@ class SimTurntable:
         self._plant = Plant(truth.table, truth.site, description.site.azimuth_deg, clock.rate_hz)
         self._turns = np.zeros(3)
         self._pointing = np.zeros(3)
+        self._turned = np.zeros(3, dtype=bool)
         self._moves = 0
         self._profile: Profile | None = None
         self._step = 0
@@ -63,19 +68,40 @@ class SimTurntable:
 
     async def move_to(self, angles: TableAngles) -> None:
         """Move all axes, settle, lock; see the port."""
-        violations = self._description.violations(angles)
-        if violations:
-            raise OutOfRange("; ".join(violations))
-        if self._fault:
-            raise DeviceFault(self._fault)
-        if not self.locked:
-            raise DeviceFault("the table is moving: one demand at a time")
+        self._need_leave(self._description.violations(angles))
         self._moves += 1
         self._pointing = pointing_error_rad(self._truth.table, self._seed, self._moves)
         demanded = units.DEG * np.array([angles.outer_deg, angles.middle_deg, angles.inner_deg])
         start, end = self._plant.angles_rad, demanded + self._pointing - 2.0 * np.pi * self._turns
         duration = move_ticks((end - start) / units.DEG, self._limits, self._clock.rate_hz) / self._clock.rate_hz
         await self._follow(Quintic(start, end, duration))
+
+    def command_turn(self, turn: Turn) -> None:
+        """Begin whole turns of one axis; see the port. The axis that turns stops with a new pointing error."""
+        self._need_leave(self._description.violations(self.read_angles(), turn))
+        axis = AXES.index(turn.axis)
+        self._moves += 1
+        pointing = pointing_error_rad(self._truth.table, self._seed, self._moves)[axis]
+        angle = units.DEG * turn.angle_deg + pointing - self._pointing[axis]
+        self._pointing[axis] = pointing
+        self._turned[axis] = self._description.axis(turn.axis).continuous
+        self._begin(Spin(self._plant.angles_rad, axis, angle, turn.duration_s, turn.ramp_s))
+
+    async def settle(self) -> None:
+        """Let time pass until what was commanded is over and the axes rest; see the port."""
+        if self._fault:
+            raise DeviceFault(self._fault)
+        if self._profile is not None:
+            await self._finish(self._profile, self._demand)
+
+    def _need_leave(self, violations: tuple[str, ...]) -> None:
+        """Limits first, then whether the table may move at all."""
+        if violations:
+            raise OutOfRange("; ".join(violations))
+        if self._fault:
+            raise DeviceFault(self._fault)
+        if not self.locked:
+            raise DeviceFault("the table is moving: one demand at a time")
 
     def read_angles(self) -> TableAngles:
         """Where the encoders say the axes are."""
@@ -97,15 +123,23 @@ class SimTurntable:
 
     async def _follow(self, profile: Profile) -> None:
         """Give the axes a profile and let time pass until they rest; a later demand takes over and stops this one."""
+        self._begin(profile)
+        await self._finish(profile, self._demand)
+
+    def _begin(self, profile: Profile) -> None:
         self._demand += 1
-        demand = self._demand
         self._profile, self._step = profile, 0
-        moving = ceil(profile.duration_s * self._clock.rate_hz - 1e-6)
+
+    async def _finish(self, profile: Profile, demand: int) -> None:
+        """Let time pass until a profile that may have begun some time ago is over, settle, lock."""
+        done = self._step // self._plant.steps_per_tick
+        moving = ceil(profile.duration_s * self._clock.rate_hz - 1e-6) - done
+        waited = max(0, -moving) / self._clock.rate_hz
         longest = max(1, int(SLICE_S * self._clock.rate_hz))
         while moving > 0:
             await self._pass(min(moving, longest), demand)
             moving -= longest
-        await self._settle(profile, demand)
+        await self._settle(demand, waited)
         self._lock()
 
     async def _pass(self, ticks: int, demand: int) -> None:
@@ -113,24 +147,31 @@ class SimTurntable:
         if demand != self._demand:
             raise Stopped("the table was stopped by another demand")
 
-    async def _settle(self, profile: Profile, demand: int) -> None:
-        target = profile.at(np.array([profile.duration_s + 1.0]))[0][0]
+    async def _settle(self, demand: int, waited: float) -> None:
+        """`waited`: how long the profile has been over already [s]."""
         ticks = max(1, int(SETTLE_SLICE_S * self._clock.rate_hz))
-        waited = 0.0
-        while waited < SETTLE_TIMEOUT_S:
+        longest = waited + SETTLE_TIMEOUT_S
+        while waited < longest:
             await self._pass(ticks, demand)
             waited += ticks / self._clock.rate_hz
-            error = np.max(np.abs(self._plant.angles_rad - target))
             at_rest = np.max(np.abs(self._plant.rates_rad_s)) < SETTLED_RATE_RAD_S
-            if waited > SETTLE_S - 1e-9 and error < SETTLED_ERROR_RAD and at_rest:
+            if waited > SETTLE_S - 1e-9 and self._error_rad() < SETTLED_ERROR_RAD and at_rest:
                 return
         raise NotSettled(f"the table did not come to rest within {SETTLE_TIMEOUT_S:g} s of its move")
+
+    def _error_rad(self) -> float:
+        """How far the axes are from where the profile ends."""
+        if self._profile is None:
+            return 0.0
+        target = self._profile.at(np.array([self._profile.duration_s + 1.0]))[0][0]
+        return float(np.max(np.abs(self._plant.angles_rad - target)))
 
     def _lock(self) -> None:
         """Hold the axes where they are, and bring each angle to within half a turn."""
         here = self._plant.angles_rad
         turns = np.rint(here / (2.0 * np.pi))
-        self._turns = self._turns + turns
+        self._turns = np.where(self._turned, 0.0, self._turns + turns)
+        self._turned[:] = False
         self._plant.put(here - 2.0 * np.pi * turns)
         self._profile = None
         self._rest = self._at_rest()
@@ -154,9 +195,19 @@ class SimTurntable:
             self._fault = str(fault)
             raise
         self._step += steps
+        if isinstance(self._profile, Spin):
+            self._unwind(self._profile)
         rotation = attitude(path, self._truth.table, self._description.site.azimuth_deg)
         angle, velocity = path_increments(rotation, self._plant.steps_per_tick, tick_s, self._truth.site)
         return Motion(ticks, angle, velocity)
+
+    def _unwind(self, spin: Spin) -> None:
+        """Take whole turns out of a turning axis and of its setpoint: far from zero a servo never rests (rounding)."""
+        turns = np.rint(self._plant.angles_rad / (2.0 * np.pi))
+        if np.any(turns):
+            self._turns = self._turns + turns
+            self._plant.shift(-2.0 * np.pi * turns)
+            self._profile = replace(spin, start_rad=spin.start_rad - 2.0 * np.pi * turns)
 
     def checkpoint(self) -> dict[str, Any]:
         """State to resume from. Only a locked table has one."""

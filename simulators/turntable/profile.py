@@ -67,6 +67,37 @@ class RampDown:
         return self.start_rad + 0.5 * (self.rate_rad_s + rate) * passed, rate
 
 
+@dataclass(frozen=True)
+class Spin:
+    """One axis from rest through an angle at a constant rate to rest, as `procedures.core.turn.Turn` describes it.
+
+    The others hold. Of the given duration; the rate follows from it and from the angle.
+    """
+
+    start_rad: Array
+    axis: int
+    angle_rad: float
+    duration_s: float
+    ramp_s: float
+
+    def at(self, time_s: Array) -> tuple[Array, Array]:
+        """See `Profile`; at rest after the end."""
+        t = np.clip(time_s, 0.0, self.duration_s)
+        up = np.minimum(t / self.ramp_s, 1.0)
+        down = np.minimum((self.duration_s - t) / self.ramp_s, 1.0)
+        rate_rad_s = self.angle_rad / (self.duration_s - self.ramp_s)
+        # ∫(3s² − 2s³)ds = s³ − s⁴/2. A ramp that is over lacks half of itself; one to come lacks nothing.
+        covered = t + self.ramp_s * (_covered(up) - up + down - _covered(down) - 0.5)
+        position, rate = np.tile(self.start_rad, (len(t), 1)), np.zeros((len(t), 3))
+        position[:, self.axis] += np.where(t >= self.duration_s, self.angle_rad, rate_rad_s * covered)
+        rate[:, self.axis] = rate_rad_s * (up * up * (3.0 - 2.0 * up)) * (down * down * (3.0 - 2.0 * down))
+        return position, rate
+
+
+def _covered(s: Array) -> Array:
+    return s**3 * (1.0 - 0.5 * s)
+
+
 def move_ticks(distance_deg: Array, limits: tuple[AxisLimits, ...], rate_hz: float) -> int:
     """Whole ticks that a quintic move of all axes together needs within every axis' rate and acceleration."""
     longest = 0.0

@@ -9,13 +9,14 @@ from itertools import product
 import pytest
 
 from bench_service.jobs.errors import IdempotencyConflict, IllegalTransition, NotFound, StorageFailure
-from bench_service.jobs.job import LEGAL, Failure, Job, JobState
+from bench_service.jobs.job import FINAL, LEGAL, Failure, Job, JobState
 from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import Idempotency
+from bench_service.jobs.stored import BenchStop, Idempotency
 from bench_service.persistence import Database
 from bench_service.persistence.stores import stores_of
 from bench_service.wall_clock import new_id, now
 from procedures.core.limits import Verdict
+from tests.storage.conftest import NOW
 
 NewJob = Callable[..., Job]
 LATER = timedelta(seconds=5)
@@ -87,6 +88,7 @@ def test_a_job_through_its_life(stores: Stores, new_job: NewJob) -> None:
         result_id="r-1",
         stations_done=3,
         context={"bench": "mounted"},
+        attempt=2,
         started_at=start + LATER,
         finished_at=start + 8 * LATER,
     )
@@ -100,7 +102,7 @@ def test_a_job_through_its_life(stores: Stores, new_job: NewJob) -> None:
     assert stores.jobs.events(job.id, after=2, limit=3) == events[2:5]
 
 
-@pytest.mark.parametrize("state", [JobState.QUEUED, JobState.INTERRUPTED])
+@pytest.mark.parametrize("state", [JobState.QUEUED, JobState.PAUSED, JobState.INTERRUPTED])
 def test_a_job_that_does_not_run_is_cancelled_at_once(stores: Stores, new_job: NewJob, state: JobState) -> None:
     job = stores.jobs.add(new_job(state=state))
     cancelled = stores.jobs.request_cancel(job.id, now())
@@ -109,14 +111,45 @@ def test_a_job_that_does_not_run_is_cancelled_at_once(stores: Stores, new_job: N
         stores.jobs.request_cancel(job.id, now())
 
 
-@pytest.mark.parametrize("state", [JobState.RUNNING, JobState.PAUSED])
-def test_a_job_that_runs_is_asked_to_end(stores: Stores, new_job: NewJob, state: JobState) -> None:
-    job = stores.jobs.add(new_job(state=state))
+def test_a_job_that_runs_is_asked_to_end(stores: Stores, new_job: NewJob) -> None:
+    job = stores.jobs.add(new_job(state=JobState.RUNNING))
     assert not stores.jobs.cancel_requested(job.id)
     for _ in range(2):
-        assert stores.jobs.request_cancel(job.id, now()).state is state
+        assert stores.jobs.request_cancel(job.id, now()).state is JobState.RUNNING
     assert stores.jobs.cancel_requested(job.id)
     assert [e.kind for e in stores.jobs.events(job.id)] == ["state", "note"]
+
+
+def test_a_job_is_put_aside_and_taken_up_again_as_its_next_attempt(stores: Stores, new_job: NewJob) -> None:
+    job = stores.jobs.add(new_job(state=JobState.RUNNING))
+    for _ in range(2):
+        assert stores.jobs.request_pause(job.id, now()).pause_requested
+    assert stores.jobs.resume(job.id, now()).pause_requested is False  # the wish was taken back
+    assert [e.data for e in stores.jobs.events(job.id, after=1)] == [{"pause_requested": w} for w in (True, False)]
+    stores.jobs.request_pause(job.id, now())
+    stores.jobs.transition(job.id, JobState.PAUSED, at=now())
+    assert stores.jobs.request_pause(job.id, now()).state is JobState.PAUSED
+    again = stores.jobs.resume(job.id, now())
+    assert (again.state, again.attempt, again.pause_requested) == (JobState.QUEUED, 2, False)
+    with pytest.raises(IllegalTransition, match="is queued; it cannot become queued"):
+        stores.jobs.resume(job.id, now())
+    assert stores.jobs.request_pause(job.id, now()).state is JobState.PAUSED  # one that waits, at once
+    for state in FINAL:
+        ended = stores.jobs.add(new_job(state=state))
+        for verb in (stores.jobs.request_pause, stores.jobs.resume):
+            with pytest.raises(IllegalTransition, match=f"is {state.value}"):
+                verb(ended.id, now())
+
+
+def test_a_bench_stays_stopped_until_it_is_released(stores: Stores) -> None:
+    stop = BenchStop("b-1", NOW, "smoke")
+    stores.units.stop_bench(stop)
+    stores.units.stop_bench(BenchStop("b-1", NOW + LATER, "more smoke"))
+    assert stores.units.bench_stop("b-1") == stop
+    assert stores.units.bench_stop("b-2") is None
+    for _ in range(2):
+        stores.units.release_bench("b-1")
+    assert stores.units.bench_stop("b-1") is None
 
 
 def test_what_does_not_exist_is_not_found(stores: Stores) -> None:
@@ -126,6 +159,8 @@ def test_what_does_not_exist_is_not_found(stores: Stores) -> None:
         lambda: stores.jobs.events("x"),
         lambda: stores.jobs.cancel_requested("x"),
         lambda: stores.jobs.request_cancel("x", moment),
+        lambda: stores.jobs.request_pause("x", moment),
+        lambda: stores.jobs.resume("x", moment),
         lambda: stores.jobs.transition("x", JobState.RUNNING, at=moment),
         lambda: stores.jobs.station_done("x", 0, moment, {}),
         lambda: stores.jobs.set_context("x", {}),

@@ -1,0 +1,249 @@
+"""Gyro scale factor by whole turns (IEEE Std 647: scale factor over whole revolutions at fixed rates).
+
+Each axis of the unit in turn points upwards, along the table's outer axis, and the table makes n whole turns forth and
+n back at each of several rates while the unit is recorded. The turned angle is known to an arcsecond out of millions,
+the Earth's rate and the bias cancel between forth and back: so scale factors come out to a part in a million, where the
+Earth's rate alone leaves some hundred (methods.md, Errata), with asymmetry, nonlinearity and misalignments.
+The outer axis must turn without end. The accelerometers are recorded but not judged.
+"""
+
+from collections.abc import AsyncIterator, Sequence
+from math import ceil
+from typing import Annotated
+
+from pydantic import Field
+
+from procedures import steps
+from procedures.analysis import whole_turns_report as pictures
+from procedures.analysis.reference import site_with
+from procedures.analysis.station_means import launch_warnings
+from procedures.analysis.table_errors import TableUncertainty
+from procedures.analysis.whole_turns import TERMS, Term
+from procedures.analysis.whole_turns_plan import TurnPlan, TurnProgram, bench_time_s, coefficient_names, too_coarse
+from procedures.analysis.whole_turns_summary import WholeTurns, analyse_turns
+from procedures.bench import Bench, BenchDescription
+from procedures.bench.imu import Stream
+from procedures.core import units
+from procedures.core.errors import BadParameter
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.recording import AXES, Recording, Station
+from procedures.core.report import Report
+from procedures.core.site import Site
+from procedures.core.turn import PEAK_ACCELERATION
+from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+
+Arcsec = Annotated[float, Field(ge=0.0, le=3600.0)]
+Rate = Annotated[float, Field(ge=0.1, le=3600.0)]
+
+ACCELERATION_SHARE = 0.9
+"""Of the outer axis' acceleration, for ramps that are not told; the rest is for the servo."""
+
+
+class Limits(Parameters):
+    """Requirements on the measurement (issue 6) and on the unit (ours: the thesis's limit on the scale factor, 4.3)."""
+
+    scale_factor_3_sigma_ppm: float = Field(1.0, gt=0.0, le=1e6, description="three standard uncertainties")
+    asymmetry_ppm: float = Field(10.0, gt=0.0, le=1e6)
+    nonlinearity_ppm: float = Field(10.0, gt=0.0, le=1e6, description="each term at the reference rate")
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the residuals' chi-square")
+
+
+class Params(Parameters):
+    """How to turn, and what to hold the unit to. None takes the bench's value."""
+
+    rates_deg_s: tuple[Rate, ...] = Field(
+        (10.0, 20.0, 30.0, 40.0, 50.0), min_length=1, max_length=50, description="each forth and back, about each axis"
+    )
+    turning_s: float = Field(45.0, ge=1.0, le=86_400.0, description="at each rate, to the nearest whole turn")
+    ramp_s: float | None = Field(None, gt=0.0, le=600.0, description="None: what the outer axis' acceleration allows")
+    rest_s: float = Field(2.0, ge=1.0, le=600.0, description="at rest at the end of each recording")
+    settle_s: float = Field(2.0, ge=0.0, le=3600.0)
+    terms: tuple[Term, ...] = Field(TERMS, max_length=3, description="to fit beyond bias and matrix")
+    reference_rate_deg_s: Rate | None = Field(
+        None, description="where the nonlinearity is given; None: the largest of the rates"
+    )
+    latitude_deg: float | None = Field(None, ge=-90.0, le=90.0)
+    azimuth_deg: float | None = Field(None, ge=-360.0, le=360.0, description="heading of the table's zero")
+    orthogonality_sd_arcsec: Arcsec | None = Field(None, description="of each of the table's two right angles")
+    pointing_sd_arcsec: Arcsec | None = Field(None, description="of each axis, anew at each stop")
+    make_calibration: bool = Field(
+        False,
+        description="true: bias and matrix become the unit's current calibration, of the gyro triad alone; its bias is "
+        "coarser than that of a calibration at rest",
+    )
+    limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
+
+
+class Result(Outcome):
+    """The gyro triad's coefficients, the scale factor at each rate, and the verdict."""
+
+    gyro: WholeTurns
+    make_calibration: bool = False
+
+
+def resolve(params: Params, context: Context) -> Params:
+    """Ramps, site and table accuracy from the bench; the reference rate from the rates."""
+    site, accuracy, outer = context.bench.site, context.bench.accuracy, context.bench.outer
+    fastest = max(params.rates_deg_s)
+    ramp_s = PEAK_ACCELERATION * fastest / (ACCELERATION_SHARE * outer.acceleration_deg_s2)
+    defaults = {
+        "ramp_s": ceil(10.0 * ramp_s) / 10.0,
+        "reference_rate_deg_s": fastest,
+        "latitude_deg": site.latitude_deg,
+        "azimuth_deg": site.azimuth_deg,
+        "orthogonality_sd_arcsec": accuracy.orthogonality_sd_arcsec,
+        "pointing_sd_arcsec": accuracy.pointing_sd_arcsec,
+    }
+    return params.filled(defaults)
+
+
+def schedule(params: Params) -> tuple[Station, ...]:
+    """Axis x, y, z; for each every rate forth and back, one station each."""
+    return _program(params).stations()
+
+
+def predict(params: Params, context: Context) -> Prediction:
+    """Duration, every coefficient's uncertainty, and whether 3σ of the scale factor comes within its limit.
+
+    Raises `Undetermined` where the rates cannot tell the terms apart, `BadParameter` where the table cannot turn so.
+    """
+    params = resolve(params, context)
+    _require_possible(params, context.bench)
+    plan = _plan(params, context)
+    made = plan.estimator()
+    duration_s, per_axis_s = bench_time_s(plan)
+    if made is None:
+        return Prediction(duration_s, (), ("the noise of the gyro triad is not known: nothing is predicted",))
+    noise, total = made.noise_covariance.diagonal() ** 0.5, made.covariance.diagonal() ** 0.5
+    table = (made.table_per_sd**2).sum(axis=1) ** 0.5
+    parts = zip(coefficient_names(params.terms), total.tolist(), noise.tolist(), table.tolist(), strict=True)
+    uncertainties = tuple(
+        PredictedUncertainty(f"gyro.{name}", "rad/s" if name.startswith("b_") else "1", sd, of_noise, of_table)
+        for name, sd, of_noise, of_table in parts
+    )
+    basis = "whole turns; " + (
+        "the unit's calibration" if context.unit.calibration("gyro") else "nominal scale factors"
+    )
+    note = f"; bench time about each axis {', '.join(f'{a} {t:.0f} s' for a, t in zip(AXES, per_axis_s, strict=True))}"
+    return Prediction(duration_s, uncertainties, _warnings(params, plan), basis + note)
+
+
+async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
+    """Move, settle, record while the table turns, station after station."""
+    for station in stations:
+        yield await steps.record_turn(bench, station)
+
+
+def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
+    """Generalised least squares over the integrated outputs of all stations."""
+    params = resolve(params, context)
+    plan = _plan(params, context)
+    found = analyse_turns(
+        recordings,
+        plan.site,
+        plan.uncertainty,
+        context.unit.gyro,
+        params.terms,
+        params.reference_rate_deg_s or max(params.rates_deg_s),
+    )
+    checks = _checks(found, params)
+    warnings = _warnings(params, plan) + launch_warnings(recordings)
+    return Result(
+        checks=checks,
+        verdict=verdict(checks),
+        warnings=warnings,
+        gyro=found,
+        make_calibration=params.make_calibration,
+    )
+
+
+def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
+    """The gyro triad where that was asked for."""
+    return (result.gyro.calibration,) if result.make_calibration else ()
+
+
+def report(result: Result) -> Report:
+    """Coefficients, scale factor over the rates, checks."""
+    found = result.gyro
+    return Report(
+        sections=(pictures.coefficient_table(found), *pictures.rate_figures(found), pictures.rate_table(found))
+    )
+
+
+def _program(params: Params) -> TurnProgram:
+    if params.ramp_s is None:
+        raise BadParameter("ramp_s", None, "resolve the parameters first: the ramps come from the bench")
+    return TurnProgram(params.rates_deg_s, params.turning_s, params.ramp_s, params.rest_s, params.settle_s)
+
+
+def _plan(params: Params, context: Context) -> TurnPlan:
+    uncertainty = TableUncertainty(params.orthogonality_sd_arcsec or 0.0, params.pointing_sd_arcsec or 0.0)
+    reference = params.reference_rate_deg_s or max(params.rates_deg_s)
+    return TurnPlan(
+        _program(params),
+        context.unit,
+        context.bench.axis_motion,
+        _site(params, context),
+        uncertainty,
+        params.terms,
+        reference * units.DEG,
+    )
+
+
+def _site(params: Params, context: Context) -> Site:
+    return site_with(context.bench.site, params.latitude_deg, None, params.azimuth_deg, None)
+
+
+def _require_possible(params: Params, bench: BenchDescription) -> None:
+    """Refuse what the table cannot do, before anything moves."""
+    for station in schedule(params):
+        if station.angles is not None and (found := bench.violations(station.angles, station.turn)):
+            raise BadParameter("rates_deg_s", params.rates_deg_s, f"station {station.label}: {'; '.join(found)}")
+
+
+def _warnings(params: Params, plan: TurnPlan) -> tuple[str, ...]:
+    made = plan.estimator()
+    coarse = None if made is None else too_coarse(plan, made, params.limits.scale_factor_3_sigma_ppm)
+    if made is None:
+        return ("the noise of the gyro triad is not known: uncertainties come from the residuals alone",)
+    return () if coarse is None else (coarse,)
+
+
+def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
+    limits, ppm = params.limits, units.PPM
+    of_scale = Limit("ppm", maximum=limits.scale_factor_3_sigma_ppm, source="issue 6")
+    maxima = {
+        "asymmetry": ("asymmetry", limits.asymmetry_ppm),
+        "quadratic": ("nonlinearity, quadratic", limits.nonlinearity_ppm),
+        "cubic": ("nonlinearity, cubic", limits.nonlinearity_ppm),
+    }
+    checks: list[Check] = []
+    for number, axis in enumerate(AXES, start=1):
+        k = found.coefficient(f"K{number}{number}")
+        checks.append(check(f"gyro scale factor {axis}, 3σ", 3.0 * k.standard_uncertainty / ppm, of_scale))
+        for term in params.terms:
+            name, maximum = maxima[term]
+            c = found.coefficient(f"{term}_{axis}")
+            limit = Limit("ppm", maximum=maximum, source="ours, after thesis 4.3")
+            checks.append(check(f"gyro {name} {axis}", abs(c.estimate) / ppm, limit, c.standard_uncertainty / ppm))
+    if found.p_value is not None:
+        limit = Limit("1", minimum=limits.residual_p_value_min)
+        checks.append(check("gyro residuals, p-value of chi-square", found.p_value, limit))
+    return tuple(checks)
+
+
+PROCEDURE = Procedure(
+    "scale_factor_whole_turns",
+    "Gyro scale factor by whole turns",
+    "1.0.0",
+    Params,
+    Result,
+    resolve,
+    schedule,
+    predict,
+    acquire,
+    analyse,
+    report,
+    calibrations,
+)

@@ -1,0 +1,299 @@
+"""Scale factor by whole turns: exact on exact data, spread as claimed, refused where it cannot work."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter
+
+from procedures.analysis.table_errors import TableUncertainty
+from procedures.analysis.whole_turns import TERMS, Term, fit_turns, turning
+from procedures.analysis.whole_turns_plan import UPRIGHT, TurnPlan, TurnProgram, bench_time_s, longer_needed
+from procedures.bench.description import AxisLimits
+from procedures.catalog.scale_factor_whole_turns import PROCEDURE
+from procedures.core import units
+from procedures.core.errors import BadParameter, Undetermined, UnfitRecording
+from procedures.core.limits import Verdict
+from procedures.core.noise import NoiseCoefficients
+from procedures.core.recording import MemoryRecording, RecordingInfo, Station
+from procedures.core.turn import Turn
+from procedures.core.unit import TriadRecord, Unit
+from procedures.procedure import Context
+from tests.domain.forward_model import B_GYRO, GYRO_NOISE, K_GYRO, SITE, turn
+
+PPM, ARCSEC = 1e-6, units.ARCSEC
+REFERENCE = 50.0 * units.DEG
+EVEN = np.array([[30.0, -20.0], [-15.0, 25.0], [0.0, 40.0]]) * PPM
+"""Asymmetry and quadratic term of each channel, at 50 deg/s."""
+CUBIC = np.array([-12.0, 8.0, 20.0]) * PPM
+WHITE = NoiseCoefficients(quantization=0.39 * ARCSEC, random_walk=0.0014 * units.DEG_PER_SQRT_HOUR)
+SHORT = TurnProgram((20.0, 35.0, 50.0), 20.0, 1.0, 2.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Flaws:
+    """Right angles [arcsec], and pointing at the start (outer, middle, inner) and of the outer axis at the stop."""
+
+    orthogonality: tuple[float, float] = (0.0, 0.0)
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    stop: float = 0.0
+
+
+def outputs(station: Station, flaws: Flaws, even: np.ndarray, cubic: np.ndarray) -> np.ndarray:
+    """Integrated outputs of the three gyros: the table's motion step by step, matrices multiplied out, Simpson."""
+    whole, angles = station.turn, station.angles
+    assert whole is not None
+    assert angles is not None
+    up = np.linspace(0.0, 1.0, 2001)
+    ramp = up**2 * (3.0 - 2.0 * up)
+    steady_s = abs(360.0 * whole.turns) / whole.rate_deg_s - whole.ramp_s
+    rest_s = station.record_s - steady_s - 2 * whole.ramp_s
+    error_deg = (flaws.stop - flaws.start[0]) / 3600.0
+    rate = (360.0 * whole.turns + error_deg) / (steady_s + whole.ramp_s) * units.DEG
+    total, angle = np.zeros(3), units.DEG * (angles.outer_deg + flaws.start[0] / 3600.0)
+    deg = 1.0 / 3600.0
+    inside = (
+        turn("x", flaws.orthogonality[0] * deg)
+        @ turn("z", angles.middle_deg + flaws.start[1] * deg)
+        @ turn("y", flaws.orthogonality[1] * deg)
+        @ turn("x", angles.inner_deg + flaws.start[2] * deg)
+    )
+    latitude, azimuth = np.radians(SITE.latitude_deg), np.radians(SITE.azimuth_deg)
+    north, above = SITE.earth_rate_rad_s * np.array([np.cos(latitude), np.sin(latitude)])
+    earth = np.array([north * np.cos(azimuth), above, -north * np.sin(azimuth)])
+    on_ramp, steady, rest = (whole.ramp_s, ramp), (steady_s, 1.0 + 0 * up), (rest_s, 0 * up)
+    for seconds, share in (on_ramp, steady, (whole.ramp_s, ramp[::-1]), rest):
+        spin = rate * share
+        step = seconds / 2000
+        mean = np.concatenate([[0.0], np.cumsum(0.5 * (spin[1:] + spin[:-1]) * step)])
+        if np.ptp(share) > 0.0:  # the integral of the ramp, better than by trapezoid
+            forth = rate * seconds * (up**3 - up**4 / 2)
+            mean = forth if share[0] < share[-1] else rate * seconds / 2 - forth[::-1]
+        theta = angle + mean
+        level = np.column_stack([
+            earth[0] * np.cos(theta) - earth[2] * np.sin(theta),
+            earth[1] + spin,
+            earth[0] * np.sin(theta) + earth[2] * np.cos(theta),
+        ])  # fmt: skip
+        a = level @ inside @ K_GYRO.T
+        u = B_GYRO + a + 0.5 * even[:, 0] * np.abs(a) + even[:, 1] * a**2 / REFERENCE + cubic * a**3 / REFERENCE**2
+        weights = np.full(2001, 2.0)
+        weights[1::2], weights[[0, -1]] = 4.0, 1.0
+        total += step / 3.0 * (weights @ u)
+        angle = theta[-1]
+    return total
+
+
+def recorded(stations: Sequence[Station], unit: Unit, sums: np.ndarray) -> list[MemoryRecording]:
+    """Recordings of 40 samples whose gyros integrate to given angles (n, 3), with a little ripple; no other channel."""
+    ripple = np.where(np.arange(40) % 2, 1e-7, -1e-7)[:, None]
+    made, start = [], 10.0
+    for station, total in zip(stations, sums, strict=True):
+        info = RecordingInfo(station.label, "S-1", unit.channels[:3], 40 / station.record_s, 40, start, station)
+        made.append(MemoryRecording(info, total / station.record_s + ripple))
+        start += station.record_s + 3.0
+    return made
+
+
+@pytest.fixture
+def turnable(context: Context) -> Context:
+    outer = AxisLimits(-360.0, 360.0, 60.0, 100.0, continuous=True)
+    return Context(replace(context.unit, gyro=TriadRecord((WHITE,) * 3)), replace(context.bench, outer=outer))
+
+
+def truth(even: np.ndarray, cubic: np.ndarray) -> np.ndarray:
+    return np.column_stack([B_GYRO, K_GYRO, even, cubic])
+
+
+def test_the_exact_outputs_of_a_flawless_table_give_back_every_coefficient(turnable: Context) -> None:
+    stations = SHORT.stations()
+    sums = np.array([outputs(s, Flaws(), EVEN, CUBIC) for s in stations])
+    motion = turning(stations, np.array([s.record_s for s in stations]), SITE)
+    fit = fit_turns(motion, sums, TERMS, REFERENCE, None, TableUncertainty())
+    errors = fit.parameters - truth(EVEN, CUBIC)
+    # Left out of a is the Earth's part, which the square multiplies: 2q·Ω/a₀ = 5e-9 of the scale factor at q = 40 ppm.
+    np.testing.assert_allclose(errors[:, 1:4], 0, atol=1e-8)
+    np.testing.assert_allclose(errors[:, 4:], 0, atol=2e-8)
+    np.testing.assert_allclose(errors[:, 0], 0, atol=1e-3 * units.DEG_PER_HOUR)
+
+
+@pytest.mark.parametrize(
+    ("rate", "turns", "ramp_s"), [(10.0, 1, 0.5), (50.0, -6, 2.0), (60.0, 7, 40.0), (3.0, 1, 30.0)]
+)
+def test_the_earths_turn_is_that_of_the_motion_step_by_step(rate: float, turns: int, ramp_s: float) -> None:
+    whole = Turn("outer", turns, rate, ramp_s)
+    station = Station(0, "z up", UPRIGHT["z"], None, 0.0, whole.duration_s + 2.0, turn=whole)
+    motion = turning([station], np.array([station.record_s]), SITE)
+    zero = np.zeros((3, 2))
+    stepped = np.linalg.solve(K_GYRO, outputs(station, Flaws(), zero, zero[:, 0]) - B_GYRO * station.record_s)
+    # Simpson's error over 2000 steps of at most 1.1 deg is (1.1 deg)^4/180 of the Earth's 10″ a second.
+    np.testing.assert_allclose((motion.turned_b + motion.earth_rad)[0], stepped, rtol=0, atol=1e-4 * ARCSEC)
+
+
+def test_errors_have_the_spread_that_is_claimed_and_residuals_the_chi_square(turnable: Context) -> None:
+    """Of 120 units each of 21 spreads is known to 6.5 %: within four of these; so the mean chi-square of 33 · 120."""
+    rng, units_made = np.random.Generator(np.random.Philox(5)), 120
+    stations = SHORT.stations()
+    seconds = np.array([s.record_s for s in stations])
+    motion = turning(stations, seconds, SITE)
+    exact = np.array([outputs(s, Flaws(), 0 * EVEN, 0 * CUBIC) for s in stations])
+    per_axis = per_flaw(stations, exact)
+    noise = np.array([np.diag(2 * (WHITE.quantization / seconds) ** 2 + WHITE.random_walk**2 / seconds)] * 3)
+    errors, claims, chi_square = [], [], []
+    for _ in range(units_made):
+        constant, each = rng.normal(size=2) * 3.0, rng.normal(size=(len(stations), 4)) * 1.0
+        white = rng.normal(size=(len(stations), 3)) * (np.sqrt(np.diagonal(noise[0])) * seconds)[:, None]
+        y = (
+            exact
+            + white
+            + np.einsum("nfc,f->nc", per_axis[:, :2], constant)
+            + np.einsum("nfc,nf->nc", per_axis[:, 2:], each)
+        )
+        fit = fit_turns(motion, y, TERMS, REFERENCE, noise, TableUncertainty(3.0, 1.0))
+        errors.append((fit.parameters - truth(0 * EVEN, 0 * CUBIC)).ravel())
+        claims.append(np.sqrt(np.diagonal(fit.covariance)))
+        chi_square.append(fit.chi_square / fit.degrees_of_freedom)
+        assert fit.degrees_of_freedom == 33
+    spread = np.sqrt(np.mean(np.square(np.array(errors) / np.array(claims)), axis=0))
+    np.testing.assert_allclose(spread, 1.0, atol=4 / np.sqrt(2 * units_made))
+    assert np.mean(chi_square) == pytest.approx(1.0, abs=4 * np.sqrt(2 / (33 * units_made)))
+
+
+def per_flaw(stations: Sequence[Station], exact: np.ndarray) -> np.ndarray:
+    """Change of the outputs an arcsecond of each flaw, by difference: two right angles, three pointings, the stop."""
+    zero = np.zeros((3, 2))
+    one = [
+        Flaws((1.0, 0.0)),
+        Flaws((0.0, 1.0)),
+        *(Flaws(start=tuple(row)) for row in np.eye(3).tolist()),
+        Flaws(stop=1.0),
+    ]
+    changed = np.array([[outputs(s, flaw, zero, zero[:, 0]) for flaw in one] for s in stations])
+    return changed - exact[:, None]
+
+
+def test_the_default_plan_resolves_a_part_in_a_million_in_ten_minutes_an_axis_and_says_so(turnable: Context) -> None:
+    for unit in (turnable.unit, replace(turnable.unit, gyro=TriadRecord((GYRO_NOISE,) * 3))):
+        bench = replace(turnable.bench, accuracy=replace(turnable.bench.accuracy, pointing_sd_arcsec=1.0))
+        prediction = PROCEDURE.predict(PROCEDURE.params(), Context(unit, bench))
+        sd = {u.name: u.standard_uncertainty for u in prediction.uncertainties}
+        assert len(sd) == 21
+        assert all(3 * sd[f"gyro.K{i}{i}"] < 1.0 * PPM for i in (1, 2, 3))
+        assert prediction.warnings == ()
+        assert prediction.duration_s < 3 * 600.0
+        assert all(
+            u.standard_uncertainty == pytest.approx(np.hypot(u.from_noise, u.from_table))
+            for u in prediction.uncertainties
+        )
+
+
+def test_what_a_coarse_table_cannot_resolve_is_warned_of_with_the_way_out(turnable: Context) -> None:
+    params = PROCEDURE.params(pointing_sd_arcsec=5.0)
+    (warning,) = PROCEDURE.predict(params, turnable).warnings
+    assert "3σ is to be within 1 ppm and the plan's is" in warning
+    seconds = float(warning.split("turning_s = ")[1].split(" ")[0])
+    assert seconds > 45.0
+    assert PROCEDURE.predict(params.model_copy(update={"turning_s": seconds}), turnable).warnings == ()
+    half = PROCEDURE.predict(params.model_copy(update={"turning_s": seconds / 2}), turnable)
+    assert len(half.warnings) == 1
+    hopeless = PROCEDURE.predict(PROCEDURE.params(pointing_sd_arcsec=3600.0), turnable)
+    assert "no length of turning gets there" in hopeless.warnings[0]
+
+
+def run(context: Context, **parameters: object) -> tuple[object, list[MemoryRecording]]:
+    params = PROCEDURE.params(rates_deg_s=(20.0, 35.0, 50.0), turning_s=20.0, **parameters)
+    stations = PROCEDURE.schedule(PROCEDURE.resolve(params, context))
+    return params, recorded(stations, context.unit, np.array([outputs(s, Flaws(), EVEN, CUBIC) for s in stations]))
+
+
+def test_from_recordings_to_a_result_and_back(turnable: Context) -> None:
+    params, recordings = run(turnable, make_calibration=True)
+    result = PROCEDURE.analyse(recordings, params, turnable)
+    assert PROCEDURE.result.model_validate_json(result.model_dump_json()) == result
+    found = result.gyro.coefficient("asymmetry_x")
+    assert found.estimate == pytest.approx(30 * PPM, abs=2e-8)
+    failed = {c.name for c in result.checks if not c.passed}
+    assert result.verdict is Verdict.FAIL
+    assert {"gyro asymmetry x", "gyro nonlinearity, quadratic z", "gyro nonlinearity, cubic z"} <= failed
+    points = {(p.axis, p.rate_deg_s): p for p in result.gyro.points}
+    assert len(points) == 18
+    # At ±50 deg/s of axis x, short of its ramps: ±s/2 ± q + c, with the terms' own scale a/a₀ = K11 = 1.0048.
+    at = points["x", 50.0].departure / PPM, points["x", -50.0].departure / PPM
+    assert at == (pytest.approx(15 - 20 - 12, abs=2.5), pytest.approx(-15 + 20 - 12, abs=2.5))
+    (calibration,) = PROCEDURE.calibrations(result)
+    np.testing.assert_allclose(calibration.matrix_array, K_GYRO, atol=2e-9)
+    assert PROCEDURE.calibrations(result.model_copy(update={"make_calibration": False})) == ()
+    assert len(PROCEDURE.report(result).sections) == 5
+
+
+def test_unknown_noise_is_estimated_from_the_residuals(turnable: Context) -> None:
+    unknown = Context(replace(turnable.unit, gyro=None), turnable.bench)
+    params, recordings = run(unknown)
+    rng = np.random.Generator(np.random.Philox(8))
+    noisy = [replace(r, raw=r.raw + rng.normal(size=3) * 2.0 * ARCSEC / r.info.duration_s) for r in recordings]
+    result = PROCEDURE.analyse(noisy, params, unknown)
+    assert result.gyro.p_value is None
+    assert "noise of the gyro triad is not known" in result.warnings[0]
+    estimated = np.sqrt(result.gyro.chi_square / 33)
+    assert estimated == pytest.approx(2.0, rel=4 / np.sqrt(2 * 33))  # in arcseconds, 33 degrees of freedom
+    assert PROCEDURE.predict(params, unknown).uncertainties == ()
+
+
+def test_recordings_that_do_not_hold_the_turns_are_refused(turnable: Context) -> None:
+    params, recordings = run(turnable)
+    lost = [replace(recordings[0], raw=0.7 * recordings[0].raw), *recordings[1:]]
+    with pytest.raises(UnfitRecording, match=r"x \+20 deg/s.*gyro_x counted 0.7"):
+        PROCEDURE.analyse(lost, params, turnable)
+    still = replace(recordings[0].info, station=replace(recordings[0].info.station, turn=None))
+    with pytest.raises(UnfitRecording, match="its station has no whole turns"):
+        PROCEDURE.analyse([replace(recordings[0], info=still), *recordings[1:]], params, turnable)
+    counts = [replace(c, unit="count") for c in recordings[0].info.channels]
+    in_counts = [replace(r, info=replace(r.info, channels=tuple(counts))) for r in recordings]
+    with pytest.raises(UnfitRecording, match="are in count"):
+        PROCEDURE.analyse(in_counts, params, turnable)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "error", "words"),
+    [
+        ({"rates_deg_s": (20.0,)}, Undetermined, "fewer terms need fewer rates"),
+        ({"rates_deg_s": (61.0,), "terms": ()}, BadParameter, "outer rate of 61 deg/s is above 60"),
+        ({"ramp_s": 0.5}, BadParameter, "ramps of"),
+        ({"ramp_s": 50.0}, BadParameter, "the rate is not reached"),
+    ],
+)
+def test_a_plan_that_cannot_work_is_refused_beforehand(turnable, parameters, error, words: str) -> None:
+    with pytest.raises(error, match=words):
+        PROCEDURE.predict(PROCEDURE.params(**parameters), turnable)
+
+
+def test_a_table_without_slip_rings_is_refused(context: Context) -> None:
+    with pytest.raises(BadParameter, match="it has no slip rings"):
+        PROCEDURE.predict(PROCEDURE.params(), context)
+
+
+def test_one_rate_is_enough_for_the_linear_coefficients(turnable: Context) -> None:
+    terms: tuple[Term, ...] = ()
+    prediction = PROCEDURE.predict(PROCEDURE.params(rates_deg_s=(40.0,), terms=terms), turnable)
+    assert [u.name for u in prediction.uncertainties][:4] == ["gyro.b_x", "gyro.K11", "gyro.K12", "gyro.K13"]
+    assert len(prediction.uncertainties) == 12
+
+
+def test_a_station_with_turns_is_kept_as_json() -> None:
+    adapter = TypeAdapter(tuple[Station, ...])
+    stations = SHORT.stations()
+    assert adapter.validate_json(adapter.dump_json(stations)) == stations
+    document = adapter.dump_python(stations, mode="json")
+    del document[0]["turn"]
+    assert adapter.validate_python(document)[0].turn is None
+
+
+def test_how_much_longer_is_found_in_powers_of_two(turnable: Context) -> None:
+    plan = TurnPlan(
+        SHORT, turnable.unit, turnable.bench.axis_motion, SITE, TableUncertainty(3.0, 1.0), TERMS, REFERENCE
+    )
+    assert longer_needed(plan, 1e-12) is None
+    assert longer_needed(plan, 1.0) == 2
+    assert len(bench_time_s(plan)[1]) == 3
+    assert sum(bench_time_s(plan)[1]) == pytest.approx(bench_time_s(plan)[0])
