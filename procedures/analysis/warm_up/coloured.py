@@ -1,0 +1,164 @@
+"""The noise of one long record of cell means, taken apart by cosines. Knows no transient.
+
+The cosines of a discrete cosine transform (type II, orthonormal) take a rate random walk and a white noise apart
+exactly, a flicker noise and a quantization noise nearly: their coefficients are all but uncorrelated. So the
+likelihood of a record is that of its coefficients' squares (Whittle's), with the *exact* variance of each, and
+dividing by its root whitens whatever curve is to be fitted. The mean (k = 0) says nothing about noise and is left out.
+
+With Δ the cell length and r_m the covariance of cells m apart, per unit coefficient (IEEE Std 952 C; `core.noise`):
+
+* quantization ``r_0 = 2/Δ²``, ``r_1 = −1/Δ²``; random walk ``r_0 = 1/Δ``;
+* bias instability, density 1/(πf): ``−(1/π)·δ²[½m² ln m]``, and rate random walk ``−Δ·δ²[m³/12]``, with δ² the
+  second difference over m: covariances up to a constant, which no cosine sees.
+"""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from scipy.fft import dct
+from scipy.optimize import nnls
+
+from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.noise import NoiseCoefficients
+
+MOST = 2048
+"""A longer series is averaged in groups to at most so many cells."""
+FEWEST = 64
+"""Fewer cells do not tell noise from transient."""
+_SINGLE, _PER_E_FOLD = 24, 8
+_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class CosineSeries:
+    """A series by its cosines."""
+
+    values: Array
+    """Means over the grouped cells, (n,) [rate]; cells at the end that fill no group are left out."""
+    cell_s: float
+    """Length of a grouped cell [s]."""
+    coefficients: Array
+    """Orthonormal cosine coefficients k = 1…n−1, (n−1,) [rate]."""
+    unit_variances: Array
+    """Their variances per unit Q², N², B² and K², (4, n−1)."""
+
+    @property
+    def edges_s(self) -> Array:
+        """Edges of the cells from the first one's beginning, (n+1,) [s]."""
+        return np.arange(len(self.values) + 1, dtype=np.float64) * self.cell_s
+
+
+def cosine_series(cells: Array, cell_s: float, most: int = MOST) -> CosineSeries:
+    """Groups cell means (n,) [rate] of length `cell_s` [s]. Raises `BadParameter` and `UnfitRecording`."""
+    if not 0.0 < cell_s < float("inf"):
+        raise BadParameter("cell_s", cell_s, "finite and above 0 s")
+    if cells.ndim != 1 or len(cells) < FEWEST:
+        raise UnfitRecording(f"{cells.size} cells are too few to tell a transient from noise; it takes {FEWEST}")
+    if not np.all(np.isfinite(cells)):
+        raise UnfitRecording(f"cell {int(np.argmin(np.isfinite(cells)))} is not finite: a transient cannot be sought")
+    if np.ptp(cells) == 0.0:
+        raise UnfitRecording("all cells are equal: a channel that says nothing")
+    group = -(-len(cells) // most)
+    values = cells[: len(cells) // group * group].reshape(-1, group).mean(axis=1)
+    length = group * cell_s
+    return CosineSeries(values, length, cosines(values), unit_variances(len(values), length))
+
+
+def cosines(values: Array) -> Array:
+    """Orthonormal cosine coefficients k = 1…n−1 of columns (n,) or (n, m), in the unit of the values."""
+    return np.asarray(dct(values, type=2, norm="ortho", axis=0), dtype=np.float64)[1:]
+
+
+def unit_variances(n: int, cell_s: float) -> Array:
+    """Variances of the cosine coefficients of n cells per unit Q², N², B² and K², (4, n−1)."""
+    m = np.arange(n + 1, dtype=np.float64)
+    quantization, white = np.zeros(n), np.zeros(n)
+    quantization[:2] = 2.0 / cell_s**2, -1.0 / cell_s**2
+    white[0] = 1.0 / cell_s
+    twice = 0.5 * m**2 * np.log(np.maximum(m, 1.0))
+    flicker = -(twice[1:] - 2.0 * twice[:-1] + np.concatenate([twice[1:2], twice[:-2]])) / pi
+    walk = -0.5 * cell_s * m[:-1]
+    walk[0] = -cell_s / 6.0
+    return np.array([_cosine_variances(r) for r in (quantization, white, flicker, walk)])
+
+
+def _cosine_variances(r: Array) -> Array:
+    """Diagonal of the Toeplitz matrix of r (n,) between cosines k = 1…n−1, by a product of cosines being a sum."""
+    n = len(r)
+    lags = np.arange(n)
+    differences = np.zeros(2 * n)
+    differences[:n] = (n - lags) * r
+    differences[n + 1 :] = differences[1:n][::-1]
+    along = np.empty(n)  # Σ r_{i−j} over i + j = L, for L < n: the lags of L's parity up to it, both signs
+    along[0::2] = 2.0 * np.cumsum(r[0::2]) - r[0]
+    along[1::2] = 2.0 * np.cumsum(r[1::2])
+    sums = np.zeros(2 * n)
+    sums[1 : n + 1] = along
+    sums[n + 1 :] = along[:-1][::-1]
+    return np.fft.rfft(differences + sums).real[1:n] / n
+
+
+@dataclass(frozen=True)
+class FittedNoise:
+    """Noise by maximum likelihood."""
+
+    noise: NoiseCoefficients
+    variances: Array
+    """Of the cosine coefficients k = 1…n−1, (n−1,) [rate²]."""
+    deviance: float
+    """Minus twice the log likelihood, up to a constant of the record."""
+
+    @property
+    def weights(self) -> Array:
+        """What whitens a cosine coefficient, (n−1,) [1/rate]."""
+        return 1.0 / np.sqrt(self.variances)
+
+
+def fit_noise(coefficients: Array, units: Array) -> FittedNoise:
+    """Q, N, B and K, none negative, most likely for cosine coefficients (n−1,) with `unit_variances` (4, n−1).
+
+    Minimises ``Σ ln s_k + c_k²/s_k`` over ``s = Σ θ_j·u_jk`` by Fisher scoring, each step a non-negative least squares
+    with weights 1/s². Neighbouring coefficients of high k, where s is smooth, are taken together.
+    """
+    starts = _bins(len(coefficients))
+    counts = np.diff(np.append(starts, len(coefficients))).astype(np.float64)
+    power = np.add.reduceat(coefficients**2, starts) / counts
+    shares = np.add.reduceat(units, starts, axis=1) / counts
+    theta = np.mean(power) / np.mean(shares, axis=1) / len(units)
+    for _ in range(30):  # each step raises the likelihood; a rough start for the scoring
+        s = theta @ shares
+        theta = theta * np.sqrt((shares @ (counts * power / s**2)) / (shares @ (counts / s)))
+    best, least = theta, _deviance(counts, power, theta @ shares)
+    for _ in range(40):
+        weight = np.sqrt(counts) / (best @ shares)
+        size = np.linalg.norm(shares * weight, axis=1)
+        step = nnls((shares * weight).T / size, weight * power)[0] / size - best
+        length, deviance = 1.0, np.inf
+        while length > 1e-3:
+            deviance = _deviance(counts, power, (best + length * step) @ shares)
+            if deviance <= least:
+                break
+            length *= 0.5
+        if deviance >= least - _TOLERANCE:
+            break
+        best, least = best + length * step, deviance
+    q, n, b, k = np.sqrt(best).tolist()
+    noise = NoiseCoefficients(quantization=q, random_walk=n, bias_instability=b, rate_random_walk=k)
+    return FittedNoise(noise, best @ units, least)
+
+
+def _deviance(counts: Array, power: Array, s: Array) -> float:
+    if np.any(s <= 0.0):
+        return np.inf
+    return float(np.dot(counts, np.log(s) + power / s))
+
+
+def _bins(count: int) -> list[int]:
+    """First index of each bin: singly at first, then evenly in the logarithm."""
+    if count <= _SINGLE:
+        return list(range(count))
+    number = max(2, int(np.log(count / _SINGLE) * _PER_E_FOLD))
+    later = np.round(np.geomspace(_SINGLE, count, number, endpoint=False)).astype(int)
+    return sorted({*range(_SINGLE), *later.tolist()})
