@@ -2,6 +2,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
+VALIDATIONS := calibration allan noise conditioning whole_turns
 
 .DEFAULT_GOAL := help
 .PHONY: help run test bench check validate lock clean
@@ -27,10 +28,10 @@ check: $(VENV)/.ready  ## format, lint, types, import contracts
 	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/lint-imports --no-cache && $(BIN)/basedpyright
 
 validate: $(VENV)/.ready  ## Monte Carlo against theory over 1000 simulated units and more
-	@$(BIN)/python -m tests.validation.calibration
+	@held=0; for part in $(VALIDATIONS); do echo "== $$part"; $(BIN)/python -m tests.validation.$$part || held=1; done; exit $$held
 
 bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
-	@$(BIN)/python -m tests.benchmarks; kept=$$?; $(BIN)/python -m tests.benchmarks.allan && exit $$kept
+	@kept=0; for part in tests.benchmarks tests.benchmarks.allan tests.benchmarks.static; do $(BIN)/python -m $$part || kept=1; done; exit $$kept
 
 lock: $(VENV)/.ready  ## compile requirements.lock anew
 	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev pyproject.toml -o requirements.lock

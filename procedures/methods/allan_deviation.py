@@ -12,8 +12,8 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from procedures.analysis.allan.correlated import Uncorrelatable
 from procedures.analysis.allan.deviation import Deviation, DeviationStream
-from procedures.analysis.allan.overlapping import RoundingTooLarge
 from procedures.analysis.allan.statistic import STATISTICS, Statistic, log_sizes
 from procedures.core import units
 from procedures.core.errors import UnfitRecording
@@ -103,7 +103,7 @@ def _curves(recording: Recording, statistic: Statistic, params: Params) -> tuple
     names = params.channels or tuple(c.name for c in info.channels if c.quantity is not Quantity.TEMPERATURE)
     try:
         found = _deviations(recording, names, statistic, params, correlate=True)
-    except RoundingTooLarge:
+    except Uncorrelatable:
         found = _deviations(recording, names, statistic, params, correlate=False)
     return tuple(
         Curve(
@@ -160,7 +160,7 @@ def _naming(recording: str, channel: str = "") -> Generator[None]:
     """A refusal says which recording and channel it is about."""
     try:
         yield
-    except RoundingTooLarge:
+    except Uncorrelatable:
         raise
     except UnfitRecording as refusal:
         where = f"recording {recording}" + (f": channel {channel}" if channel else "")

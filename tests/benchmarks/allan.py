@@ -2,15 +2,17 @@
 
 import resource
 import sys
+import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
 from bench_service.wall_clock import monotonic_s
-from procedures.analysis.allan.band import BandStream, start_sums
-from procedures.analysis.allan.deviation import deviation
-from procedures.analysis.allan.statistic import log_sizes
+from procedures.analysis.allan.band import Band, BandStream, start_sums
+from procedures.analysis.allan.deviation import Deviation, DeviationStream, deviation
+from procedures.analysis.allan.statistic import STATISTICS, decade_sizes, log_sizes
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -40,35 +42,99 @@ def noise(samples: int, quantization: float) -> Iterator[np.ndarray]:
         last = float(reading[-1])
 
 
+def kinds() -> Iterator[tuple[str, np.ndarray]]:
+    """Records of the benchmark's length whose deviations the fast sums reach by different ways."""
+    rng = np.random.default_rng(2)
+    readings = rng.normal(0.0, np.sqrt(64.0 * RATE_HZ / 3.0), SAMPLES + 1)
+    yield "quantization below 64 s", np.diff(readings) + rng.normal(size=SAMPLES)
+    yield "quantization alone", np.diff(readings)
+    yield "white", rng.normal(size=SAMPLES)
+    spectrum = np.fft.rfft(rng.normal(size=SAMPLES))
+    spectrum[1:] /= np.sqrt(np.arange(1, len(spectrum)))
+    yield "flicker", np.fft.irfft(spectrum, SAMPLES)
+    yield "random walk", np.cumsum(rng.normal(size=SAMPLES))
+
+
+def cpu_s(work: Callable[[], object]) -> float:
+    """Median processor time of three rounds [s]: all of this is one thread's, and machines are shared."""
+    times: list[float] = []
+    for _ in range(3):
+        begun = time.process_time()
+        work()
+        times.append(time.process_time() - begun)
+    return sorted(times)[1]
+
+
+def theirs(y: np.ndarray, found: Deviation) -> np.ndarray:
+    """The peer at the same cluster sizes; it leaves out the last, of a single term."""
+    _, peer, _, _ = allantools.oadev(y, rate=RATE_HZ, data_type="freq", taus=found.tau_s)
+    return peer
+
+
 def overlapping() -> None:
     """Overlapping Allan of a long record against allantools at the same cluster sizes."""
     y = np.concatenate(list(noise(SAMPLES, 20.0)))  # angle noise rules below about 1200 samples
-    ours: list[float] = []
-    for _ in range(3):
-        begun = monotonic_s()
-        result = deviation(y, RATE_HZ, sizes=log_sizes(SAMPLES // 2, SIZES))
-        ours.append(monotonic_s() - begun)
-    begun = monotonic_s()
-    _, theirs, _, _ = allantools.oadev(y, rate=RATE_HZ, data_type="freq", taus=result.tau_s)
-    peer = monotonic_s() - begun
-    difference = np.abs(result.deviation[: len(theirs)] / theirs - 1.0)
-    exact = result.strides[: len(theirs)] == 1
-    print(f"overlapping Allan, {SAMPLES} samples, {len(result.sizes)} cluster sizes, with intervals")
-    print(f"  ours {sorted(ours)[1]:.2f} s (median of 3), allantools {peer:.1f} s: 1/{peer / sorted(ours)[1]:.0f}")
-    print(
-        f"  largest difference: {difference[exact].max():.1e} exact part, {difference[~exact].max():.2%} thinned part"
-    )
-    print(f"  budget: 1/60 and 0.10 %; peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3:.0f} MB")
+    counts, sizes = np.round(50.0 * y).astype(np.int32), log_sizes(SAMPLES // 2, SIZES)
+    found = deviation(y, RATE_HZ, sizes=sizes)
+    peer = cpu_s(lambda: theirs(y, found))
+    print(f"overlapping Allan, {SAMPLES} samples, {len(found.sizes)} cluster sizes, with intervals")
+    print("  processor time, medians of 3")
+    for name, samples in (("float64 rates", y), ("int32 increments", counts)):
+        increments = samples.dtype == np.int32
+        ours = cpu_s(partial(deviation, samples, RATE_HZ, sizes=sizes, increments=increments))
+        print(f"  {name:17}: ours {ours:.2f} s, allantools {peer:.1f} s: 1/{peer / ours:.0f}; budget 1/60")
+    for name, record in (("mixture", y), *kinds()):
+        some = sizes if name == "mixture" else sizes[::4]
+        result = deviation(record, RATE_HZ, sizes=some)
+        reference = theirs(record, result)
+        off = np.abs(result.deviation[: len(reference)] / reference - 1.0)
+        exact = result.strides[: len(reference)] == 1
+        print(
+            f"  {name:24} off by {off[exact].max():.1e} up to {result.sizes[: len(reference)][exact].max()} samples, "
+            f"{off[~exact].max():.3%} beyond; budget 0.10 %"
+        )
+    for statistic in STATISTICS.values():
+        took = cpu_s(partial(deviation, y, RATE_HZ, statistic, sizes=log_sizes(statistic.largest(SAMPLES), SIZES)))
+        print(f"  {statistic.name:22} {took:.2f} s")
+
+
+def launch() -> None:
+    """Six channels in blocks, as a static launch gives them; and what is asked of means of a second."""
+    block = np.random.default_rng(3).normal(size=BLOCK)
+    for samples, hours in ((SAMPLES, 6), (93_600_000, 65)):
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        streams = [DeviationStream(RATE_HZ, samples, sizes=log_sizes(samples // 2, 100)) for _ in range(6)]
+        begun = time.process_time()
+        for start in range(0, samples, BLOCK):
+            for stream in streams:
+                stream.add(block[: samples - start])
+        for stream in streams:
+            stream.finish()
+        took = (time.process_time() - begun) / 6
+        grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1e3
+        print(f"six channels of {hours} h: {took:.2f} s a channel, peak memory grown by {grown:.0f} MB")
+    y = np.concatenate(list(noise(SAMPLES, 0.0)))
+    for number in (60, 100):
+        took = cpu_s(partial(banded, [y], log_sizes(SAMPLES // 2, number)))
+        print(f"band of {SAMPLES} samples, {number} sizes: {took:.2f} s a channel; budget 0.30 s")
+    for cells in (21_600, 234_000):
+        took = cpu_s(partial(deviation, y[:cells], 1.0, sizes=log_sizes(cells // 2, 60)))
+        print(f"deviation of {cells} cells, 60 sizes: {1e3 * took:.0f} ms; budget {20 if cells < 1e5 else 200} ms")
+
+
+def banded(blocks: list[np.ndarray], sizes: np.ndarray) -> Band:
+    """The band of a record in blocks."""
+    stream = BandStream(RATE_HZ, sum(map(len, blocks)), sizes=sizes)
+    for block in blocks:
+        stream.add(block)
+    return stream.finish()
 
 
 def band(samples: int) -> None:
     """Band with a 0.002-decade step against exact sums at some sizes."""
     blocks = list(noise(samples, 0.0))
     begun = monotonic_s()
-    stream = BandStream(RATE_HZ, samples)
-    for block in blocks:
-        stream.add(block)
-    ours = stream.finish()
+    ours = banded(blocks, decade_sizes(samples // 2, 0.002))
     took = monotonic_s() - begun
     print(f"band, {samples} samples, {len(ours.sizes)} cluster sizes (0.002 decade): {took:.1f} s; budget 30 s")
     x = np.zeros(samples + 1)
@@ -97,5 +163,6 @@ def band(samples: int) -> None:
 
 
 if __name__ == "__main__":
+    launch()
     overlapping()
     band(int(sys.argv[1]) if len(sys.argv) > 1 else BAND_SAMPLES)

@@ -9,7 +9,9 @@ from procedures.analysis.allan.statistic import (
     HADAMARD,
     MODIFIED_ALLAN,
     OVERLAPPING_ALLAN,
+    OVERLAPPING_HADAMARD,
     STATISTICS,
+    TIME,
     Statistic,
 )
 
@@ -57,6 +59,17 @@ def test_every_printed_digit_of_table_30(name: str, monkeypatch: pytest.MonkeyPa
     found = deviation(NBS14, 1.0, STATISTICS[name], sizes=[1, 2])
     digits = [len(text.split(".")[1]) for text in TABLE_30[name]]
     assert tuple(f"{v:.{d}f}" for v, d in zip(found.deviation, digits, strict=True)) == TABLE_30[name]
+
+
+OVERLAPPING_HADAMARD_1000 = """1 2.9439e-01 2 2.0125e-01 3 1.6240e-01 5 1.3344e-01 8 1.0987e-01 13 7.6285e-02
+    21 4.9759e-02 34 4.5024e-02 55 3.5111e-02 89 3.3493e-02 143 2.5501e-02 231 1.2500e-02 247 1.1150e-02"""
+"""The 1000 points as Stable32 prints them between the columns of Table 31."""
+
+
+def test_every_printed_digit_between_the_columns(nist_1000: np.ndarray) -> None:
+    words = OVERLAPPING_HADAMARD_1000.split()
+    found = deviation(nist_1000, 1.0, OVERLAPPING_HADAMARD, sizes=[int(m) for m in words[::2]])
+    assert [f"{value:.4e}" for value in found.deviation] == words[1::2]
 
 
 STABLE32 = [  # statistic, samples, then rows of m, α, least, sigma, greatest as Stable32 1.60 prints them (68.3 %)
@@ -107,6 +120,40 @@ STABLE32 = [  # statistic, samples, then rows of m, α, least, sigma, greatest a
         128 -1 4.8839e-12 5.2198e-12 5.6361e-12
         512 -2 3.9824e-12 4.4684e-12 5.1904e-12
         2048 -2 7.3681e-12 9.1993e-12 1.3822e-11""",
+    ),
+    (
+        OVERLAPPING_HADAMARD,
+        19982,
+        """1 1 7.9203e-11 7.9753e-11 8.0315e-11
+        2 1 4.2296e-11 4.2610e-11 4.2931e-11
+        4 0 1.9603e-11 1.9793e-11 1.9990e-11
+        8 1 9.8549e-12 9.9549e-12 1.0058e-11
+        16 -2 5.4935e-12 5.6036e-12 5.7207e-12
+        32 -2 4.2398e-12 4.3595e-12 4.4900e-12
+        64 -2 4.1180e-12 4.2817e-12 4.4667e-12
+        128 -1 4.6679e-12 4.9244e-12 5.2287e-12
+        256 -1 4.1723e-12 4.4968e-12 4.9112e-12
+        512 -2 3.8499e-12 4.2789e-12 4.8931e-12
+        1024 -1 4.2162e-12 4.8704e-12 5.9683e-12
+        2048 0 6.4971e-12 7.7990e-12 1.0424e-11
+        4096 0 6.5430e-12 8.4681e-12 1.4748e-11""",
+    ),
+    (
+        TIME,
+        19982,
+        """1 1 4.3689e-11 4.3961e-11 4.4238e-11
+        2 1 3.2336e-11 3.2568e-11 3.2805e-11
+        4 0 2.2040e-11 2.2261e-11 2.2490e-11
+        8 1 1.9202e-11 1.9470e-11 1.9750e-11
+        16 -2 3.1452e-11 3.2159e-11 3.2915e-11
+        32 -2 6.4932e-11 6.6986e-11 6.9250e-11
+        64 -2 1.4705e-10 1.5359e-10 1.6111e-10
+        128 -1 3.1063e-10 3.2813e-10 3.4897e-10
+        256 -1 5.6516e-10 6.1021e-10 6.6807e-10
+        512 -2 1.1524e-09 1.2957e-09 1.5104e-09
+        1024 -1 3.0605e-09 3.5476e-09 4.3778e-09
+        2048 0 6.7733e-09 8.3072e-09 1.1784e-08
+        4096 0 1.7460e-08 2.3192e-08 4.6937e-08""",
     ),
 ]
 

@@ -15,6 +15,7 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from procedures.analysis.allan.differences import squared
 from procedures.analysis.allan.integral import Integral
 from procedures.analysis.allan.statistic import ALLAN, Sizes, checked_sizes, decade_sizes
 from procedures.core.arrays import Array
@@ -28,7 +29,7 @@ STARTS = 128
 """Sizes of at least so many held points start at the points; smaller ones at chosen samples, exactly."""
 LONG, THIN = 1 << 11, 4
 """Sizes of at least `LONG` held points start at every `THIN`-th of them."""
-_CHUNK = 1 << 20
+_CHUNK = 1 << 18
 _CACHED = 1 << 15
 
 
@@ -170,7 +171,7 @@ class _Near:
             means = np.diff(ends.copy().ravel() if columns == 1 else ends.copy(), axis=0)
             means[:-1] -= means[1:]
             d = means[:-1]
-            self._sums[:columns] += np.dot(d, d) if columns == 1 else np.einsum("ij,ij->j", d, d)
+            self._sums[:columns] += squared(d) if columns == 1 else np.einsum("ij,ij->j", d, d)
 
     def add(self, x: Array, first: int) -> None:
         """Its share of the terms that fit into `x`, which begins at sample `first`, for every offset."""

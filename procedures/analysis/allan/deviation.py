@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from procedures.analysis.allan.correlated import CorrelatedSums, Uncorrelatable
 from procedures.analysis.allan.differences import NonOverlappingSums
 from procedures.analysis.allan.freedom import ONE_SIGMA, degrees_of_freedom, interval
-from procedures.analysis.allan.identification import LatePoints
+from procedures.analysis.allan.identification import exponents
 from procedures.analysis.allan.integral import Gaps, Integral
-from procedures.analysis.allan.overlapping import OverlappingSums, RoundingTooLarge
+from procedures.analysis.allan.overlapping import WHOLE, OverlappingSums
 from procedures.analysis.allan.statistic import OVERLAPPING_ALLAN, Sizes, Statistic, checked_sizes
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
@@ -32,7 +33,7 @@ class Deviation:
     left_out: NDArray[np.int64]
     """Those left out because they touch a gap."""
     strides: NDArray[np.int64]
-    """Samples between the starts of neighbouring terms; 1 is exact, more: see `differences`."""
+    """Samples between neighbouring terms; 1 is exact, more: see `correlated` and `overlapping`."""
     alpha: Array
     """Exponent of the rate's spectral density that the edf were taken for."""
     edf: Array
@@ -45,7 +46,7 @@ class Deviation:
 
 
 class DeviationStream:
-    """One channel's deviation from blocks, in bounded memory (about 40 MB, whatever the length).
+    """One channel's deviation from blocks, in bounded memory (10 MB for 10⁷ samples, 25 MB for 10⁸).
 
     Samples are rates, or with ``increments=True`` increments of the integrated output, which are multiplied by
     `rate_hz`. A NaN is refused, or with ``gaps="aware"`` the terms that touch it are left out and counted. `count` is
@@ -68,24 +69,31 @@ class DeviationStream:
         wanted = checked_sizes(sizes, count, statistic)
         interval(np.ones(1), np.ones(1), confidence)
         self._integral = Integral(rate_hz, increments=increments, gaps=gaps)
-        if statistic.overlapping:
-            self._sums = OverlappingSums(statistic, count, wanted, correlate=correlate)
-        else:
+        self._sums: CorrelatedSums | OverlappingSums | NonOverlappingSums
+        if not statistic.overlapping:
             self._sums = NonOverlappingSums(statistic, count, wanted)
-        self._late = LatePoints(count)
+        elif count <= WHOLE or gaps != "refuse" or not correlate:
+            self._sums = OverlappingSums(statistic, count, wanted)
+        else:
+            self._sums = CorrelatedSums(statistic, count, wanted)
 
     def add(self, block: Array | NDArray[np.int32]) -> None:
         """The next samples of the channel, (n,)."""
         if self._integral.count + len(block) > self._count:
             raise UnfitRecording(f"more samples came than the {self._count} that were announced")
-        for piece in self._integral.add(block):
-            self._sums.add(piece)
-            self._late.add(piece)
+        if isinstance(self._sums, CorrelatedSums):
+            for rates in self._integral.rates(block):
+                self._sums.add(rates)
+        else:
+            for piece in self._integral.add(block):
+                self._sums.add(piece)
 
     def finish(self) -> Deviation:
         """The deviation, once all samples came; cluster sizes without a single term (gaps) do not appear."""
         self._integral.check_end(self._count)
         sums, terms = self._sums.finish()
+        if isinstance(self._sums, CorrelatedSums):
+            sums *= self._integral.scale**2
         all_starts = self._sums.starts()
         there = terms > 0
         if not np.any(there):
@@ -96,7 +104,7 @@ class DeviationStream:
         sizes, terms, starts = self._sums.sizes[there], terms[there], all_starts[there]
         variance = self._statistic.variance(sums[there], terms.astype(np.float64), sizes, self._rate_hz)
         deviation = np.sqrt(variance)
-        alpha = self._late.exponents(sizes, self._statistic.order)
+        alpha = exponents(self._sums.held(), sizes, self._statistic.order)
         edf = np.array(
             [
                 degrees_of_freedom(self._statistic, int(a), int(m), self._count)
@@ -137,8 +145,8 @@ def deviation(
 ) -> Deviation:
     """The deviation of one channel held in memory, (n,); see `DeviationStream`.
 
-    Where the channel wanders so far that the fast sums would lose more than a hundred-thousandth, it is differenced
-    term by term.
+    Where the fast sums would lose accuracy (`correlated.Uncorrelatable`: more than a hundred-thousandth by rounding, a
+    two-thousandth by periodic signals), it is differenced term by term.
     """
     for correlate in (True, False):
         stream = DeviationStream(
@@ -154,6 +162,6 @@ def deviation(
         try:
             stream.add(samples)
             return stream.finish()
-        except RoundingTooLarge:
+        except Uncorrelatable:
             continue
     raise AssertionError("term by term, no rounding is too large")

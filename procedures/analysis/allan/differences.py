@@ -3,10 +3,22 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from procedures.analysis.allan.identification import Held, LatePoints
 from procedures.analysis.allan.integral import Counts, Piece
-from procedures.analysis.allan.lagged import BLOCK
 from procedures.analysis.allan.statistic import Sizes, Statistic
 from procedures.core.arrays import Array
+
+BLOCK = 1 << 15
+"""Terms at once: what they take fits into the cache."""
+
+_UNTHREADED = 1 << 13
+"""OpenBLAS gives longer products to threads, which on a busy machine cost a thousand times the product."""
+
+
+def squared(d: Array) -> float:
+    """``Σ d²`` of a vector, (n,)."""
+    parts = (d[a : a + _UNTHREADED] for a in range(0, len(d), _UNTHREADED))
+    return sum(float(np.dot(part, part)) for part in parts)
 
 
 def sum_of_squares(z: Array, missing: Counts | None, m: int, order: int, stop: int) -> tuple[float, int]:
@@ -31,7 +43,7 @@ def sum_of_squares(z: Array, missing: Counts | None, m: int, order: int, stop: i
             touched = missing[a + order * m : b + order * m] != missing[a:b]
             d[touched] = 0.0
             terms -= int(np.count_nonzero(touched))
-        total += float(np.dot(d, d))
+        total += squared(d)
         terms += b - a
     return total, terms
 
@@ -56,7 +68,7 @@ def sum_of_smoothed_squares(x: Array, missing: Counts | None, m: int, reach: int
             touched = missing[a + reach : b + reach] != missing[a:b]
             d[touched] = 0.0
             terms -= int(np.count_nonzero(touched))
-        total += float(np.dot(d, d))
+        total += squared(d)
         terms += b - a
     return total, terms
 
@@ -69,11 +81,13 @@ class NonOverlappingSums:
         self.strides = np.ones(len(sizes), np.int64)
         self._sums, self._terms = np.zeros(len(sizes)), np.zeros(len(sizes), np.int64)
         self._index = 1
+        self._late = LatePoints(count)
         self._last = [np.zeros(1) for _ in sizes]
         self._last_gaps = [np.zeros(1, np.int64) for _ in sizes]
 
     def add(self, piece: Piece) -> None:
         """The next piece of the running sum."""
+        self._late.add(piece)
         p = self._statistic.differences
         for i, size in enumerate(self.sizes):
             first = -self._index % int(size)
@@ -94,6 +108,10 @@ class NonOverlappingSums:
     def finish(self) -> tuple[Array, NDArray[np.int64]]:
         """Sums and numbers of terms at `sizes`, (k,) each, after the last piece."""
         return self._sums, self._terms
+
+    def held(self) -> Held:
+        """What the identification needs."""
+        return self._late.held()
 
     def starts(self) -> NDArray[np.int64]:
         """The terms that fit, gaps or not, (k,)."""

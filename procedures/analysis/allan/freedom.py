@@ -2,9 +2,22 @@
 
 C. A. Greenhall and W. J. Riley, "Uncertainty of Stability Variances Based on Finite Differences", PTTI 2003, the
 combined algorithm; NIST SP 1065, 5.4.1 (edf) and eq. 45 (interval).
+
+How often the intervals hold the truth was measured (`tests.validation.allan`, 2000 records of 1024 samples, sampled
+power laws, the noise identified and not given): as often as they say for white angle and white rate noise, and
+elsewhere but for
+
+* the longest sizes, with 1 to 8 degrees of freedom, where a sum of squares is no χ²: up to 76 % instead of 68.3 %,
+  98 % instead of 95 %;
+* flicker angle noise of the overlapping members, whose edf are 10 to 20 % too low: up to 78 % and 97 %;
+* flicker rate noise, which 64 points and fewer mistake for a random walk in 61 of 100 records: overlapping 72 % (with
+  few degrees of freedom 77 %) and 97 %, non-overlapping Hadamard 65 % and 93 %;
+* m = 1 of flicker and random walk of the rate, where a sampled noise is not the formula's: 64 to 71 %, 93 to 96 %.
+
+Nowhere do they hold it less often than 64 % and 92.7 % of the time.
 """
 
-from functools import cache
+from functools import lru_cache
 from math import ceil, comb, inf, log
 
 import numpy as np
@@ -48,7 +61,7 @@ _UNMODIFIED = {  # (α, d): a0, a1 of Table 2
 _FLICKER = {2: (15.23, 12.0), 3: (47.8, 40.0)}  # d: b0, b1 of Table 3
 
 
-@cache
+@lru_cache(maxsize=1 << 14)
 def degrees_of_freedom(statistic: Statistic, alpha: int, m: int, count: int, *, averaged: bool = False) -> float:
     """edf of a member of the family at cluster size m of `count` samples, for the exponent α (see `identification`).
 

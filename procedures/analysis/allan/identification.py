@@ -4,6 +4,9 @@ The spectral density of the rate is taken as ∝ f^α: α = 2 white and 1 flicke
 angle), −1 flicker (bias instability), −2 random walk of the rate, −3 and −4 its flicker and integrated walk.
 """
 
+from dataclasses import dataclass
+from functools import lru_cache
+
 import numpy as np
 
 from procedures.analysis.allan.integral import Piece
@@ -14,7 +17,7 @@ FEWEST = 30
 """Below so many points the method decides nothing."""
 SURE = 120
 """With so many points a rounded exponent rarely errs."""
-MOST = 4096
+MOST = 2048
 """More points than these do not change a rounded exponent."""
 _HELD = 1 << 17
 _LATE = 1 << 16
@@ -26,10 +29,9 @@ def lag1_exponent(x: Array, most_differences: int) -> float:
     A quadratic (offset and ramp of the rate) is removed; x is differenced until ``δ = r₁/(1 + r₁) < 1/4``, r₁ the
     lag-1 autocorrelation; then ``α = 2 − 2(δ + d)``, d the number of differences.
     """
-    t = np.linspace(-1.0, 1.0, len(x))
-    z = x - np.mean(x)
-    for shape in (t, t**2 - np.mean(t**2)):  # orthogonal to one another and to a constant
-        z = z - shape * (np.dot(shape, z) / np.dot(shape, shape))
+    shapes = _quadratics(len(x))
+    z = x - x[0]
+    z -= (shapes @ z) @ shapes
     for d in range(most_differences + 1):
         z = z - np.mean(z)
         power = float(np.dot(z, z))
@@ -41,14 +43,33 @@ def lag1_exponent(x: Array, most_differences: int) -> float:
     raise AssertionError("the loop returns")
 
 
+@lru_cache(maxsize=256)
+def _quadratics(count: int) -> Array:
+    """An orthonormal basis of the quadratics on evenly spaced points, (3, count)."""
+    t = np.linspace(-1.0, 1.0, count)
+    shapes = np.stack([np.ones(count), t, t**2 - np.mean(t**2)])
+    return shapes / np.linalg.norm(shapes, axis=1, keepdims=True)
+
+
+@dataclass(frozen=True)
+class Held:
+    """Values of a running sum that the identification needs."""
+
+    points: Array
+    """At every `stride`-th sample, (n,)."""
+    stride: int
+    late: Array
+    """At each of the last samples."""
+
+
 class LatePoints:
-    """Keeps what the identification needs of a long running sum: every s-th value, and all of the last ones."""
+    """Keeps what the identification needs of a running sum: every s-th value, and all of the last ones."""
 
     def __init__(self, count: int) -> None:
         self._stride = max(1, count // _HELD)
         self._points = np.zeros(count // self._stride + 1)
-        self._late = np.zeros(1)
-        self._index = 1
+        self._late = np.zeros(min(count + 1, _LATE))
+        self._index, self._skipped = 1, count + 1 - len(self._late)
 
     def add(self, piece: Piece) -> None:
         """The next piece of the running sum."""
@@ -56,26 +77,39 @@ class LatePoints:
         kept = piece.x[first :: self._stride]
         at = (self._index + first) // self._stride
         self._points[at : at + len(kept)] = kept
-        self._late = np.concatenate([self._late[-_LATE:], piece.x])[-_LATE:]
         self._index += len(piece.x)
+        end = self._index - self._skipped
+        if end > 0:
+            kept = piece.x[-end:]
+            self._late[end - len(kept) : end] = kept
 
-    def exponents(self, sizes: Sizes, order: int) -> Array:
-        """α rounded at each size (k,), for a statistic's order, −2 (Allan) or −4 (Hadamard) to 2.
+    def held(self) -> Held:
+        """After the last piece."""
+        return Held(self._points, self._stride, self._late)
 
-        Where fewer than `FEWEST` points are left, that of the smaller size. Taking every m-th point folds flicker angle
-        noise into what looks white, and few points scatter, so α does not rise where it is known better already: from
-        flicker to white angle noise, or with fewer than `SURE` points at all.
-        """
-        alpha = np.zeros(len(sizes))
-        before: float | None = None
-        for i, size in enumerate(sizes):
-            m = int(size)
-            points, step = (self._late, m) if m < self._stride else (self._points, m // self._stride)
-            x = points[::-step][:MOST][::-1]
-            if len(x) >= FEWEST:
-                found = float(np.clip(np.round(lag1_exponent(x, order)), -2.0 if order == 2 else -4.0, 2.0))
-                if before is not None and (before == 1.0 or len(x) < SURE):
-                    found = min(found, before)
-                before = found
-            alpha[i] = before or 0.0
-        return alpha
+
+def exponents(held: Held, sizes: Sizes, order: int) -> Array:
+    """α rounded at each size (k,), for a statistic's order, −2 (Allan) or −4 (Hadamard) to 2.
+
+    Where fewer than `FEWEST` points are left, that of the smaller size. Taking every m-th point folds flicker angle
+    noise into what looks white, and few points scatter, so α does not rise where it is known better already: from
+    flicker to white angle noise, or with fewer than `SURE` points at all.
+    """
+    alpha = np.zeros(len(sizes))
+    before: float | None = None
+    last_step = 0
+    for i, size in enumerate(sizes):
+        m = int(size)
+        values, step = (held.late, m) if m < held.stride else (held.points, m // held.stride)
+        if i and step == last_step and m >= held.stride:
+            alpha[i] = alpha[i - 1]  # of the same points
+            continue
+        last_step = step if m >= held.stride else 0
+        x = values[::-step][:MOST][::-1]
+        if len(x) >= FEWEST:
+            found = float(np.clip(np.round(lag1_exponent(x, order)), -2.0 if order == 2 else -4.0, 2.0))
+            if before is not None and (before == 1.0 or len(x) < SURE):
+                found = min(found, before)
+            before = found
+        alpha[i] = before or 0.0
+    return alpha

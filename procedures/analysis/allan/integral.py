@@ -38,7 +38,8 @@ class Integral:
             raise BadParameter("rate_hz", rate_hz, "finite and positive")
         if gaps not in ("refuse", "aware"):
             raise BadParameter("gaps", gaps, "'refuse' or 'aware'")
-        self._scale = rate_hz if increments else 1.0
+        self.scale = rate_hz if increments else 1.0
+        """Of a sample to a rate."""
         self._gaps: Gaps = gaps
         self._last = 0.0
         self._reference: float | None = None
@@ -50,10 +51,22 @@ class Integral:
 
     def add(self, block: Array | NDArray[np.int32]) -> Iterator[Piece]:
         """The sums at the ends of a block's samples (n,), in pieces. Raises `UnfitRecording`."""
+        for y in self._pieces(block):
+            yield self._piece(y)
+
+    def rates(self, block: Array | NDArray[np.int32]) -> Iterator[Array]:
+        """A block's samples less the reference, in pieces, unscaled (see `scale`); only where gaps are refused."""
+        for y in self._pieces(block):
+            rates, _ = self._checked(y)
+            self.count += len(y)
+            yield rates
+
+    @staticmethod
+    def _pieces(block: Array | NDArray[np.int32]) -> Iterator[Array]:
         if block.ndim != 1:
             raise BadParameter("samples", block.shape, "one channel, (n,)")
         for start in range(0, len(block), PIECE):
-            yield self._piece(np.asarray(block[start : start + PIECE], dtype=np.float64))
+            yield np.asarray(block[start : start + PIECE], dtype=np.float64)
 
     def check_end(self, expected: int | None = None) -> None:
         """After the last block. Raises `UnfitRecording` where the channel is constant or its length is not as said."""
@@ -62,7 +75,8 @@ class Integral:
         if not self._varies:
             raise UnfitRecording(f"the channel is constant ({self._first!r}): a stuck channel has no noise to analyse")
 
-    def _piece(self, y: Array) -> Piece:
+    def _checked(self, y: Array) -> tuple[Array, NDArray[np.bool_] | None]:
+        """The samples less the reference, zero where one is missing, and which are (None: none)."""
         bad = None if np.isfinite(np.sum(y)) else ~np.isfinite(y)
         if bad is not None and np.any(bad):
             y = self._without(y, bad)
@@ -73,12 +87,16 @@ class Integral:
             if self._reference is None or self._first is None:
                 self._reference, self._first = float(np.mean(good)), float(good[0])
             self._varies = self._varies or bool(np.any(good != self._first))
-        x = y - (self._reference or 0.0)
+        rates = y - (self._reference or 0.0)
         if bad is not None:
-            x[bad] = 0.0
-        x[0] += self._last / self._scale
+            rates[bad] = 0.0
+        return rates, bad
+
+    def _piece(self, y: Array) -> Piece:
+        x, bad = self._checked(y)
+        x[0] += self._last / self.scale
         np.cumsum(x, out=x)
-        x *= self._scale
+        x *= self.scale
         self._last = float(x[-1])
         missing = None
         if bad is not None:

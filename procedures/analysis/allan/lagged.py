@@ -1,82 +1,145 @@
-"""Sums of squared differences of a long series for many cluster sizes at once, by block correlation.
+"""Sums of squared differences for every start of a long series and many cluster sizes at once, by block correlation.
 
-``Σ_k (Σ_a c_a x_{k+am})² = Σ_{a,b} c_a c_b Σ_k x_{k+am} x_{k+bm}``: every sum on the right is one of lagged products,
-and one Fourier transform a block gives these for all lags up to the block's length. Nothing is approximated but by
-rounding, which grows with ``Σx² / ΣD²`` and is bounded by `worst_rounding`.
+With the running sum x of the samples y, ``x_k = Σ_{i<k} y_i``, every sum of squared differences of x is one of its
+structure function ``V(q) = Σ_k (x_{k+q} − x_k)²``, and V of the lagged products ``R(l) = Σ_k y_k y_{k+l}``, for
+``V(q+1) − 2V(q) + V(q−1) = 2R(q)``. One Fourier transform a window gives R at all lags. Nothing is approximated but
+by rounding, which grows with ``Σy² / ΣD²`` and is bounded by `worst_rounding`.
 """
 
+from collections.abc import Callable
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import fft
+from numpy.lib.stride_tricks import as_strided
 
-from procedures.analysis.allan.statistic import Sizes
+from procedures.analysis.allan.statistic import Sizes, Statistic
 from procedures.core.arrays import Array
 
-BLOCK = 1 << 15
-"""Samples a block; two of them, transformed, still fit into the cache."""
+SPAN = 32
+"""Transforms are so many times as long as the longest lag: little is spent on padding."""
 
 
 class LaggedProducts:
-    """``R(l) = Σ_{k<K} x_k x_{k+l}`` for l ≤ `BLOCK`, accumulated block after block.
+    """``R(l) = Σ_k y_k y_{k+l}`` for l < `reach`, accumulated from pieces of any length; no sample is left out.
 
-    A straight line is taken off x: it changes no second difference, and keeps the products small.
+    Windows overlap by `reach` samples, so that every pair lies in one of them; pairs inside the overlaps, which lie in
+    two, are taken off again.
     """
 
-    def __init__(self, offset: float = 0.0, slope: float = 0.0) -> None:
-        self._offset, self._step = offset, slope * BLOCK
-        self._ramp = slope * np.arange(BLOCK)
-        self._same = np.zeros(BLOCK + 1)
-        self._next = np.zeros(BLOCK + 1, dtype=np.complex128)
-        self._previous: NDArray[np.complex128] | None = None
-        self._work = np.empty(BLOCK + 1, dtype=np.complex128)
-        self._head = self._last = np.empty(0)
-        self.starts = 0
-        """K: starts whose products are in; the block that came last is not among them."""
+    def __init__(self, reach: int, kernel: Array) -> None:
+        """`kernel` κ(l), (≤ reach,): see `energy`."""
+        self._reach, self._length = reach, SPAN * reach
+        self._window = self._length - reach
+        self._rest = np.empty(0)
+        self._power, self._seams = np.zeros(self._length + 2), np.zeros(2 * reach + 2)
+        self._response, self._seam_response = _response(kernel, self._length), _response(kernel, 2 * reach)
+        self._shape = np.zeros(self._length + 2)
+        self.ends: list[int] = [0]
+        self.energies: list[float] = [0.0]
+        """``Σ_l κ(l) R(l)``, l of both signs, up to each of `ends` (one a window)."""
 
-    @property
-    def is_empty(self) -> bool:
-        return self._previous is None
+    def add(self, y: Array) -> None:
+        """The next samples, (n,)."""
+        self._rest = np.concatenate([self._rest, y])
+        step = self._window - self._reach
+        rows = (len(self._rest) - self._window) // step + 1
+        if rows > 0:
+            stride = self._rest.strides[0]
+            shape, strides = (rows, self._window), (step * stride, stride)
+            self._take(as_strided(self._rest, shape, strides, writeable=False), step)
+            self._rest = self._rest[rows * step :]
 
-    def add(self, block: Array) -> None:
-        """One more block of x, (BLOCK,)."""
-        self._last = block - self._ramp
-        self._last -= self._offset
-        self._offset += self._step
-        spectrum = np.asarray(fft.rfft(self._last, 2 * BLOCK))
-        previous = self._previous
-        if previous is None:
-            self._head = self._last
-        else:
-            np.conjugate(previous, out=self._work)
-            self._work *= spectrum
-            self._next += self._work
-            self._same += np.square(previous.real)
-            self._same += np.square(previous.imag)
-            self.starts += BLOCK
-        self._previous = spectrum
+    def finish(self) -> Array:
+        """R, (reach,), after the last piece."""
+        if len(self._rest):
+            self._take(self._rest[None, :], len(self._rest))
+        products = np.fft.irfft(_paired(self._power), self._length)[: self._reach]
+        return products - np.fft.irfft(_paired(self._seams), 2 * self._reach)[: self._reach]
 
-    def sums(self, sizes: Sizes, order: int) -> tuple[Array, float]:
-        """``Σ_{k<K} (Δ_m^order x_k)²`` for each size m ≤ BLOCK/order, (k,), and ``Σ_{k<K} x_k²``."""
-        both = self._next.copy()
-        both[1::2] *= -1.0  # a shift by half the transform's length
-        products = fft.irfft(both + self._same, 2 * BLOCK)[: BLOCK + 1]
-        signs = [(-1) ** a * comb(order, a) for a in range(order + 1)]
-        sums = np.zeros(len(sizes))
-        for i, size in enumerate(sizes):
-            m = int(size)
-            for a in range(order + 1):
-                for b in range(a, order + 1):
-                    lag, skipped = (b - a) * m, a * m
-                    total = products[lag]
-                    total += np.dot(self._last[:skipped], self._last[lag : lag + skipped])
-                    total -= np.dot(self._head[:skipped], self._head[lag : lag + skipped])
-                    sums[i] += (1 if a == b else 2) * signs[a] * signs[b] * total
-        return sums, float(products[0])
+    def spectrum(self) -> Array:
+        """Mean over the windows of each one's part of `energies` by frequency, (length/2 + 1,), its sum near 1."""
+        return _paired(self._shape * self._response) / (len(self.ends) - 1)
+
+    def _take(self, windows: Array, step: int) -> None:
+        seams = windows[:, : self._reach]
+        if self.ends[-1] == 0:
+            seams = seams * np.where(np.arange(len(windows)) > 0, 1.0, 0.0)[:, None]  # none before the first
+        power, twice = _powers(windows, self._length), _powers(seams, 2 * self._reach)
+        whole = power @ self._response
+        even = np.divide(1.0, whole, out=np.zeros(len(whole)), where=whole > 0.0)
+        added = np.stack([np.ones(len(whole)), even]) @ power
+        self._power += added[0]
+        self._shape += added[1]
+        self._seams += twice.sum(axis=0)
+        for energy in whole - twice @ self._seam_response:
+            self.energies.append(self.energies[-1] + float(energy))
+            self.ends.append(self.ends[-1] + step)
 
 
-def worst_rounding(sums: Array, squares: float, order: int) -> float:
-    """A bound of the relative rounding error of the sums: ``ε·4^p·Σx²/ΣD²`` (two to three times what is found)."""
-    least = float(np.min(sums))
-    return float(np.finfo(float).eps) * 4**order * squares / least if least > 0.0 else float("inf")
+def _powers(rows: Array, length: int) -> Array:
+    """Squares of the real and imaginary parts of each row's transform, padded to `length`, (rows, length + 2)."""
+    parts = np.fft.rfft(rows, length).view(np.float64)
+    return np.multiply(parts, parts, out=parts)
+
+
+def _paired(squares: Array) -> Array:
+    """|Y|² from squares of parts, (n/2,) from (n,)."""
+    return squares[0::2] + squares[1::2]
+
+
+def _response(kernel: Array, length: int) -> Array:
+    """Weights of the squares of parts whose sum is ``Σ_l κ(l) R(l)``, (length + 2,)."""
+    both = np.zeros(length)
+    both[: len(kernel)] = kernel
+    both[length - len(kernel) + 1 :] += kernel[:0:-1]
+    weights = np.fft.rfft(both).real * 2.0 / length
+    weights[[0, -1]] /= 2.0
+    return np.repeat(weights, 2)
+
+
+def padded_sums(products: Array, statistic: Statistic, sizes: Sizes) -> Array:
+    """``Σ_k D_k²`` over all k of the series continued by zeros at both ends, (k,), for sizes whose terms fit the reach.
+
+    ``−½ Σ_j b_j V(jm)``, b the autocorrelation of the d-th difference's coefficients; of a modified statistic with
+    one difference more and the double sum of V in its place.
+    """
+    structure = _twice_summed(2.0 * products)
+    d = statistic.order
+    if statistic.modified:
+        structure, d = _twice_summed(structure), d + 1
+    sign = 1.0 if statistic.modified else -1.0
+    sums = np.zeros(len(sizes))
+    for j in range(1, d + 1):
+        sums += sign * (-1) ** j * comb(2 * d, d + j) * structure[j * sizes]
+    return sums
+
+
+def _twice_summed(u: Array) -> Array:
+    """w with ``w(q+1) − 2w(q) + w(q−1) = u(q)`` and w(0) = 0, both symmetric in q: (n + 1,) from (n,)."""
+    slopes = np.cumsum(u) - u[0] / 2.0  # a constant in w changes no difference of it
+    return np.concatenate([[0.0], np.cumsum(slopes)])
+
+
+def edge_sums(
+    head: Array, tail: Array, sizes: Sizes, span: Callable[[int], int], squares: Callable[[Array, int, int], float]
+) -> Array:
+    """The part of `padded_sums` whose terms touch the zeros, (k,).
+
+    `head` and `tail`: the series' first and last samples, at least as many as a term spans; ``span(m)`` samples a term
+    spans; ``squares(x, m, stop)`` the sum of the first `stop` squared terms of a running sum.
+    """
+    left = np.concatenate([np.zeros(len(head) + 1), np.cumsum(head)])
+    end = np.cumsum(tail)
+    right = np.concatenate([[0.0], end, np.full(len(tail), end[-1])])
+    sums = np.zeros(len(sizes))
+    for i, size in enumerate(sizes):
+        m, terms = int(size), span(int(size)) - 1
+        sums[i] = squares(left[len(head) - terms : len(head) + terms + 1], m, terms)
+        sums[i] += squares(right[len(tail) - terms : len(tail) + terms + 1], m, terms)
+    return sums
+
+
+def worst_rounding(sums: Array, spans: Sizes, squares: float) -> float:
+    """A bound of the relative rounding error of the sums, R known to 16ε: ``16ε·Σy²·span^1.5/ΣD²``."""
+    bounds = 16.0 * float(np.finfo(float).eps) * squares * spans**1.5
+    return float(np.max(bounds / sums)) if np.all(sums > 0.0) else float("inf")

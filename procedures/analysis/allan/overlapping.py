@@ -1,21 +1,21 @@
-"""The sums of the overlapping members, from pieces of any length, in bounded memory.
+"""The sums of the overlapping members term by term, from pieces of any length, with or without gaps.
 
-A series of up to `WHOLE` samples is exact at every size. A longer one is taken at two resolutions: cluster sizes up
-to `exact_limit` use every start k, larger ones the running sum at every s-th sample only. Each cluster mean is still
-exact, but the starts are 0, s, 2s… (4s, beyond `LONG`·s), and the cluster sizes multiples of that. What it costs
-depends on the noise. Where the rate is white or redder neighbouring starts hardly differ: below 0.01 %. Where white
-angle noise still rules there, every start counts: ``1/√(2·POINTS·18/35)`` ≈ 0.1 %, one sigma.
+A series of up to `WHOLE` samples is exact at every size. A longer one, which `correlated` does faster where it can, is
+taken at two resolutions: cluster sizes up to `exact_limit` use every start k, larger ones the running sum at every
+s-th sample only. Each cluster mean is still exact, but the starts are 0, s, 2s… (4s, beyond `LONG`·s), and the cluster
+sizes multiples of that. What it costs depends on the noise. Where the rate is white or redder neighbouring starts
+hardly differ: below 0.01 %. Where white angle noise still rules there, every start counts:
+``1/√(2·POINTS·18/35)`` ≈ 0.1 %, one sigma.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.analysis.allan.differences import sum_of_smoothed_squares, sum_of_squares
+from procedures.analysis.allan.differences import BLOCK, sum_of_smoothed_squares, sum_of_squares
+from procedures.analysis.allan.identification import Held, LatePoints
 from procedures.analysis.allan.integral import Counts, Piece
-from procedures.analysis.allan.lagged import BLOCK, LaggedProducts, worst_rounding
 from procedures.analysis.allan.statistic import Sizes, Statistic
 from procedures.core.arrays import Array
-from procedures.core.errors import UnfitRecording
 
 WHOLE = 1 << 21
 """A series up to this length is held and differenced whole."""
@@ -25,12 +25,6 @@ LONG = 1 << 14
 """Of sizes of so many held points every fourth point is a start."""
 SMOOTH = 16
 """A modified statistic is smooth over its own cluster: so many starts a cluster are as good as all."""
-FEW = 16
-"""Fewer cluster sizes are differenced faster than correlated."""
-FIRST_RUN, RUN = 1 << 20, 1 << 23
-"""Starts that are correlated before a new line is taken off the running sum."""
-ROUNDING = 1e-5
-"""The worst relative rounding of a sum that passes."""
 
 
 def stride_of(count: int) -> int:
@@ -59,13 +53,6 @@ def snapped_sizes(sizes: Sizes, statistic: Statistic, count: int) -> Sizes:
     """The sizes as they will be computed: multiples of the strides they use."""
     s = strides_of(sizes, statistic, count)
     return np.unique(np.minimum(np.round(sizes / s).astype(np.int64), statistic.largest(count) // s) * s)
-
-
-class RoundingTooLarge(UnfitRecording):
-    """A running sum wanders so far that its lagged products lose the noise; difference it term by term."""
-
-    def __init__(self) -> None:
-        super().__init__("the channel wanders too far for the fast sums; ask for correlate=False")
 
 
 class _Points:
@@ -101,7 +88,7 @@ class _Points:
 class OverlappingSums:
     """Sums of an overlapping member for many cluster sizes, from pieces of x."""
 
-    def __init__(self, statistic: Statistic, count: int, sizes: Sizes, *, correlate: bool = True) -> None:
+    def __init__(self, statistic: Statistic, count: int, sizes: Sizes) -> None:
         self._statistic, self._count = statistic, count
         self._stride = stride_of(count)
         self.sizes = snapped_sizes(sizes, statistic, count)
@@ -110,13 +97,15 @@ class OverlappingSums:
         self._sums, self._terms = np.zeros(len(self.sizes)), np.zeros(len(self.sizes), np.int64)
         self._points = _Points(count, self._stride, summed=statistic.modified)
         self._rest, self._rest_gaps = np.empty(0), None
-        direct = statistic.modified or not correlate or len(self._near) < FEW
-        self._lagged = None if direct else LaggedProducts()
-        self._run, self._began_at = FIRST_RUN, 0.0
-        self.add(Piece(np.zeros(1), None))
+        self._late = LatePoints(count)
+        self._take(Piece(np.zeros(1), None))
 
     def add(self, piece: Piece) -> None:
         """The next piece of the running sum."""
+        self._late.add(piece)
+        self._take(piece)
+
+    def _take(self, piece: Piece) -> None:
         self._points.add(piece)
         if not len(self._near):
             return
@@ -124,20 +113,10 @@ class OverlappingSums:
             old = np.zeros(len(self._rest), np.int64) if self._rest_gaps is None else self._rest_gaps
             new = np.zeros(len(piece.x), np.int64) if piece.missing is None else piece.missing
             self._rest_gaps = np.concatenate([old, new])
-        if self._lagged is not None and self._rest_gaps is not None:
-            self._close_lagged(self._lagged)
         self._rest = np.concatenate([self._rest, piece.x])
         done = 0
         while len(self._rest) - done >= 2 * BLOCK:
-            if self._lagged is None:
-                self._difference(slice(done, done + 2 * BLOCK), BLOCK)
-            else:
-                if self._lagged.is_empty:
-                    self._lagged.add(self._rest[done : done + BLOCK])
-                    self._began_at = float(self._rest[done])
-                self._lagged.add(self._rest[done + BLOCK : done + 2 * BLOCK])
-                if self._lagged.starts >= self._run:
-                    self._begin_run(self._lagged, float(self._rest[done + BLOCK]))
+            self._difference(slice(done, done + 2 * BLOCK), BLOCK)
             done += BLOCK
         self._rest = self._rest[done:]
         self._rest_gaps = None if self._rest_gaps is None else self._rest_gaps[done:]
@@ -158,27 +137,8 @@ class OverlappingSums:
             return sum_of_smoothed_squares(x, missing, m, 3 * m - (not summed), stop)
         return sum_of_squares(x, missing, m, p, stop)
 
-    def _begin_run(self, lagged: LaggedProducts, x: float) -> None:
-        """Ends a run of correlated blocks, and begins one along its mean rate, which x does not leave far."""
-        self._close_lagged(lagged)
-        self._lagged = LaggedProducts(x, (x - self._began_at) / lagged.starts)
-        self._run = RUN
-
-    def _close_lagged(self, lagged: LaggedProducts) -> None:
-        """Takes over what the correlations gave; the terms after it are differenced one by one."""
-        self._lagged = None
-        if lagged.starts:
-            order = self._statistic.differences
-            sums, squares = lagged.sums(self._near, order)
-            if worst_rounding(sums, squares, order) > ROUNDING:
-                raise RoundingTooLarge
-            self._sums[: len(sums)] += sums
-            self._terms[: len(sums)] += lagged.starts
-
     def finish(self) -> tuple[Array, NDArray[np.int64]]:
         """Sums and numbers of terms at `sizes`, (k,) each, after the last piece."""
-        if self._lagged is not None:
-            self._close_lagged(self._lagged)
         if len(self._near):
             self._difference(slice(None), None)
         points, gaps = self._points.x, self._points.missing
@@ -189,6 +149,10 @@ class OverlappingSums:
             x, missing = held[step]
             self._sums[i], self._terms[i] = self._sum(x, missing, m, None, summed=self._stride > 1)
         return self._sums, self._terms
+
+    def held(self) -> Held:
+        """What the identification needs."""
+        return self._late.held()
 
     def starts(self) -> NDArray[np.int64]:
         """The starts that fit, gaps or not, (k,)."""
