@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := calibration allan noise conditioning whole_turns
+VALIDATIONS := calibration allan noise conditioning whole_turns without_bench
 
 .DEFAULT_GOAL := help
 .PHONY: help run test bench check validate lock clean

@@ -28,7 +28,7 @@ from procedures.analysis.estimator import Weighting
 from procedures.analysis.reference import INPUT_UNITS, TRIAD_NAMES, site_with
 from procedures.analysis.scalar import require_scalar_determined
 from procedures.analysis.station_means import launch_warnings
-from procedures.analysis.station_plan import windows
+from procedures.analysis.station_plan import THESIS_ORIENTATIONS, windows
 from procedures.analysis.table_errors import TableUncertainty
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -44,12 +44,6 @@ from procedures.procedure import Context, Outcome, Parameters, PredictedUncertai
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 Arcsec = Annotated[float, Field(ge=0.0, le=3600.0)]
-
-ORIENTATIONS = (
-    *((0.0, -90.0), (0.0, 90.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 0.0), (180.0, 0.0)),
-    *((-90.0, -45.0), (90.0, 45.0), (180.0, -45.0), (0.0, 45.0), (135.0, 0.0), (-45.0, 0.0)),
-)
-"""(β, γ) [deg] of thesis figure 5.4."""
 
 
 class Limits(Parameters):
@@ -69,7 +63,7 @@ class Params(Parameters):
     """What to do, where, and what to hold the unit to. None takes the unit's or the bench's value."""
 
     orientations: tuple[tuple[Angle, Angle], ...] = Field(
-        ORIENTATIONS, min_length=1, max_length=200, description="(β, γ) [deg], in order"
+        THESIS_ORIENTATIONS, min_length=1, max_length=200, description="(β, γ) [deg], in order"
     )
     rotation_order: Literal["x_after_z", "z_after_x"] = Field(
         "x_after_z", description="x_after_z: β about x after γ about z, the order of the thesis"

@@ -38,7 +38,8 @@ class TriadCalibration:
     matrix: Matrix
     covariance: Matrix = field(repr=False)
     model: str = "linear"
-    """"linear" (full K against known vectors) or "scalar" (K upper triangular, magnitude as the only reference)."""
+    """"linear" (full K against known vectors), "scalar" (K upper triangular, magnitude as the only reference) or
+    "field" (K diagonal; cross-couplings zero with the spread that was declared)."""
 
     def __post_init__(self) -> None:
         for name, value, shape in (

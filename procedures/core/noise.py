@@ -15,8 +15,8 @@ class NoiseCoefficients:
     """
 
     quantization: float = 0.0
-    """Q [rate·s]: standard deviation of the whole error of one reading of the integrated output: LSB/√12 of a plain counter,
-    LSB/2 of one with a triangular dither of ±1 pulse."""
+    """Q [rate·s]: standard deviation of the whole error of one reading of the integrated output: LSB/√12 of a plain
+    counter, LSB/2 of one with a triangular dither of ±1 pulse."""
     random_walk: float = 0.0
     """N [rate·√s]: angle (velocity) random walk."""
     bias_instability: float = 0.0

@@ -1,0 +1,195 @@
+"""What a plan of orientations is worth beside another in the same bench time, by the estimators that would use it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from procedures.analysis.calibration_plan import TriadPlan, predicted_parts, triad_plan
+from procedures.analysis.orientation_plan.information import Model, TriadDesign
+from procedures.analysis.reference import reference_magnitude, reference_vectors
+from procedures.analysis.scalar import fit_scalar, scalar_parameters
+from procedures.analysis.station_noise import triad_covariance
+from procedures.analysis.station_plan import move_time_s, windows
+from procedures.analysis.table_errors import TableUncertainty
+from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter
+from procedures.core.recording import Station
+from procedures.core.site import Site
+from procedures.core.table_angles import TableAngles
+from procedures.core.unit import Unit
+
+
+@dataclass(frozen=True)
+class Requirements:
+    """Limits that uncertainties are measured by, one triad's: bias [SI], scale factor and cross-coupling [relative]."""
+
+    bias: float
+    scale_factor: float
+    cross_coupling: float
+
+    def of_twelve(self, matrix: Array) -> Array:
+        """In the units of the twelve coefficients, shape (12,): a row of K in parts of its scale factor."""
+        found = np.zeros((3, 4))
+        for c in range(3):
+            found[c] = self.bias, *(np.full(3, self.cross_coupling) * abs(matrix[c, c]))
+            found[c, 1 + c] = self.scale_factor * abs(matrix[c, c])
+        return found.ravel()
+
+    def of_nine(self, matrix: Array) -> Array:
+        """In the units of the scalar nine (b, s, t), shape (9,)."""
+        scale = self.scale_factor / np.abs(np.diagonal(matrix))
+        return np.array([self.bias] * 3 + scale.tolist() + [self.cross_coupling] * 3)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The bench, the place and the unit that plans are compared on."""
+
+    unit: Unit
+    site: Site
+    table: TableUncertainty
+    axes: tuple[tuple[float, float], ...]
+    """(rate [deg/s], acceleration [deg/s²]) of outer, middle and inner."""
+    settle_s: float
+    model: Model
+    requirements: Mapping[str, Requirements]
+    """By triad; the triads that count."""
+
+    def limits(self, triad: str, matrix: Array) -> Array:
+        """Of the model's coefficients, shape (12,) or (9,)."""
+        r = self.requirements[triad]
+        return r.of_nine(matrix) if self.model == "scalar" else r.of_twelve(matrix)
+
+
+@dataclass(frozen=True)
+class ScoredPlan:
+    """Orientations in order, the dwell that fills the time, and the standard uncertainties to expect."""
+
+    angles: tuple[TableAngles, ...]
+    dwell_s: float
+    total_s: float
+    sd: Mapping[str, Array]
+    """By triad: of the twelve or the nine, SI."""
+    relative: Mapping[str, Array]
+    """The same over their limits."""
+
+    def worst(self, triad: str) -> float:
+        """Greatest sd over limit of a triad."""
+        return float(self.relative[triad].max())
+
+    @property
+    def worst_of_all(self) -> float:
+        """Over all triads: what plans are compared by."""
+        return max(self.worst(triad) for triad in self.relative)
+
+
+def stations(angles: Sequence[TableAngles], dwell_s: float, settle_s: float) -> tuple[Station, ...]:
+    """One station an orientation, in order."""
+    return tuple(
+        Station(i, f"{a.outer_deg:.4g} {a.middle_deg:.4g} {a.inner_deg:.4g}", a, settle_s=settle_s, record_s=dwell_s)
+        for i, a in enumerate(angles)
+    )
+
+
+def total_time_s(angles: Sequence[TableAngles], dwell_s: float, setting: Setting) -> float:
+    """From the table's zero to the end of the last dwell."""
+    return float(windows(stations(angles, dwell_s, setting.settle_s), setting.axes)[-1, 1])
+
+
+def in_short_order(angles: Sequence[TableAngles], setting: Setting) -> tuple[TableAngles, ...]:
+    """Always the nearest orientation next, beginning from the table's zero."""
+    left, at, ordered = list(angles), TableAngles(), list[TableAngles]()
+
+    def move(to: TableAngles) -> float:
+        turns = (to.outer_deg - at.outer_deg, to.middle_deg - at.middle_deg, to.inner_deg - at.inner_deg)
+        return max(move_time_s(turn, *axis) for turn, axis in zip(turns, setting.axes, strict=True))
+
+    while left:
+        at = min(left, key=move)
+        left.remove(at)
+        ordered.append(at)
+    return tuple(ordered)
+
+
+def scored(angles: Sequence[TableAngles], total_s: float, setting: Setting) -> ScoredPlan:
+    """The plan in this order, with the longest dwell that the time allows.
+
+    Raises `Undetermined` where the orientations do not show all coefficients, `BadParameter` where the time is too
+    short to move.
+    """
+    moving = total_time_s(angles, 1.0, setting) - len(angles)
+    dwell = (total_s - moving) / len(angles)
+    if dwell < 1.0:
+        raise BadParameter("dwell_s", dwell, f"{len(angles)} stations leave no time to dwell, at least 1 s is needed")
+    sd: dict[str, Array] = {}
+    relative: dict[str, Array] = {}
+    for triad in setting.requirements:
+        table = TableUncertainty() if setting.model == "linear" else setting.table
+        record = stations(angles, dwell, setting.settle_s)
+        plan = triad_plan(triad, setting.unit, record, setting.axes, setting.site, table)
+        sd[triad] = _scalar_sd(plan, setting) if setting.model == "scalar" else _linear_sd(plan)
+        relative[triad] = sd[triad] / setting.limits(triad, plan.matrix)
+    return ScoredPlan(tuple(angles), dwell, total_s, sd, relative)
+
+
+def design(triad: str, count: int, dwell_s: float, setting: Setting) -> TriadDesign:
+    """A triad for a search of `count` orientations: the noise of a dwell, split in what stations share and what not."""
+    record = stations([TableAngles()] * count, dwell_s, setting.settle_s)
+    plan = triad_plan(triad, setting.unit, record, setting.axes, setting.site, setting.table)
+    covariance = triad_covariance(setting.unit.triad(triad), windows(record, setting.axes))
+    if covariance is None:
+        raise BadParameter("unit", setting.unit.serial, f"the noise of its {triad} triad is not known")
+    off = ~np.eye(count, dtype=bool)
+    shared = np.maximum(np.array([c[off].mean() for c in covariance]), 0.0)
+    own = np.array([np.diagonal(c).mean() for c in covariance]) - shared
+    # The search sees the scalar model at K = 1; its limits of scale are relative then.
+    matrix = np.eye(3) if setting.model == "scalar" else plan.matrix
+    return TriadDesign(triad, plan.vectors[0], own, shared, setting.limits(triad, matrix), matrix)
+
+
+def worst_bound(triad: str, count: int, total_s: float, setting: Setting) -> float:
+    """No plan of so many stations in this time has a worst coefficient of less than this, over its limit.
+
+    Whatever the other unknowns are, a channel's scale factor has ``var(K_cc) ≥ λ_c/Σ_i v²_ic``, λ_c the least
+    eigenvalue of its covariance C_c of the means, and all channels together have ``Σ_c Σ_i v²_ic = n·|v|²``. Shared out
+    so that no channel is worse off than another this makes the worst ``√(Σ_c λ_c/K²_cc/(n·|v|²))``; the scalar model's
+    ``Σ_i u⁴_ic·v²`` only makes it larger. A bias has at least ``1/(1ᵀC_c⁻¹1)``, which no orientation changes. Moves
+    count as no time at all.
+    """
+    dwell = (total_s - count * setting.settle_s) / count
+    record = stations([TableAngles()] * count, dwell, setting.settle_s)
+    plan = triad_plan(triad, setting.unit, record, setting.axes, setting.site, setting.table)
+    covariance = plan.noise_covariance()
+    if covariance is None:
+        raise BadParameter("unit", setting.unit.serial, f"the noise of its {triad} triad is not known")
+    required = setting.requirements[triad]
+    least = np.array([np.linalg.eigvalsh(c)[0] for c in covariance]) / np.diagonal(plan.matrix) ** 2
+    scale = np.sqrt(least.sum() / count) / np.linalg.norm(plan.vectors[0])
+    bias = max(float(np.sqrt(1.0 / np.linalg.solve(c, np.ones(count)).sum())) for c in covariance)
+    return max(float(scale) / required.scale_factor, bias / required.bias)
+
+
+def worst_by_triad(plan: ScoredPlan) -> dict[str, float]:
+    """Greatest sd over limit of each triad, for the search's objective."""
+    return {triad: plan.worst(triad) for triad in plan.relative}
+
+
+def _linear_sd(plan: TriadPlan) -> Array:
+    parts = predicted_parts(plan)
+    if parts is None:
+        raise BadParameter("unit", plan.unit.serial, f"the noise of its {plan.triad} triad is not known")
+    return np.hypot(*parts)
+
+
+def _scalar_sd(plan: TriadPlan, setting: Setting) -> Array:
+    """Of `fit_scalar` at the very outputs that the plan would give without noise."""
+    noise = plan.noise_covariance()
+    if noise is None:
+        raise BadParameter("unit", plan.unit.serial, f"the noise of its {plan.triad} triad is not known")
+    angles = [s.angles for s in plan.stations if s.angles is not None]
+    vectors = reference_vectors(plan.triad, angles, setting.site)
+    start = scalar_parameters(np.column_stack([np.zeros(3), plan.matrix]).ravel())
+    reference = reference_magnitude(plan.triad, setting.site)
+    outputs = vectors @ plan.matrix.T
+    return fit_scalar(f"the nine of the {plan.triad}", outputs, noise, reference, start).standard_uncertainties

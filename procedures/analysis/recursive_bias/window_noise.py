@@ -1,0 +1,149 @@
+"""Means of a channel over windows that follow one another, and the covariance of their noise.
+
+The noise of such means is not white. Quantization ties neighbours: both share the reading at their common edge, with
+opposite signs. Flicker and rate random walk tie all of them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import toeplitz
+from scipy.special import chdtrc
+
+from procedures.analysis.recursive_bias.kalman import RecursiveBias
+from procedures.analysis.station_noise import mean_covariance
+from procedures.analysis.station_plan import dwell_for
+from procedures.analysis.whitening import whitener
+from procedures.core.arrays import Array
+from procedures.core.errors import MissingChannel, UnfitRecording
+from procedures.core.noise import NoiseCoefficients
+from procedures.core.recording import INCREMENTS, Recording
+
+WINDOWS_MAX = 300
+"""Windows a recording is cut into at the most: their covariance is a full matrix."""
+WINDOWS_MIN = 20
+BATCHES = 10
+
+
+@dataclass(frozen=True)
+class WindowMeans:
+    """Mean nominal rates over even windows of one recording."""
+
+    length_s: float
+    means: Array
+    """Shape (n, channels), in each channel's rate unit."""
+    windows: Array
+    """[start, stop] in bench time [s], shape (n, 2)."""
+
+
+def window_means(recording: Recording, names: tuple[str, ...], window_s: float) -> WindowMeans:
+    """Block by block; the window is lengthened so that there are at most `WINDOWS_MAX`, what is left over is cut off.
+
+    Raises `MissingChannel`, and `UnfitRecording` where there are fewer than `WINDOWS_MIN` windows or samples that are
+    not numbers.
+    """
+    info = recording.info
+    columns = [info.column(name) for name in names]
+    size = max(1, round(window_s * info.rate_hz), -(-info.count // WINDOWS_MAX))
+    count = info.count // size
+    if count < WINDOWS_MIN:
+        raise UnfitRecording(
+            f"recording {info.id}: {info.duration_s:g} s give {count} windows of {size / info.rate_hz:g} s, "
+            f"at least {WINDOWS_MIN} are needed"
+        )
+    sums, seen = np.zeros((count, len(columns))), 0
+    for block in recording.blocks():
+        raw = np.asarray(block)[: max(0, count * size - seen), columns].astype(np.float64)
+        if not np.all(np.isfinite(raw)):
+            raise UnfitRecording(f"recording {info.id} holds samples that are not numbers")
+        if len(raw):
+            first = seen // size
+            edges = [0, *range((first + 1) * size - seen, len(raw), size)]
+            sums[first : first + len(edges)] += np.add.reduceat(raw, edges, axis=0)
+        seen += len(raw)
+    channels = [info.channels[c] for c in columns]
+    gain = np.array([c.scale * (info.rate_hz if c.quantity in INCREMENTS else 1.0) for c in channels])
+    offset = np.array([c.offset for c in channels])
+    length = size / info.rate_hz
+    edges_s = np.linspace(info.start_s, info.start_s + length * count, count + 1)
+    windows = np.column_stack([edges_s[:-1], edges_s[1:]])
+    return WindowMeans(length, (sums / size - offset) * gain, windows)
+
+
+def contiguous_covariance(noise: NoiseCoefficients, windows: Array) -> Array:
+    """Covariance (n, n) [rate²] of the means over windows (n, 2), from a channel's coefficients.
+
+    `station_noise` has all but the quantization of neighbours: a reading of the integrated output errs by Q, a mean
+    over T by the difference of two readings, so ``2Q²/T²`` on the diagonal and, where two windows touch, ``−Q²/T²``
+    beside it.
+    """
+    covariance = mean_covariance(noise, windows)
+    lengths = windows[:, 1] - windows[:, 0]
+    touch = np.flatnonzero(np.isclose(windows[1:, 0], windows[:-1, 1], rtol=0.0, atol=1e-6 * lengths.min()))
+    shared = -(noise.quantization**2) / (lengths[touch] * lengths[touch + 1])
+    covariance[touch, touch + 1] += shared
+    covariance[touch + 1, touch] += shared
+    return covariance
+
+
+def observed_covariance(means: Array) -> Array:
+    """Covariance (n, n) from the means (n,) themselves, for a channel whose noise nobody knows.
+
+    Variance and covariance of neighbours, nothing farther (a moving average of order one): white noise and
+    quantization. Its correlation lies within ±1/2 by nature, and an estimate outside is taken as that end.
+    """
+    centred = means - means.mean()
+    variance = float(centred @ centred) / (len(means) - 1)
+    if variance == 0.0:
+        raise UnfitRecording("the channel is constant: its noise cannot be found from it")
+    neighbours = float(centred[1:] @ centred[:-1]) / (len(means) - 1)
+    correlation = min(max(neighbours / variance, -0.499), 0.499)
+    column = np.zeros(len(means))
+    column[:2] = variance, correlation * variance
+    return np.asarray(toeplitz(column), dtype=np.float64)
+
+
+def slow_noise_p(means: Array, covariance: Array) -> float:
+    """Chance that `BATCHES` equal parts of the means (n,) scatter as they do, if their noise has this covariance.
+
+    ``χ² = rᵀV⁻¹r`` of the parts about their weighted mean, V their covariance, with one degree of freedom fewer than
+    parts; noise slower than declared makes it large.
+    """
+    parts = np.array_split(np.arange(len(means)), BATCHES)
+    averaging = np.zeros((BATCHES, len(means)))
+    for row, part in zip(averaging, parts, strict=True):
+        row[part] = 1.0 / len(part)
+    weights = whitener(averaging @ covariance @ averaging.T)
+    values, ones = weights @ averaging @ means, weights @ np.ones(BATCHES)
+    residuals = values - ones * float(ones @ values) / float(ones @ ones)
+    return float(chdtrc(BATCHES - 1, float(residuals @ residuals)))
+
+
+def predicted_sd(noise: NoiseCoefficients, dwell_s: float, start_s: float, prior_variance: float | None) -> float:
+    """Standard uncertainty of a bias after a dwell, in a hundred windows of it."""
+    edges = start_s + np.linspace(0.0, dwell_s, 101)
+    covariance = contiguous_covariance(noise, np.column_stack([edges[:-1], edges[1:]]))
+    return float(np.sqrt(RecursiveBias(covariance, 0.0, prior_variance).variances[-1]))
+
+
+def dwell_needed(
+    noise: NoiseCoefficients, target_sd: float, start_s: float, prior_variance: float | None, shortest_s: float
+) -> float | None:
+    """Shortest dwell [s], not under `shortest_s`, that makes a bias as sure as asked; None where none does."""
+    return dwell_for(lambda dwell: predicted_sd(noise, dwell, start_s, prior_variance), target_sd, shortest_s)
+
+
+def known_noise(noise: NoiseCoefficients | None) -> NoiseCoefficients | None:
+    """The coefficients where at least one of those that fall on short times is there, else None."""
+    if noise is None or not (noise.quantization > 0.0 or noise.random_walk > 0.0 or noise.bias_instability > 0.0):
+        return None
+    return noise
+
+
+def channel_names(recording: Recording, wanted: tuple[str, ...] | None, all_of: tuple[str, ...]) -> tuple[str, ...]:
+    """The channels asked for, else those of `all_of` that the recording has. Raises `MissingChannel`."""
+    present = tuple(c.name for c in recording.info.channels)
+    names = wanted or tuple(name for name in all_of if name in present)
+    if not names:
+        raise MissingChannel(all_of[0], present)
+    return names

@@ -1,0 +1,266 @@
+"""Field calibration: bias and scale of a unit turned by hand through a few positions, without a bench (F).
+
+Accelerometers from two positions, zero and (α, β), or from more with the tilt of the base found along (F 11-34); gyros'
+bias alone where they cannot feel the Earth's rate, bias and scale where they can (F 36, 45-48). Cross-couplings are
+neglected, and what that costs is in the uncertainty. Errata of F: `procedures.analysis.field.positions`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from procedures.analysis.calibration_analysis import noise_of_means
+from procedures.analysis.field.fit import FieldFit, FieldModel, FieldUncertainty, fit_field
+from procedures.analysis.reference import INPUT_UNITS, reference_vectors
+from procedures.analysis.station_means import StationMeans, station_means
+from procedures.core import units
+from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.recording import Recording
+from procedures.core.report import Report, Table
+from procedures.core.site import Site
+from procedures.core.table_angles import TableAngles
+from procedures.core.unit import Unit
+from procedures.procedure import Evidence, Method, Outcome, Parameters
+
+Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
+
+
+class Params(Parameters):
+    """Where and how the unit was turned, and how well that is known. Latitude and gravity depend on the place."""
+
+    latitude_deg: float = Field(ge=-90.0, le=90.0)
+    gravity_m_s2: float = Field(ge=9.7, le=9.9)
+    azimuth_deg: float = Field(0.0, ge=-360.0, le=360.0, description="of the unit's x in position zero; F: -90")
+    positions: tuple[tuple[Angle, Angle], ...] | None = Field(
+        None, min_length=2, max_length=200, description="(α, β) [deg] of each recording; None: its table angles"
+    )
+    tilt: Literal["level", "base", "turn_zeros"] = Field(
+        "level",
+        description="level: the base is level within level_sd; base: its tilt is estimated; turn_zeros: the zeros of "
+        "the two turns are (F 15)",
+    )
+    gyro: Literal["none", "bias", "bias_and_scale"] = Field(
+        "bias", description="bias: tactical grade, scale factor nominal; bias_and_scale: from the Earth's rate"
+    )
+    angle_sd_arcsec: float = Field(60.0, ge=0.0, le=36_000.0, description="of each turn, set by hand")
+    level_sd_arcsec: float = Field(60.0, ge=0.0, le=36_000.0, description="of a base taken as level, a spirit level")
+    azimuth_sd_arcsec: float = Field(3600.0, ge=0.0, le=360_000.0, description="of the azimuth, a compass")
+    cross_coupling_sd: float = Field(0.001, ge=0.0, le=0.1, description="of each of the six that are neglected")
+    gravity_relative_sd: float = Field(1e-5, ge=0.0, le=0.01)
+    gyro_scale_sd: float = Field(0.01, ge=0.0, le=0.5, description="of a nominal scale factor, relative")
+    lever_min: float = Field(0.02, gt=0.0, le=1.0, description="least change of a channel's input, relative")
+    scale_sd_max: float = Field(0.1, gt=0.0, le=1.0, description="relative; a worse scale factor is refused")
+    scale_sd_limit: float = Field(0.005, gt=0.0, le=1.0, description="relative; a worse accelerometer fails")
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0)
+
+
+@dataclass(frozen=True)
+class FieldTriad:
+    """One triad's bias and scale with standard uncertainties, and the base as this triad saw it."""
+
+    calibration: TriadCalibration
+    bias: tuple[float, ...]
+    bias_sd: tuple[float, ...]
+    scale: tuple[float, ...]
+    scale_relative_sd: tuple[float, ...]
+    scale_estimated: bool
+    chi_square: float
+    degrees_of_freedom: int
+    p_value: float | None
+    residuals: tuple[tuple[float, ...], ...]
+    """Per recording, in the output's unit."""
+
+
+class Result(Outcome):
+    """The triads, and the tilt where it was estimated."""
+
+    triads: tuple[FieldTriad, ...]
+    tilt_deg: tuple[float, float] | None
+    """(α₀, β₀)."""
+    tilt_sd_deg: tuple[float, float] | None
+    tilt_model: str
+
+
+def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
+    """One recording a position. Raises `Undetermined` where the positions do not show what is asked, with the reason.
+
+    Also `UnfitRecording` and `BadParameter` where positions are missing or too few.
+    """
+    positions = _positions(evidence.recordings, params)
+    accelerometer, means = _accelerometer(evidence.recordings, positions, params, unit)
+    triads = [_told(accelerometer, means, params, estimated=True)]
+    if params.gyro != "none":
+        gyro, gyro_means = _gyro(evidence.recordings, positions, params, unit, accelerometer)
+        triads.append(_told(gyro, gyro_means, params, estimated=params.gyro == "bias_and_scale"))
+    checks = tuple(_checks(triads, params))
+    estimated = params.tilt != "level"
+    sd = np.sqrt(np.diagonal(accelerometer.covariance)[6:]) / units.DEG
+    tilt = accelerometer.tilt_rad / units.DEG
+    return Result(
+        checks=checks,
+        verdict=verdict(checks),
+        warnings=tuple(_warnings(triads, accelerometer, params)),
+        triads=tuple(triads),
+        tilt_deg=(float(tilt[0]), float(tilt[1])) if estimated else None,
+        tilt_sd_deg=(float(sd[0]), float(sd[1])) if estimated else None,
+        tilt_model=params.tilt,
+    )
+
+
+def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
+    """Diagonal K, model "field"."""
+    return tuple(t.calibration for t in result.triads)
+
+
+def report(result: Result) -> Report:
+    """Bias and scale of every channel, and the tilt."""
+    rows = tuple(
+        (
+            f"{t.calibration.triad} {axis}",
+            name,
+            t.bias[c] / size,
+            t.bias_sd[c] / size,
+            t.scale[c],
+            t.scale_relative_sd[c],
+        )
+        for t in result.triads
+        for name, size in (units.DISPLAY[t.calibration.output_unit],)
+        for c, axis in enumerate("xyz")
+    )
+    columns = ("channel", "unit", "bias", "±", "scale", "± relative")
+    note = "" if result.tilt_deg is None else f"tilt α₀ = {result.tilt_deg[0]:.4g}°, β₀ = {result.tilt_deg[1]:.4g}°"
+    return Report(note, (Table("Field calibration", columns, rows, "U = b + k·v; cross-couplings are neglected."),))
+
+
+def _positions(recordings: Sequence[Recording], params: Params) -> list[TableAngles]:
+    if len(recordings) < 2:
+        raise UnfitRecording(f"{len(recordings)} recording(s): at least two positions are needed")
+    if params.positions is not None:
+        if len(params.positions) != len(recordings):
+            raise BadParameter("positions", len(params.positions), f"one for each of the {len(recordings)} recordings")
+        return [TableAngles(0.0, alpha, beta) for alpha, beta in params.positions]
+    found: list[TableAngles] = []
+    for recording in recordings:
+        station = recording.info.station
+        if station is None or station.angles is None:
+            raise BadParameter("positions", None, f"recording {recording.info.id} has no angles: give the positions")
+        if station.angles.outer_deg != 0.0:
+            raise BadParameter("positions", None, f"recording {recording.info.id} has an outer angle: F has none")
+        found.append(station.angles)
+    return found
+
+
+def _accelerometer(
+    recordings: Sequence[Recording], positions: list[TableAngles], params: Params, unit: Unit | None
+) -> tuple[FieldFit, StationMeans]:
+    level = (params.level_sd_arcsec * units.ARCSEC) ** 2
+    uncertainty = FieldUncertainty(
+        params.angle_sd_arcsec * units.ARCSEC,
+        ((level, 0.0), (0.0, level)),
+        0.0,
+        params.cross_coupling_sd,
+        params.gravity_relative_sd,
+    )
+    return _fit("accelerometer", recordings, unit, _model("accelerometer", positions, params, None), uncertainty)
+
+
+def _gyro(
+    recordings: Sequence[Recording],
+    positions: list[TableAngles],
+    params: Params,
+    unit: Unit | None,
+    accelerometer: FieldFit,
+) -> tuple[FieldFit, StationMeans]:
+    """On the base as the accelerometers found it."""
+    level = (params.level_sd_arcsec * units.ARCSEC) ** 2
+    tilt = accelerometer.covariance[6:, 6:] if params.tilt != "level" else level * np.eye(2)
+    uncertainty = FieldUncertainty(
+        params.angle_sd_arcsec * units.ARCSEC,
+        ((float(tilt[0, 0]), float(tilt[0, 1])), (float(tilt[1, 0]), float(tilt[1, 1]))),
+        params.azimuth_sd_arcsec * units.ARCSEC,
+        params.cross_coupling_sd,
+        0.0,
+        params.gyro_scale_sd,
+    )
+    return _fit("gyro", recordings, unit, _model("gyro", positions, params, accelerometer), uncertainty)
+
+
+def _model(triad: str, positions: list[TableAngles], params: Params, accelerometer: FieldFit | None) -> FieldModel:
+    site = Site(params.latitude_deg, params.gravity_m_s2, params.azimuth_deg)
+    vector: Array = reference_vectors(triad, [TableAngles()], site)[0]
+    alpha_beta = np.array([[p.middle_deg, p.inner_deg] for p in positions]) * units.DEG
+    tilt = (0.0, 0.0) if accelerometer is None else (float(accelerometer.tilt_rad[0]), float(accelerometer.tilt_rad[1]))
+    return FieldModel(
+        alpha_beta,
+        vector,
+        "turn_zeros" if params.tilt == "turn_zeros" else "base",
+        params.tilt != "level" and triad == "accelerometer",
+        tilt,
+        triad == "accelerometer" or params.gyro == "bias_and_scale",
+        params.lever_min,
+        params.scale_sd_max,
+    )
+
+
+def _fit(
+    triad: str, recordings: Sequence[Recording], unit: Unit | None, model: FieldModel, uncertainty: FieldUncertainty
+) -> tuple[FieldFit, StationMeans]:
+    means = station_means(recordings, triad)
+    if means.output_unit == "count" and not model.estimate_scale:
+        raise UnfitRecording(
+            f"the {triad} channels are in counts: without a scale factor the Earth's rate stays in them"
+        )
+    noise, known = noise_of_means(means, unit.triad(triad) if unit else None)
+    what = f"bias and scale of the {triad} triad in the field"
+    return fit_field(what, means.outputs, noise, model, uncertainty, known), means
+
+
+def _told(fit: FieldFit, means: StationMeans, params: Params, estimated: bool) -> FieldTriad:
+    triad = means.triad
+    return FieldTriad(
+        fit.calibration(triad, means.output_unit, INPUT_UNITS[triad], params.cross_coupling_sd),
+        tuple(fit.bias.tolist()),
+        tuple(np.sqrt(np.diagonal(fit.covariance)[:3]).tolist()),
+        tuple(fit.scale.tolist()),
+        tuple(fit.scale_relative_sd.tolist()),
+        estimated,
+        fit.chi_square,
+        fit.degrees_of_freedom,
+        fit.p_value,
+        tuple(tuple(row) for row in fit.residuals.tolist()),
+    )
+
+
+def _checks(triads: Sequence[FieldTriad], params: Params) -> list[Check]:
+    limit = Limit("1", params.scale_sd_limit, source="ours")
+    greatest = max(triads[0].scale_relative_sd)
+    found = [check("accelerometer scale factor, greatest relative standard uncertainty", greatest, limit)]
+    for t in triads:
+        if t.p_value is not None:
+            limit = Limit("1", minimum=params.residual_p_value_min)
+            found.append(check(f"{t.calibration.triad} residuals, p-value of chi-square", t.p_value, limit))
+    return found
+
+
+def _warnings(triads: Sequence[FieldTriad], accelerometer: FieldFit, params: Params) -> list[str]:
+    found: list[str] = []
+    if not accelerometer.noise_known:
+        found.append("the noise is not known: uncertainties come from the scatter within the recordings")
+    found += [
+        f"{t.calibration.triad}: as many unknowns as measurements, nothing shows whether the base moved or was tilted"
+        for t in triads
+        if t.degrees_of_freedom == 0
+    ]
+    if params.tilt == "level":
+        bias = params.gravity_m_s2 * units.DEG
+        found.append(f"a base tilted by one degree makes the horizontal biases wrong by {bias:.2g} m/s^2: see tilt")
+    return found
+
+
+METHOD = Method("field_calibration", "Field calibration", "1.0.0", Params, Result, analyse, report, calibrations)

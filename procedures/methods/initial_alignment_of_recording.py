@@ -1,0 +1,210 @@
+"""Heading, pitch and roll of a unit that rested, from its corrected mean outputs (textbook S 3.163-3.166, thesis 1.1).
+
+Each recording is an alignment of its own. The uncertainty has the calibration's covariance, the change from launch to
+launch and the noise of the recording; beside it stands the azimuth error of thesis 1.1, from the unit's noise.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+from scipy.linalg import block_diag
+
+from procedures.analysis.navigation.alignment import (
+    InitialAttitude,
+    azimuth_error,
+    initial_attitude,
+    require_alignable,
+)
+from procedures.analysis.navigation.instrument_errors import calibrated_triad
+from procedures.analysis.station_means import StationMeans, station_means
+from procedures.analysis.station_noise import triad_covariance
+from procedures.core import units
+from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter, Undetermined, UnfitRecording
+from procedures.core.imu_model import TriadCalibration, correct
+from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.report import Report, Table
+from procedures.core.unit import Unit
+from procedures.procedure import Evidence, Method, Outcome, Parameters
+
+TRIADS = ("accelerometer", "gyro")
+LIKELY = 4.0
+"""Standard deviations within which a magnitude must agree with the site's; beyond them the unit moved, or the site,
+the calibration or the uncertainty is wrong: one in 16 000 by chance."""
+
+
+class Params(Parameters):
+    """Where the unit rested; neither latitude nor gravity has a default, they depend on the place."""
+
+    latitude_deg: float = Field(ge=-90.0, le=90.0)
+    gravity_m_s2: float = Field(ge=9.7, le=9.9)
+    gravity_sd_m_s2: float = Field(1e-4, ge=0.0, le=0.01)
+    earth_rate_rad_s: float = Field(units.EARTH_RATE, ge=7.0e-5, le=7.6e-5)
+    base_turn_arcsec: float = Field(0.0, ge=0.0, le=3600.0, description="turn of the base about east meanwhile")
+    heading_sd_max_deg: float = Field(0.1, gt=0.0, le=180.0, description="limit of the heading's uncertainty (ours)")
+
+
+@dataclass(frozen=True)
+class AlignedAttitude:
+    """One recording's attitude [deg]; heading clockwise from north, 0 … 360."""
+
+    recording: str
+    heading_deg: float
+    pitch_deg: float
+    roll_deg: float
+    heading_sd_deg: float
+    pitch_sd_deg: float
+    roll_sd_deg: float
+    duration_s: float
+    predicted_azimuth_error_deg: float | None
+    """Thesis 1.1, magnitudes added; None where the unit's noise is not known."""
+    predicted_azimuth_sd_deg: float | None
+    """The same with the parts as independent standard uncertainties."""
+    magnitude_errors: tuple[float, float, float]
+    """|f| − g [m/s²], |ω| − Ω and ω upwards − Ω·sin L [rad/s]."""
+    magnitude_sd: tuple[float, float, float]
+
+
+class Result(Outcome):
+    """Every recording's attitude, in order."""
+
+    basis: str
+    attitudes: tuple[AlignedAttitude, ...]
+
+
+def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
+    """Correct the means with the calibration given, else the unit's current one. Raises `BadParameter` at a pole."""
+    require_alignable(params.latitude_deg)
+    if not evidence.recordings:
+        raise UnfitRecording("there is no recording of a resting unit to align")
+    calibrations, basis = _calibrations(evidence, unit)
+    means = {triad: station_means(evidence.recordings, triad) for triad in TRIADS}
+    found = [_aligned(i, means, calibrations, params, unit) for i in range(len(evidence.recordings))]
+    attitudes = tuple(_told(i, means, params, unit, a) for i, a in enumerate(found))
+    checks = tuple(c for a in attitudes for c in _checks(a, params))
+    known = unit is not None and all(unit.triad(triad) is not None for triad in TRIADS)
+    missing = (
+        () if known else ("noise and change from launch to launch are not known: uncertainties are lower figures",)
+    )
+    return Result(checks=checks, verdict=verdict(checks), warnings=missing, basis=basis, attitudes=attitudes)
+
+
+def report(result: Result) -> Report:
+    """A row a recording."""
+    columns = ("recording", "heading, deg", "±", "pitch, deg", "±", "roll, deg", "±", "time, s", "thesis 1.1, deg")
+    rows = tuple(
+        (
+            *(a.recording, a.heading_deg, a.heading_sd_deg, a.pitch_deg, a.pitch_sd_deg, a.roll_deg, a.roll_sd_deg),
+            *(a.duration_s, a.predicted_azimuth_error_deg),
+        )
+        for a in result.attitudes
+    )
+    return Report(result.basis, (Table("Initial alignment", columns, rows, "± one standard uncertainty."),))
+
+
+def _calibrations(evidence: Evidence, unit: Unit | None) -> tuple[dict[str, TriadCalibration], str]:
+    if len(evidence.calibrations) > 1:
+        raise BadParameter("calibrations", len(evidence.calibrations), "one at a time")
+    if evidence.calibrations:
+        triads, basis = evidence.calibrations[0].triads, f"calibration {evidence.calibrations[0].id}"
+    else:
+        triads = unit.calibrations if unit else ()
+        basis = f"the unit's current calibration {unit.calibration_id or ''}" if unit else ""
+    by_name = {c.triad: c for c in triads}
+    for triad in TRIADS:
+        if triad not in by_name:
+            raise BadParameter("calibrations", len(evidence.calibrations), f"the {triad} triad has no calibration")
+    return by_name, basis
+
+
+def _aligned(
+    i: int, means: dict[str, StationMeans], calibrations: dict[str, TriadCalibration], params: Params, unit: Unit | None
+) -> InitialAttitude:
+    vectors: list[Array] = []
+    covariances: list[Array] = []
+    for triad in TRIADS:
+        calibration, mean = calibrations[triad], means[triad]
+        if mean.output_unit != calibration.output_unit:
+            raise UnfitRecording(
+                f"the {triad} channels are in {mean.output_unit}, the calibration is for {calibration.output_unit}"
+            )
+        record = unit.triad(triad) if unit and mean.output_unit != "count" else None
+        vector = correct(mean.outputs[i], calibration)
+        errors = calibrated_triad(calibration, record, vector)
+        known = triad_covariance(record, mean.windows[i : i + 1])
+        variance = mean.mean_sd[i] ** 2 if known is None else known[:, 0, 0]
+        inverse = np.linalg.inv(calibration.matrix_array)
+        vectors.append(vector)
+        covariances.append(np.sum(list(errors.constant.values()), axis=0) + inverse @ np.diag(variance) @ inverse.T)
+    covariance = np.asarray(block_diag(*covariances), dtype=np.float64)
+    site = (params.latitude_deg, params.gravity_m_s2, params.earth_rate_rad_s)
+    try:
+        return initial_attitude(vectors[0], vectors[1], covariance, *site)
+    except Undetermined as refusal:
+        raise UnfitRecording(f"recording {means['gyro'].labels[i]}: {refusal}") from refusal
+
+
+def _told(
+    i: int, means: dict[str, StationMeans], params: Params, unit: Unit | None, attitude: InitialAttitude
+) -> AlignedAttitude:
+    window = means["gyro"].windows[i]
+    duration = float(window[1] - window[0])
+    predicted = _predicted(params, unit, duration)
+    heading, pitch, roll = (attitude.angles_rad / units.DEG).tolist()
+    sds = (np.sqrt(np.diagonal(attitude.covariance)) / units.DEG).tolist()
+    gravity, rate, upward = attitude.magnitude_errors.tolist()
+    gravity_sd, rate_sd, upward_sd = attitude.magnitude_sd.tolist()
+    return AlignedAttitude(
+        means["gyro"].labels[i],
+        heading % 360.0,
+        pitch,
+        roll,
+        sds[0],
+        sds[1],
+        sds[2],
+        duration,
+        predicted[0],
+        predicted[1],
+        (gravity, rate, upward),
+        (float(np.hypot(gravity_sd, params.gravity_sd_m_s2)), rate_sd, upward_sd),
+    )
+
+
+def _predicted(params: Params, unit: Unit | None, duration_s: float) -> tuple[float | None, float | None]:
+    """Thesis 1.1 with the noisiest channel of each triad, since any of them may look east."""
+    gyro, accelerometer = (None, None) if unit is None else (unit.gyro, unit.accelerometer)
+    if gyro is None or accelerometer is None:
+        return None, None
+    added, independent = azimuth_error(
+        params.latitude_deg,
+        params.gravity_m_s2,
+        max(n.bias_instability for n in accelerometer.noise),
+        max(n.bias_instability for n in gyro.noise),
+        max(n.random_walk for n in gyro.noise),
+        params.base_turn_arcsec * units.ARCSEC,
+        duration_s,
+        params.earth_rate_rad_s,
+    )
+    return added / units.DEG, independent / units.DEG
+
+
+def _checks(a: AlignedAttitude, params: Params) -> tuple[Check, ...]:
+    limit = Limit("deg", params.heading_sd_max_deg, source="ours")
+    found = [check(f"{a.recording}: heading, standard uncertainty", a.heading_sd_deg, limit)]
+    kinds = (("|f| − g", "m/s^2"), ("|ω| − Ω", "rad/s"), ("ω upwards − Ω·sin L", "rad/s"))
+    for (name, unit), error, sd in zip(kinds, a.magnitude_errors, a.magnitude_sd, strict=True):
+        bound = Limit(unit, LIKELY * sd, -LIKELY * sd, source=f"{LIKELY:g} standard uncertainties")
+        found.append(check(f"{a.recording}: {name}", error, bound, sd))
+    return tuple(found)
+
+
+METHOD = Method(
+    "initial_alignment_of_recording",
+    "Initial alignment from a recording at rest",
+    "1.0.0",
+    Params,
+    Result,
+    analyse,
+    report,
+)
