@@ -29,7 +29,13 @@ from tests.domain.forward_model import (
 
 CALIBRATION = catalog.discover()["calibration_12_orientations"]
 VERIFICATION = catalog.discover()["verification_9_orientations"]
-OURS = ("calibration_12_orientations", "verification_9_orientations", "no_operation")
+OURS = (
+    "calibration_12_orientations",
+    "verification_9_orientations",
+    "no_operation",
+    "scale_factor_whole_turns",
+    "static_run",
+)
 
 
 @pytest.mark.parametrize("name", OURS)
@@ -41,7 +47,7 @@ def test_a_procedure_is_named_as_its_file_and_has_a_schema(name: str):
     assert inspect.isasyncgenfunction(procedure.acquire)
 
 
-@pytest.mark.parametrize("name", ["run_to_run", "scalar_calibration"])
+@pytest.mark.parametrize("name", list(methods.discover()))
 def test_a_method_is_named_as_its_file_and_has_a_schema(name: str):
     method = methods.discover()[name]
     json.dumps(method.params.model_json_schema())

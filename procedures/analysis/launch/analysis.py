@@ -1,0 +1,126 @@
+"""A launch at rest from raw counts to noise coefficients: two passes over its blocks, in bounded memory.
+
+The first pass inspects the samples and gathers cell means. They tell what to trim and to remove. The second pass takes
+what is faster than a cell from every sample after the trim; everything slower comes from the cells.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from procedures.analysis.allan.correlated import Uncorrelatable
+from procedures.analysis.allan.deviation import Deviation, DeviationStream
+from procedures.analysis.allan.statistic import Sizes, decade_sizes
+from procedures.analysis.cells import Cells, CellStream, cell_samples, channel_rows
+from procedures.analysis.fitness.findings import require_fit
+from procedures.analysis.fitness.stream import FitnessStream
+from procedures.analysis.launch.channel import channel_noise
+from procedures.analysis.launch.results import LaunchNoise
+from procedures.analysis.launch.settings import LaunchSettings
+from procedures.analysis.launch.signal import CleanSignal, clean_signal
+from procedures.analysis.noise_fit.powers import FastPowers, Powers
+from procedures.core.arrays import Array
+from procedures.core.errors import UnfitRecording
+from procedures.core.recording import Quantity, RawArray, Recording
+
+FEWEST_CELLS = 120
+"""Fewer cells are no launch to analyse."""
+CROSSOVER = 0.25
+"""Of a cell's frequency: above it the spectrum is taken from every sample."""
+FEWEST_A_CELL = 8
+"""With fewer samples a cell nothing is gained by looking faster."""
+
+
+def analyse_launch(recording: Recording, label: str, settings: LaunchSettings) -> LaunchNoise:
+    """Every channel but temperatures. Raises `UnfitRecording` naming recording, channel and value; `BadParameter`."""
+    info = recording.info
+    names = tuple(c.name for c in info.channels if c.quantity is not Quantity.TEMPERATURE)
+    if not names:
+        raise UnfitRecording(f"recording {info.id} has no channel whose noise could be analysed")
+    cells, findings = _first_pass(recording, names, settings)
+    signals = [
+        clean_signal(name, row, cells.cell_s, cells.since_launch_s, settings)
+        for name, row in zip(names, cells.rates, strict=True)
+    ]
+    samples = cell_samples(info.rate_hz, settings.cell_s)
+    parts: list[tuple[Deviation | None, Powers | None]] = [(None, None)] * len(names)
+    if settings.fast and samples >= FEWEST_A_CELL:
+        try:
+            parts = _second_pass(recording, names, signals, settings, correlate=True)
+        except Uncorrelatable:
+            parts = _second_pass(recording, names, signals, settings, correlate=False)
+    channels = tuple(
+        channel_noise(name, info.channels[info.column(name)].rate_unit, cells, signal, *part, findings[name], settings)
+        for name, signal, part in zip(names, signals, parts, strict=True)
+    )
+    return LaunchNoise(info.id, label, info.rate_hz, info.duration_s, info.since_launch_s, channels)
+
+
+def _first_pass(
+    recording: Recording, names: Sequence[str], settings: LaunchSettings
+) -> tuple[Cells, dict[str, tuple[str, ...]]]:
+    """Cell means, and what the inspection warns of, channel by channel. Raises `UnfitRecording`."""
+    info = recording.info
+    columns = [info.column(name) for name in names]
+    fitness = FitnessStream([info.channels[c] for c in columns], info.rate_hz, info.count)
+    stream = CellStream(info, names, settings.cell_s)
+
+    def inspected() -> Iterator[RawArray]:
+        for block in recording.blocks():
+            fitness.add(block[:, columns])
+            yield block
+
+    for rows in channel_rows(info, names, inspected()):
+        stream.add(rows)
+    found = fitness.finish()
+    require_fit(info.id, found)
+    cells = stream.finish()
+    if cells.rates.shape[1] < FEWEST_CELLS:
+        raise UnfitRecording(
+            f"recording {info.id}: {cells.rates.shape[1]} cells of {cells.cell_s:g} s are too few for a noise "
+            f"analysis, at least {FEWEST_CELLS} are needed"
+        )
+    return cells, {f.channel: tuple(finding.sentence for finding in f.findings) for f in found}
+
+
+@dataclass
+class _Streams:
+    """What one channel's fast part gathers, once the samples that were trimmed have passed."""
+
+    deviation: DeviationStream
+    powers: FastPowers
+    trimmed: int
+
+    def add(self, row: Array) -> None:
+        """The next samples, (n,) [rate]."""
+        passed = min(self.trimmed, len(row))
+        self.trimmed -= passed
+        if passed < len(row):
+            self.deviation.add(row[passed:])
+            self.powers.add(row[passed:])
+
+
+def _second_pass(
+    recording: Recording,
+    names: Sequence[str],
+    signals: Sequence[CleanSignal],
+    settings: LaunchSettings,
+    *,
+    correlate: bool,
+) -> list[tuple[Deviation | None, Powers | None]]:
+    """Deviations at short times and powers at high frequencies, from every sample. Raises `Uncorrelatable`."""
+    info = recording.info
+    samples = cell_samples(info.rate_hz, settings.cell_s)
+    crossover_hz = CROSSOVER * info.rate_hz / samples
+    sizes: Sizes = decade_sizes(samples, 1.0 / settings.points_per_decade)
+    streams = [
+        _Streams(
+            DeviationStream(info.rate_hz, info.count - signal.first_cell * samples, sizes=sizes, correlate=correlate),
+            FastPowers(info.rate_hz, crossover_hz),
+            signal.first_cell * samples,
+        )
+        for signal in signals
+    ]
+    for rows in channel_rows(info, names, recording.blocks()):
+        for stream, row in zip(streams, rows, strict=True):
+            stream.add(row)
+    return [(stream.deviation.finish(), stream.powers.finish()) for stream in streams]

@@ -1,0 +1,195 @@
+"""One channel of one launch: curves, band, coefficients three ways, wavelet split, averaging time."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from procedures.analysis.allan.band import BandStream
+from procedures.analysis.allan.deviation import Deviation, deviation
+from procedures.analysis.allan.read_off import Line, ReadOff, read_off
+from procedures.analysis.allan.statistic import ALLAN, OVERLAPPING_ALLAN, Sizes, decade_sizes
+from procedures.analysis.averaging_time import averaging_time
+from procedures.analysis.cells import Cells
+from procedures.analysis.launch.results import (
+    PROCESSES,
+    Averaging,
+    BandCurve,
+    ChannelNoise,
+    Coefficient,
+    Curve,
+    Reading,
+    Stage,
+)
+from procedures.analysis.launch.settings import LaunchSettings
+from procedures.analysis.launch.signal import CleanSignal
+from procedures.analysis.noise_fit.comparison import compare
+from procedures.analysis.noise_fit.estimate import Estimate, NoiseFit
+from procedures.analysis.noise_fit.least_squares import fit_allan
+from procedures.analysis.noise_fit.likelihood import fit_noise
+from procedures.analysis.noise_fit.powers import Powers, slow_powers
+from procedures.analysis.wavelet_split import wavelet_split
+from procedures.core.arrays import Array
+from procedures.core.units import DEVIATION_DISPLAY
+
+BAND_TERMS = 8
+"""The band ends where every start has about twice so many terms."""
+
+
+def channel_noise(
+    name: str,
+    rate_unit: str,
+    cells: Cells,
+    signal: CleanSignal,
+    fast: Deviation | None,
+    powers: Powers | None,
+    findings: Sequence[str],
+    settings: LaunchSettings,
+) -> ChannelNoise:
+    """Everything that is found of a channel; `fast` and `powers` are of every sample, None where there are none."""
+    cell_s, series = cells.cell_s, signal.cells
+    slow = _deviation(series, cell_s, settings)
+    whole = slow if fast is None else joined(fast, slow)
+    graphical = read_off(whole)
+    least_squares = fit_allan(whole)
+    likelihood = fit_noise(slow_powers(series, cell_s), powers, level=settings.level, confidence=settings.confidence)
+    stages = [*_stages(signal, cell_s, settings), *_split(series, cell_s, rate_unit, settings)]
+    last = len(signal.steps) - 1
+    stages[last] = replace(stages[last], curve=_curve(whole), readings=_values(graphical))
+    return ChannelNoise(
+        channel=name,
+        rate_unit=rate_unit,
+        mean=float(np.mean(signal.steps[0].cells[signal.first_cell :])),
+        used_from_s=cells.since_launch_s + signal.first_cell * cell_s,
+        used_s=len(series) * cell_s,
+        findings=(*findings, *signal.findings),
+        warm_up=signal.warm_up,
+        self_heating=signal.self_heating,
+        trend=signal.trend,
+        stages=tuple(stages),
+        band=_band(series, cell_s, settings),
+        coefficients=tuple(
+            Coefficient(p, _of_line(getattr(graphical, p)), _of(least_squares.of(p)), _of(likelihood.of(p)))
+            for p in PROCESSES
+        ),
+        disagreements=compare(graphical, least_squares, likelihood),
+        model=_remarks(likelihood),
+        averaging=_averaging(likelihood),
+    )
+
+
+def joined(fast: Deviation, slow: Deviation) -> Deviation:
+    """Short times from every sample, longer ones from the cells, as one Allan deviation of the former's rate."""
+    later = slow.tau_s > fast.tau_s[-1] * (1.0 + 1e-9)
+    factor = round(fast.rate_hz / slow.rate_hz)
+
+    def both(one: Array, two: Array) -> Array:
+        return np.concatenate([one, two[later]])
+
+    return replace(
+        fast,
+        sizes=np.concatenate([fast.sizes, slow.sizes[later] * factor]),
+        tau_s=both(fast.tau_s, slow.tau_s),
+        deviation=both(fast.deviation, slow.deviation),
+        terms=np.concatenate([fast.terms, slow.terms[later]]),
+        left_out=np.concatenate([fast.left_out, slow.left_out[later]]),
+        strides=np.concatenate([fast.strides, slow.strides[later] * factor]),
+        alpha=both(fast.alpha, slow.alpha),
+        edf=both(fast.edf, slow.edf),
+        lower=both(fast.lower, slow.lower),
+        upper=both(fast.upper, slow.upper),
+    )
+
+
+def _deviation(series: Array, cell_s: float, settings: LaunchSettings) -> Deviation:
+    return deviation(series, 1.0 / cell_s, sizes=_sizes(len(series), settings), confidence=settings.confidence)
+
+
+def _sizes(count: int, settings: LaunchSettings) -> Sizes:
+    return decade_sizes(OVERLAPPING_ALLAN.largest(count), 1.0 / settings.points_per_decade)
+
+
+def _stages(signal: CleanSignal, cell_s: float, settings: LaunchSettings) -> list[Stage]:
+    """Each step's curve from one cell on, and what is read off it."""
+    found: list[Stage] = []
+    for step in signal.steps:
+        curve = _deviation(step.cells, cell_s, settings)
+        found.append(Stage(step.name, _curve(curve), _values(read_off(curve)), step.note))
+    return found
+
+
+def _split(series: Array, cell_s: float, rate_unit: str, settings: LaunchSettings) -> list[Stage]:
+    """What the wavelet split keeps, to read N and B of, and what it removes, to read Q of (thesis 3.1.2)."""
+    if settings.wavelet_rule is None:
+        return []
+    unit, size = DEVIATION_DISPLAY[rate_unit]
+    split = wavelet_split(
+        series,
+        cell_s,
+        rule=settings.wavelet_rule,
+        unit_size=size if settings.wavelet_rule == "thesis" else None,
+        levels=settings.wavelet_levels,
+    )
+    scale = 2**settings.wavelet_levels * cell_s
+    note = f"{settings.wavelet_rule} rule, scales up to {scale:g} s"
+    if settings.wavelet_rule == "thesis":
+        note += f", unit variance in {unit}"
+    found: list[Stage] = []
+    for name, part in (("kept", split.kept), ("removed", split.removed)):
+        title = f"{name} by the wavelet split"
+        if np.all(part == part[0]):
+            found.append(Stage(title, Curve((), (), (), (), ()), (None,) * len(PROCESSES), f"{note}: nothing"))
+            continue
+        curve = _deviation(part, cell_s, settings)
+        found.append(Stage(title, _curve(curve), _values(read_off(curve)), note))
+    return found
+
+
+def _band(series: Array, cell_s: float, settings: LaunchSettings) -> BandCurve:
+    """From the cells: below one cell there is no band to see, and of few terms some start gives nearly nothing."""
+    sizes = decade_sizes(ALLAN.largest(len(series)) // BAND_TERMS, 1.0 / settings.points_per_decade)
+    stream = BandStream(1.0 / cell_s, len(series), sizes=sizes)
+    stream.add(series)
+    band = stream.finish()
+    lists = (band.tau_s, band.least, band.mean, band.greatest)
+    return BandCurve(*(tuple(values.tolist()) for values in lists))
+
+
+def _curve(d: Deviation) -> Curve:
+    return Curve(*(tuple(values.tolist()) for values in (d.tau_s, d.deviation, d.lower, d.upper, d.edf)))
+
+
+def _values(found: ReadOff) -> tuple[float | None, ...]:
+    lines: list[Line | None] = [getattr(found, process) for process in PROCESSES]
+    return tuple(None if line is None else line.coefficient for line in lines)
+
+
+def _of_line(line: Line | None) -> Reading:
+    if line is None:
+        return Reading(None)
+    return Reading(line.coefficient, line.coefficient_sd, from_s=line.from_s, to_s=line.to_s)
+
+
+def _of(estimate: Estimate) -> Reading:
+    e = estimate
+    limit = e.upper_limit if np.isfinite(e.upper_limit) else None
+    return Reading(e.value, e.standard_uncertainty, e.lower, e.upper, limit, e.p_value)
+
+
+def _remarks(fit: NoiseFit) -> tuple[str, ...]:
+    lines = tuple(f"a spectral line at {line.frequency_hz:.4g} Hz was cut out of the fit" for line in fit.lines)
+    return (*lines, *fit.remarks)
+
+
+def _averaging(fit: NoiseFit) -> Averaging:
+    """From the efficient estimates, with their covariance."""
+    covariance = np.zeros((len(PROCESSES), len(PROCESSES)))
+    at = [PROCESSES.index(process) for process in fit.correlated]
+    sds = np.array([fit.of(process).standard_uncertainty or 0.0 for process in fit.correlated])
+    covariance[np.ix_(at, at)] = fit.correlation * np.outer(sds, sds)
+    found = averaging_time(fit.coefficients(), covariance)
+    if found.tau_s is None:
+        return Averaging(None, None, "only quantization was observed: it rules as far as the record goes")
+    if found.tau_s == 0.0:
+        return Averaging(None, None, "no quantization was observed")
+    return Averaging(found.tau_s, found.sd_s)

@@ -1,0 +1,81 @@
+"""What several launches say together of one channel: means, their uncertainty, and the noise to count on."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from procedures.analysis.averaging_time import averaging_time
+from procedures.analysis.launch.results import PROCESSES, ChannelNoise, LaunchNoise, Reading
+from procedures.core.noise import NoiseCoefficients
+
+
+@dataclass(frozen=True)
+class MeanCoefficient:
+    """One process over the launches, by the likelihood fit."""
+
+    process: str
+    values: tuple[Reading, ...]
+    """One a launch."""
+    mean: float | None
+    """A launch where it was not observed counts as zero; None where no launch shows it."""
+    sd: float | None
+    """Standard uncertainty of the mean: the greater of what the fits claim and what the launches scatter."""
+
+
+@dataclass(frozen=True)
+class ChannelSummary:
+    """One channel over all launches."""
+
+    channel: str
+    rate_unit: str
+    means: tuple[MeanCoefficient, ...]
+    averaging_time_s: float | None
+    mean_change_sd: float | None
+    """Sample standard deviation (n − 1) of the mean rate over the launches; None with one."""
+
+    def mean(self, process: str) -> MeanCoefficient:
+        """One of the five processes."""
+        return self.means[PROCESSES.index(process)]
+
+    @property
+    def noise(self) -> NoiseCoefficients:
+        """The coefficients to count on in a plan."""
+        return _coefficients(self.means)
+
+
+def summarise(launches: Sequence[LaunchNoise]) -> tuple[ChannelSummary, ...]:
+    """One entry a channel, in the order of the first launch's; a channel must be in every launch."""
+    found: list[ChannelSummary] = []
+    for index, first in enumerate(launches[0].channels):
+        channels = [launch.channels[index] for launch in launches]
+        means = tuple(_mean(process, channels) for process in PROCESSES)
+        noise = _coefficients(means)
+        rates = [c.mean for c in channels]
+        change = float(np.std(rates, ddof=1)) if len(rates) > 1 else None
+        found.append(ChannelSummary(first.channel, first.rate_unit, means, _averaging_time_s(noise), change))
+    return tuple(found)
+
+
+def _mean(process: str, channels: Sequence[ChannelNoise]) -> MeanCoefficient:
+    readings = tuple(c.coefficient(process).likelihood for c in channels)
+    seen = [r for r in readings if r.value is not None]
+    if not seen:
+        return MeanCoefficient(process, readings, None, None)
+    values = [r.value or 0.0 for r in readings]
+    n = len(values)
+    claimed = sqrt(sum((r.standard_uncertainty or 0.0) ** 2 for r in seen)) / n
+    scatter = float(np.std(values, ddof=1)) / sqrt(n) if n > 1 else 0.0
+    return MeanCoefficient(process, readings, float(np.mean(values)), max(claimed, scatter))
+
+
+def _averaging_time_s(noise: NoiseCoefficients) -> float | None:
+    """None where quantization rules nowhere, or everywhere."""
+    return averaging_time(noise).tau_s or None
+
+
+def _coefficients(means: Sequence[MeanCoefficient]) -> NoiseCoefficients:
+    """In the order of `PROCESSES`; zero where a process was not observed."""
+    q, n, b, k, r = (m.mean or 0.0 for m in means)
+    return NoiseCoefficients(q, n, b, k, r)

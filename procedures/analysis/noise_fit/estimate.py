@@ -1,0 +1,89 @@
+"""What a fit says of the noise of one channel. SI: *rate* as in `core.noise`."""
+
+from dataclasses import dataclass
+
+from procedures.analysis.noise_fit.lines import SpectralLine
+from procedures.core.arrays import Array
+from procedures.core.noise import NoiseCoefficients
+
+PROCESSES = ("quantization", "random_walk", "bias_instability", "rate_random_walk", "rate_ramp")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One coefficient. Where the process was not observed, value, uncertainty and interval are None."""
+
+    value: float | None
+    """Q [rate·s], N [rate·√s], B [rate], K [rate/√s] or |R| [rate/s]."""
+    standard_uncertainty: float | None
+    """Where only the processes observed are there."""
+    lower: float | None
+    upper: float | None
+    """Interval at the fit's confidence, whatever other processes there are."""
+    upper_limit: float
+    """The coefficient is below this with a probability of 95 % (one-sided), observed or not; infinite: no limit."""
+    p_value: float
+    """Probability that a record without this process looks as much as if it had it."""
+
+    @property
+    def present(self) -> bool:
+        """Whether the process was observed."""
+        return self.value is not None
+
+
+@dataclass(frozen=True)
+class Octave:
+    """How well the model describes the power between two frequencies."""
+
+    low_hz: float
+    high_hz: float
+    chi_square: float
+    dof: int
+    p_value: float
+    is_fast: bool
+    """From the full-rate samples, not from the cell means."""
+    fitted: bool
+    """False: left out of the fit."""
+
+
+@dataclass(frozen=True)
+class NoiseFit:
+    """The noise of one channel by one method."""
+
+    method: str
+    quantization: Estimate
+    random_walk: Estimate
+    bias_instability: Estimate
+    rate_random_walk: Estimate
+    rate_ramp: Estimate
+    slope: float
+    """Signed slope of the rate where a ramp was observed, else 0 [rate/s]."""
+    confidence: float
+    correlated: tuple[str, ...]
+    """The processes observed, in the order of `correlation`."""
+    correlation: Array
+    """Between the errors of their coefficients, (p, p)."""
+    octaves: tuple[Octave, ...]
+    """Goodness of fit from low to high frequency; empty where the method has none."""
+    lines: tuple[SpectralLine, ...]
+    """Cut out before the fit."""
+    band_hz: tuple[float, float]
+    """Lowest and highest frequency used."""
+    remarks: tuple[str, ...]
+    """What a reader must know, a sentence each."""
+
+    def of(self, process: str) -> Estimate:
+        """The estimate of one of `PROCESSES`."""
+        estimates = (
+            self.quantization,
+            self.random_walk,
+            self.bias_instability,
+            self.rate_random_walk,
+            self.rate_ramp,
+        )
+        return estimates[PROCESSES.index(process)]
+
+    def coefficients(self) -> NoiseCoefficients:
+        """The values, zero where a process was not observed."""
+        q, n, b, k, r = (self.of(process).value or 0.0 for process in PROCESSES)
+        return NoiseCoefficients(q, n, b, k, r)

@@ -1,0 +1,141 @@
+"""Noise coefficients by maximum likelihood of the spectrum (Whittle), with the processes selected and the fit judged.
+
+P. Whittle, Ark. Mat. 2 (1953) 423: modes of a stationary record are asymptotically independent and normal, so their
+powers hold all that the record tells; the coefficients reach the Cramér-Rao bound. What is exact here and what is
+approximate stands in `powers`; the maximum in `restricted`, the presence of a process in `selection`.
+"""
+
+from math import sqrt
+
+import numpy as np
+from scipy.special import chdtri
+
+from procedures.analysis.noise_fit.bands import agreed
+from procedures.analysis.noise_fit.estimate import PROCESSES, Estimate, NoiseFit
+from procedures.analysis.noise_fit.powers import Powers
+from procedures.analysis.noise_fit.restricted import Profile, Spectrum, State, information, maximum
+from procedures.analysis.noise_fit.selection import VARIANCES, Selection, inverse_information, select
+from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter
+
+METHOD = "likelihood"
+LIMIT = 0.95
+"""Probability of an upper limit."""
+
+
+def fit_noise(slow: Powers, fast: Powers | None = None, *, level: float = 0.01, confidence: float = 0.95) -> NoiseFit:
+    """Q, N, B, K, R of one channel from its slow and, where there are any, its fast powers.
+
+    `level` is the probability at which each absent process is reported present; `confidence` that of the intervals.
+    The fast powers are used from their first frequency up, the slow ones below. Where they disagree with the
+    model (chi-square per octave, see `bands`), the reading noise at the full rate is not white: the slow
+    powers are then used whole, the fast ones above them with a quantization of their own, less as many of their
+    highest octaves as it takes until the rest fits. Q is then that of readings one cell apart, as the Allan deviation
+    of the cell means shows it.
+    Raises `BadParameter` and `UnfitRecording`.
+    """
+    for name, value in (("level", level), ("confidence", confidence)):
+        if not 0.0 < value < 1.0:
+            raise BadParameter(name, value, f"0 < {name} < 1")
+    joined, remarks = agreed(slow, fast)
+    selection = select(joined.used, level)
+    estimates = _estimates(joined.used, selection, confidence)
+    correlated, correlation = _correlation(selection)
+    octaves = joined.octaves(selection.best.variances, selection.best.amplitudes, selection.ramp)
+    fitted = joined.frequency_hz[joined.fitted]
+    return NoiseFit(
+        METHOD,
+        *estimates,
+        slope=selection.slope.slope if selection.ramp else 0.0,
+        confidence=confidence,
+        correlated=correlated,
+        correlation=correlation,
+        octaves=octaves,
+        lines=() if fast is None else fast.lines,
+        band_hz=(float(fitted[0]), float(fitted[-1])),
+        remarks=(*remarks, *_remarks(selection)),
+    )
+
+
+def _estimates(spectrum: Spectrum, selection: Selection, confidence: float) -> tuple[Estimate, ...]:
+    """Of Q, N, B, K, R. Values are those of the processes present; intervals allow the others as well.
+
+    A process not observed is not proven absent: an interval that took it for zero would be too narrow. An absent
+    process's limit allows the ramp, too.
+    """
+    everything = tuple(range(spectrum.columns.shape[1]))
+    own, full = (maximum(s, everything) for s in (selection.spectrum, spectrum))
+    fit_sd = _standard_uncertainties(selection.spectrum, selection.best, selection.free)
+    own_sd = _standard_uncertainties(selection.spectrum, own, everything)
+    full_sd = _standard_uncertainties(spectrum, full, everything)
+    found: list[Estimate] = []
+    for k in VARIANCES:
+        p_value = selection.p_values[k]
+        if k in selection.present:
+            alone = Profile(selection.spectrum, selection.free, k, selection.best)
+            allowed = Profile(selection.spectrum, everything, k, own)
+            found.append(_present(((alone, fit_sd[k]), (allowed, own_sd[k])), p_value, confidence))
+        else:
+            limit = Profile(spectrum, everything, k, full).crossing(_one_sided(), upwards=True, scale=full_sd[k])
+            found.append(Estimate(None, None, None, None, sqrt(limit), p_value))
+    return (*found, _of_ramp(selection, confidence))
+
+
+def _one_sided() -> float:
+    """Loss of twice the log likelihood at an upper limit: a one-sided interval is half of a two-sided one."""
+    return float(chdtri(1, 2.0 * (1.0 - LIMIT)))
+
+
+def _present(profiles: tuple[tuple[Profile, float], ...], p_value: float, confidence: float) -> Estimate:
+    """A process with variance v: ``coefficient = √v``, its uncertainty ``sd(v)/(2√v)``, its interval by profile.
+
+    The profiles, each with sd(v): that of the processes present, then that of all. The interval is from the lowest to
+    the highest end: alone the first is blind to what was not observed, alone the second is low where all that it
+    allows is absent, since variances cannot be negative (N alone: upper limits held in 76 % instead of 95 %).
+    """
+    loss = float(chdtri(1, 1.0 - confidence))
+    first, sd = profiles[0]
+    variance = float(first.best.variances[first.k])
+    lower = min(p.crossing(loss, upwards=False, scale=s) for p, s in profiles)
+    upper = max(p.crossing(loss, upwards=True, scale=s) for p, s in profiles)
+    limit = max(p.crossing(_one_sided(), upwards=True, scale=s) for p, s in profiles)
+    return Estimate(sqrt(variance), 0.5 * sd / sqrt(variance), sqrt(lower), sqrt(upper), sqrt(limit), p_value)
+
+
+def _of_ramp(selection: Selection, confidence: float) -> Estimate:
+    """|R| with Student's interval."""
+    slope = selection.slope
+    value, sd = abs(slope.slope), slope.standard_uncertainty
+    limit = value + sd * slope.factor(LIMIT)
+    if not selection.ramp:
+        return Estimate(None, None, None, None, limit, slope.p_value)
+    half = sd * slope.factor(0.5 * (1.0 + confidence))
+    return Estimate(value, sd, max(0.0, value - half), value + half, limit, slope.p_value)
+
+
+def _standard_uncertainties(spectrum: Spectrum, at: State, free: tuple[int, ...]) -> dict[int, float]:
+    """Of the free variances, from the Fisher information."""
+    covariance = _covariance(spectrum, at, free)
+    return {k: sqrt(float(covariance[i, i])) for i, k in enumerate(free)}
+
+
+def _covariance(spectrum: Spectrum, at: State, free: tuple[int, ...]) -> Array:
+    return inverse_information(information(spectrum, at)[np.ix_(free, free)])
+
+
+def _correlation(selection: Selection) -> tuple[tuple[str, ...], Array]:
+    """Of the processes observed; slope and variances are independent in the information."""
+    count = len(selection.present)
+    covariance = _covariance(selection.spectrum, selection.best, selection.free)[:count, :count]
+    sd = np.sqrt(np.diag(covariance))
+    names = [PROCESSES[k] for k in selection.present]
+    correlation = np.eye(count + selection.ramp)
+    correlation[:count, :count] = covariance / np.outer(sd, sd)
+    return tuple(names + [PROCESSES[-1]] * selection.ramp), correlation
+
+
+def _remarks(selection: Selection) -> tuple[str, ...]:
+    if not selection.ambiguous:
+        return ()
+    taken, other = ("rate ramp", "rate random walk")[:: 1 if selection.ramp else -1]
+    return (f"The slow drift is taken for a {taken}, but one record does not tell it from a {other}.",)

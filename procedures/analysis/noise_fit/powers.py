@@ -1,0 +1,219 @@
+"""The spectrum of a record in bins: of the whole record from its cell means, and of its segments at the full rate.
+
+Slow: the orthonormal cosine transform (DCT-II) of all cell means. Its modes of white noise, of a random walk and, its
+first and last reading left free, of quantization are independent; those of a flicker nearly so (correlations of a few
+per cent between the lowest). A ramp is a mean of the modes, not a power: bins keep the products that its least squares
+need. Fast: tapered segments, overlapped so that every sample counts once. Cell means of a second fold the reading
+noise of all frequencies into their band; the fast modes separate it from the slower processes by its f².
+"""
+
+from dataclasses import dataclass
+from math import ceil, log2, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from procedures.analysis.allan.statistic import FEWEST_SAMPLES
+from procedures.analysis.noise_fit import columns
+from procedures.analysis.noise_fit.columns import FlickerBand
+from procedures.analysis.noise_fit.lines import SpectralLine, find_lines
+from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.noise import NoiseCoefficients
+
+FLICKER_BAND_S = NoiseCoefficients().flicker_band_s
+"""The flicker of `core.noise`, as long as nobody says otherwise."""
+SINGLE_MODES = 50
+"""The lowest modes of the whole record stand alone."""
+BINS = 300
+"""Bins over the others, evenly in the logarithm of frequency."""
+CROSSOVER_HZ = 0.03
+"""From here on the full-rate segments are used, where there are any."""
+_MODES_AT_CROSSOVER = 4
+_EDGE = 8
+"""The taper rises over one in so many samples of a segment."""
+
+
+@dataclass(frozen=True)
+class Powers:
+    """A spectrum of a rate in bins; a white noise of variance s² a sample has the power s² in every mode."""
+
+    frequency_hz: Array
+    """Mean frequency of each bin, ascending, (b,)."""
+    power: Array
+    """Mean power of its modes [rate²], (b,)."""
+    dof: Array
+    """Degrees of freedom of that mean, (b,)."""
+    columns: Array
+    """Expected power for unit Q², N², B², K², (b, 4)."""
+    products: Array
+    """Sums over the bin's modes of coefficient × regressor: unit ramp, first and last reading, (b, 3)."""
+    gram: Array
+    """Sums of products of those regressors, (b, 3, 3)."""
+    period_s: float
+    """Of the samples the modes were made of."""
+    lines: tuple[SpectralLine, ...] = ()
+    """Cut out of the bins."""
+
+
+def slow_powers(cells: Array, cell_s: float, *, flicker_band_s: FlickerBand = FLICKER_BAND_S) -> Powers:
+    """The whole record's spectrum from its cell means, (n,) [rate]. Raises `UnfitRecording` and `BadParameter`."""
+    _check_rate("cell_s", cell_s)
+    y = _checked(cells, 0)
+    n = len(y)
+    if n < FEWEST_SAMPLES:
+        raise UnfitRecording(f"{n} cell means are too few for noise coefficients; it takes {FEWEST_SAMPLES}")
+    if np.all(y == y[0]):
+        raise UnfitRecording(f"the channel is constant ({y[0]!r}): a stuck channel has no noise to analyse")
+    coefficients = _cosines(y - np.mean(y))
+    expected = columns.cosine_powers(columns.covariances(n, cell_s, flicker_band_s))
+    expected[columns.QUANTIZATION] = columns.free_ended_quantization(n, cell_s)
+    ends = np.zeros((2, n))
+    ends[0, 0] = ends[1, -1] = 1.0
+    time = (np.arange(n) - 0.5 * (n - 1)) * cell_s
+    regressors = np.stack([_cosines(time), _cosines(ends[0]), _cosines(ends[1])])
+    bins = _Bins.over(np.arange(1, n), SINGLE_MODES, BINS)
+    pairs = regressors[:, None, :] * regressors[None, :, :]
+    return Powers(
+        frequency_hz=bins.mean(np.arange(1, n) / (2.0 * n * cell_s)),
+        power=bins.mean(coefficients**2),
+        dof=bins.count,
+        columns=bins.mean(expected).T,
+        products=bins.sum(coefficients * regressors).T,
+        gram=np.ascontiguousarray(np.moveaxis(bins.sum(pairs), -1, 0)),
+        period_s=cell_s,
+    )
+
+
+def _cosines(values: NDArray[np.floating]) -> Array:
+    """Modes 1…n−1 of the orthonormal DCT-II of (n,)."""
+    return np.asarray(fft.dct(values, norm="ortho"), dtype=np.float64)[1:]
+
+
+class FastPowers:
+    """Mean spectrum of a channel's segments at its full rate, from blocks; memory of a few segments.
+
+    A segment is the power of two of samples that has at least four modes below `crossover_hz`. Its edges, an eighth
+    each, are tapered by a quarter of a sine and shared with its neighbours; what is left at the end of the record is
+    not used. Samples are rates. Raises `UnfitRecording` (NaN) and `BadParameter`.
+    """
+
+    def __init__(
+        self, rate_hz: float, crossover_hz: float = CROSSOVER_HZ, *, flicker_band_s: FlickerBand = FLICKER_BAND_S
+    ) -> None:
+        _check_rate("rate_hz", rate_hz)
+        if not 0.0 < crossover_hz < 0.25 * rate_hz:
+            raise BadParameter(
+                "crossover_hz", crossover_hz, f"0 < crossover < {0.25 * rate_hz:g} Hz, half of Nyquist's"
+            )
+        self._rate_hz, self._crossover_hz, self._band_s = rate_hz, crossover_hz, flicker_band_s
+        self._length = 1 << ceil(log2(_MODES_AT_CROSSOVER * rate_hz / crossover_hz))
+        self._edge = self._length // _EDGE
+        self._taper = columns.sine_edged_taper(self._length, self._edge)
+        self._taper /= sqrt(float(np.sum(self._taper**2)))
+        self._weights = self._taper / float(np.sum(self._taper))
+        self._segment = np.empty(self._length)
+        self._filled, self._count = 0, 0
+        self._sum = np.zeros(self._length // 2 + 1)
+        # Kept from segment to segment: fresh memory would cost more time than the transform.
+        self._tapered, self._square = np.empty(self._length), np.empty(len(self._sum))
+        self._modes = np.empty(len(self._sum), dtype=np.complex128)
+        self.segments = 0
+        """Segments taken so far; `finish` needs one."""
+
+    def add(self, block: Array | NDArray[np.int32]) -> None:
+        """The next samples of the channel, (n,) [rate]."""
+        y = _checked(block, self._count)
+        self._count += len(y)
+        done = 0
+        while done < len(y):
+            step = min(len(y) - done, self._length - self._filled)
+            self._segment[self._filled : self._filled + step] = y[done : done + step]
+            self._filled += step
+            done += step
+            if self._filled == self._length:
+                self._take()
+
+    def _take(self) -> None:
+        np.multiply(self._weights, self._segment, out=self._tapered)  # not np.dot: BLAS would wake its threads
+        np.subtract(self._segment, np.sum(self._tapered), out=self._tapered)
+        self._tapered *= self._taper
+        np.fft.rfft(self._tapered, out=self._modes)
+        for part in (self._modes.real, self._modes.imag):
+            np.square(part, out=self._square)
+            self._sum += self._square
+        self.segments += 1
+        self._filled = self._edge
+        self._segment[: self._edge] = self._segment[-self._edge :].copy()
+
+    def finish(self) -> Powers:
+        """The spectrum from the crossover up, less its lines. Raises `UnfitRecording` where no segment was whole."""
+        if self.segments == 0:
+            raise UnfitRecording(f"{self._count} samples are less than one segment of {self._length}")
+        length, hop = self._length, self._length - self._edge
+        power = self._sum[:-1] / self.segments
+        # The squared tapers of all segments add to 1 over the record but at its ends: (∫W)²/∫W² of white noise.
+        whole = self.segments * hop
+        dof = 2.0 * whole**2 / (whole - 0.25 * self._edge) / length
+        is_line, lines = find_lines(power, dof, length, self._rate_hz)
+        mode = np.arange(len(power))
+        kept = ~is_line & (mode * self._rate_hz / length >= self._crossover_hz)
+        if not np.any(kept):
+            raise UnfitRecording("the full-rate spectrum consists of lines alone")
+        expected = columns.tapered_powers(columns.covariances(length, 1.0 / self._rate_hz, self._band_s), self._taper)[
+            :, :-1
+        ]
+        bins = _Bins.over(mode[kept], 0, BINS)
+        zeros = np.zeros((len(bins.count), 3, 3))
+        return Powers(
+            frequency_hz=bins.mean(mode[kept] * self._rate_hz / length),
+            power=bins.mean(power[kept]),
+            dof=dof * bins.count,
+            columns=bins.mean(expected[:, kept]).T,
+            products=zeros[:, 0],
+            gram=zeros,
+            period_s=1.0 / self._rate_hz,
+            lines=lines,
+        )
+
+
+@dataclass(frozen=True)
+class _Bins:
+    """Consecutive modes put together: where each bin begins, and how many modes it has, (b,)."""
+
+    starts: NDArray[np.int64]
+    count: Array
+
+    @classmethod
+    def over(cls, modes: NDArray[np.int64], single: int, bins: int) -> "_Bins":
+        """Of ascending mode numbers (m,): the first `single` alone, the rest in at most `bins` even ratios."""
+        single = min(single, len(modes) - 1)
+        edges = np.geomspace(modes[single], modes[-1] + 1, bins + 1)
+        starts = np.concatenate([np.arange(single), np.searchsorted(modes, edges[:-1])])
+        starts = np.unique(starts[starts < len(modes)]).astype(np.int64)
+        return cls(starts, np.diff(np.append(starts, len(modes))).astype(np.float64))
+
+    def sum(self, values: Array) -> Array:
+        """Sums over each bin of (…, m): (…, b)."""
+        return np.asarray(np.add.reduceat(values, self.starts, axis=-1))
+
+    def mean(self, values: Array) -> Array:
+        """Means over each bin of (…, m): (…, b)."""
+        return self.sum(values) / self.count
+
+
+def _check_rate(field: str, value: float) -> None:
+    if not 0.0 < value < float("inf"):
+        raise BadParameter(field, value, "finite and positive")
+
+
+def _checked(values: Array | NDArray[np.int32], before: int) -> Array:
+    """As floats, (n,). Raises where a sample is no measurement."""
+    if values.ndim != 1:
+        raise BadParameter("samples", values.shape, "one channel, (n,)")
+    y = np.asarray(values, dtype=np.float64)
+    if not np.isfinite(np.sum(y)) and not np.all(np.isfinite(y)):
+        first = int(np.argmin(np.isfinite(y)))
+        raise UnfitRecording(f"sample {before + first} is {y[first]}: cut the gap before noise coefficients are sought")
+    return y

@@ -1,0 +1,194 @@
+"""Restricted likelihood of a binned spectrum whose modes are normal, independent, and linear in variances.
+
+Modes c of bin b: ``c ~ N(x'β, S_b)``, ``S = A·v``, v ≥ 0 the variances (squares of coefficients), β the regressors'
+free amplitudes. With M = ΣG_b/S_b, G the bins' Gram matrices, β = M⁻¹Σ(x'c)_b/S_b, E_b = Σ(c − x'β)², the restricted
+log likelihood is ``−½(Σν ln S + ln det M + ΣE/S)`` (Patterson and Thompson, Biometrika 58 (1971) 545). Its gradient
+vanishes where v is the least squares solution of ``E_b/ν'_b = (A v)_b`` with weights ``ν'_b/(2S_b²)``, ν' = ν less the
+leverage of β: Fisher scoring, each step a non-negative least squares. Knows no processes.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, nnls
+
+from procedures.core.arrays import Array
+
+_STEPS = 200
+_TOLERANCE = 1e-6
+"""A step that promises less log likelihood, ½δ'Fδ, ends the search."""
+_SMOOTHED = 9
+"""Bins over which the first guess of S is taken."""
+_WIDENINGS = 60
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Bins to fit: sums of squares (b,), degrees of freedom (b,), columns (b, p), products (b, r), Gram (b, r, r)."""
+
+    squares: Array
+    dof: Array
+    columns: Array
+    products: Array
+    gram: Array
+
+    def only(self, regressors: Sequence[int]) -> "Spectrum":
+        """With some of the regressors."""
+        keep = list(regressors)
+        gram = self.gram[:, keep][:, :, keep]
+        return Spectrum(self.squares, self.dof, self.columns, self.products[:, keep], gram)
+
+
+@dataclass(frozen=True)
+class State:
+    """All that follows from one v."""
+
+    variances: Array
+    """v, (p,)."""
+    power: Array
+    """S, (b,)."""
+    residual: Array
+    """E/ν', (b,)."""
+    dof: Array
+    """ν', (b,)."""
+    amplitudes: Array
+    """β, (r,)."""
+    amplitude_covariance: Array
+    """M⁻¹, (r, r)."""
+    log_likelihood: float
+    """Restricted; comparable between fits with the same regressors."""
+    plain_log_likelihood: float
+    """Without ln det M; comparable between any."""
+
+
+def state(spectrum: Spectrum, variances: Array) -> State:
+    """The state at v."""
+    s = spectrum
+    power = s.columns @ variances
+    if not np.all(power > 0.0):
+        return _impossible(s, variances)
+    flat = s.gram.reshape(len(power), -1)
+    weights = 1.0 / power
+    inverse = np.asarray(np.linalg.inv((weights @ flat).reshape(s.gram.shape[1:])), dtype=np.float64)
+    beta = inverse @ (weights @ s.products)
+    explained = 2.0 * s.products @ beta - flat @ np.outer(beta, beta).ravel()
+    squares = np.maximum(s.squares - explained, 0.0)
+    dof = np.maximum(s.dof - weights * (flat @ inverse.ravel()), 1e-6 * s.dof)
+    plain = -0.5 * float(np.dot(s.dof, np.log(power)) + np.dot(squares, weights))
+    restricted = plain + 0.5 * float(np.log(np.linalg.det(inverse)))
+    return State(variances, power, squares / dof, dof, beta, inverse, restricted, plain)
+
+
+def _impossible(spectrum: Spectrum, variances: Array) -> State:
+    """Where the model has no power at all, and the record has."""
+    amplitudes = spectrum.products.shape[1]
+    nothing = np.zeros_like(spectrum.dof)
+    flat, covariance = np.zeros(amplitudes), np.zeros((amplitudes, amplitudes))
+    return State(variances, nothing, nothing, spectrum.dof, flat, covariance, -np.inf, -np.inf)
+
+
+def information(spectrum: Spectrum, at: State) -> Array:
+    """Fisher information of v, ``½ Σν' A_k A_l/S²``, (p, p)."""
+    scaled = spectrum.columns / at.power[:, None]
+    return 0.5 * (scaled.T * at.dof) @ scaled
+
+
+def maximum(
+    spectrum: Spectrum, free: Sequence[int], held: tuple[int, float] | None = None, start: Array | None = None
+) -> State:
+    """The greatest restricted likelihood over the `free` variances; one may be `held` at a value, the others are 0."""
+    free = [k for k in free if held is None or k != held[0]]
+    fixed = np.zeros(spectrum.columns.shape[1])
+    if held is not None:
+        fixed[held[0]] = held[1]
+    if not free:
+        return state(spectrum, fixed)
+    if start is None:
+        guess = _step(spectrum, free, fixed, spectrum.squares / spectrum.dof, spectrum.dof, _smooth(spectrum))
+    else:
+        guess = fixed.copy()
+        guess[free] = start[free]
+    if not np.any(guess > 0.0):
+        guess[free] = float(np.sum(spectrum.squares)) / np.sum(
+            spectrum.dof[:, None] * spectrum.columns[:, free], axis=0
+        )
+    best = state(spectrum, guess)
+    for _ in range(_STEPS):
+        target = _step(spectrum, free, fixed, best.residual, best.dof, best.power)
+        if not np.any(target > 0.0):
+            break
+        change = spectrum.columns @ (target - best.variances) / best.power
+        if 0.25 * float(np.dot(best.dof, change**2)) < _TOLERANCE:
+            break
+        tried = _climb(spectrum, best, target)
+        if tried is best:
+            break
+        best = tried
+    return best
+
+
+def _smooth(spectrum: Spectrum) -> Array:
+    kernel = np.ones(min(_SMOOTHED, len(spectrum.dof)))
+    return np.convolve(spectrum.squares, kernel, "same") / np.convolve(spectrum.dof, kernel, "same")
+
+
+def _step(spectrum: Spectrum, free: list[int], fixed: Array, target: Array, dof: Array, power: Array) -> Array:
+    """The weighted non-negative least squares step: all variances, (p,)."""
+    weight = np.sqrt(dof) / power
+    scaled = spectrum.columns[:, free] * weight[:, None]
+    norm = np.sqrt(np.sum(scaled**2, axis=0))
+    solution = nnls(scaled / norm, (target - spectrum.columns @ fixed) * weight)[0]
+    result = fixed.copy()
+    result[free] = solution / norm
+    return result
+
+
+def _climb(spectrum: Spectrum, best: State, target: Array) -> State:
+    """From `best` towards `target`, as far as the likelihood grows."""
+    part = 1.0
+    while part > 1e-4:
+        tried = state(spectrum, best.variances + part * (target - best.variances))
+        if tried.log_likelihood > best.log_likelihood:
+            return tried
+        part *= 0.5
+    return best
+
+
+@dataclass
+class Profile:
+    """Twice the log likelihood lost where variance k is held, the other `free` ones at their best."""
+
+    spectrum: Spectrum
+    free: tuple[int, ...]
+    k: int
+    best: State
+
+    def loss(self, variance: float) -> float:
+        """At one value of the variance k."""
+        held = maximum(self.spectrum, self.free, (self.k, variance), self.best.variances)
+        return 2.0 * (self.best.log_likelihood - held.log_likelihood)
+
+    def crossing(self, loss: float, *, upwards: bool, scale: float) -> float:
+        """The variance where so much is lost, above or below the best one; below, 0 where less is lost at 0.
+
+        `scale` is the variance's standard uncertainty, the first step of the search. Infinite where nothing is lost.
+        """
+        centre = float(self.best.variances[self.k])
+        if not upwards and (centre <= 0.0 or self.loss(0.0) <= loss):
+            return 0.0
+        near, step = centre, float(scale * np.sqrt(loss))
+        for _ in range(_WIDENINGS):
+            far = near + step if upwards else near * near / (near + step)
+            if self.loss(far) > loss:
+                low, high = min(near, far), max(near, far)
+                return float(brentq(lambda v: self.loss(float(v)) - loss, low, high, rtol=1e-4, xtol=1e-4 * high))
+            near, step = far, 2.0 * step
+        return float("inf") if upwards else 0.0
+
+
+def only_where(mask: NDArray[np.bool_], spectrum: Spectrum) -> Spectrum:
+    """Some of the bins."""
+    s = spectrum
+    return Spectrum(s.squares[mask], s.dof[mask], s.columns[mask], s.products[mask], s.gram[mask])

@@ -1,0 +1,147 @@
+"""Static launches: the unit at rest, hours at a time, switched off in between (thesis 3.1, 4.1.1).
+
+From raw counts to noise coefficients three ways with uncertainties, the averaging time that calibration needs, warm-up
+and self-heating; launches side by side as the thesis's Tables 4.1 and 4.2.
+"""
+
+from collections.abc import AsyncIterator, Sequence
+from dataclasses import replace
+from math import ceil
+
+from pydantic import Field
+
+from procedures import steps
+from procedures.analysis.launch.prediction import predicted_noise, unresolved_noise
+from procedures.analysis.station_plan import windows
+from procedures.bench import Bench
+from procedures.bench.imu import Stream
+from procedures.core.limits import verdict
+from procedures.core.recording import TRIADS, Recording, Station
+from procedures.core.report import Report
+from procedures.core.table_angles import TableAngles
+from procedures.core.unit import TriadRecord, Unit
+from procedures.launches import (
+    NoiseParameters,
+    NoiseResult,
+    analyse_launches,
+    longest_averaging_time,
+    noise_checks,
+    noise_report,
+    summary_of,
+)
+from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
+
+DWELL_STEP_S = 5.0
+"""The averaging time is rounded up to whole steps of this (thesis 4.1.3: 55 and 65 s gave 70 s)."""
+
+
+class Params(NoiseParameters):
+    """How many launches, how long, and how to analyse them."""
+
+    launches: int = Field(4, ge=1, le=100)
+    duration_s: float = Field(21_600.0, ge=600.0, le=1_209_600.0, description="of each launch")
+    off_time_s: float = Field(
+        3600.0, ge=1.0, le=604_800.0, description="switched off before each launch, the first too; the thesis: 1 h"
+    )
+    settle_s: float = Field(0.0, ge=0.0, le=86_400.0, description="from switching on to the first sample")
+    outer_deg: float = Field(0.0, ge=-360.0, le=360.0)
+    middle_deg: float = Field(0.0, ge=-360.0, le=360.0)
+    inner_deg: float = Field(0.0, ge=-360.0, le=360.0)
+
+
+class Result(NoiseResult):
+    """Noise of the unit, launch by launch and together."""
+
+
+def resolve(params: Params, context: Context) -> Params:
+    """Nothing depends on unit or bench."""
+    return params
+
+
+def schedule(params: Params) -> tuple[Station, ...]:
+    """One station a launch."""
+    angles = TableAngles(params.outer_deg, params.middle_deg, params.inner_deg)
+    return tuple(
+        Station(i, f"launch {i + 1}", angles, None, params.settle_s, params.duration_s, power_off_s=params.off_time_s)
+        for i in range(params.launches)
+    )
+
+
+def predict(params: Params, context: Context) -> Prediction:
+    """Duration, and how well each coefficient that is expected will be known after all launches."""
+    stations = schedule(params)
+    duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1])
+    found: list[PredictedUncertainty] = []
+    warnings: list[str] = []
+    for triad, names in TRIADS.items():
+        record = context.unit.triad(triad)
+        if record is None:
+            warnings.append(f"nothing is known of the {triad} triad's noise: no uncertainty can be predicted")
+            continue
+        for name, noise in zip(names, record.noise, strict=True):
+            found += [
+                PredictedUncertainty(f"{name}.{p.process}", p.unit, p.standard_uncertainty, p.standard_uncertainty)
+                for p in predicted_noise(name, noise, params.duration_s, params.launches)
+            ]
+            warnings += unresolved_noise(name, noise, params.duration_s)
+    basis = f"the unit's noise as declared or last found ({_origins(context.unit)})" if found else ""
+    return Prediction(duration_s, tuple(found), tuple(warnings), basis)
+
+
+async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
+    """Off, on, turn to the orientation, record; launch after launch."""
+    for station in stations:
+        yield await steps.record_station(bench, station)
+
+
+def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
+    """Each launch on its own, then all of them together."""
+    launches = analyse_launches(recordings, params)
+    channels = summary_of(launches)
+    checks = noise_checks(channels, params.noise_limits)
+    return Result(
+        checks=checks,
+        verdict=verdict(checks),
+        launches=launches,
+        channels=channels,
+        averaging_time_s=longest_averaging_time(channels),
+    )
+
+
+def report(result: Result) -> Report:
+    """Tables 4.1 and 4.2 of the thesis, and the plots behind them."""
+    return noise_report(result)
+
+
+def learns(result: Result, unit: Unit, origin: str) -> Unit:
+    """The unit with the noise and the averaging time that were found: what later previews and dwells rest on."""
+    noise = {s.channel: s.noise for s in result.channels}
+    records: dict[str, TriadRecord | None] = {"gyro": unit.gyro, "accelerometer": unit.accelerometer}
+    for triad, (x, y, z) in TRIADS.items():
+        if all(name in noise for name in (x, y, z)):
+            old = records[triad] or TriadRecord((noise[x], noise[y], noise[z]))
+            records[triad] = replace(old, noise=(noise[x], noise[y], noise[z]), noise_origin=origin)
+    dwell = unit.averaging_time_s
+    if result.averaging_time_s is not None:
+        dwell = DWELL_STEP_S * ceil(result.averaging_time_s / DWELL_STEP_S)
+    return replace(unit, gyro=records["gyro"], accelerometer=records["accelerometer"], averaging_time_s=dwell)
+
+
+def _origins(unit: Unit) -> str:
+    return ", ".join(dict.fromkeys(r.noise_origin for r in (unit.gyro, unit.accelerometer) if r is not None))
+
+
+PROCEDURE = Procedure(
+    "static_run",
+    "Static launches",
+    "1.0.0",
+    Params,
+    Result,
+    resolve,
+    schedule,
+    predict,
+    acquire,
+    analyse,
+    report,
+    learns=learns,
+)

@@ -1,0 +1,156 @@
+"""Recordings at rest, one a launch: parameters, result and report that `static_run` and `noise_analysis` share.
+
+Knows how the answers are asked for and shown; the numerics are in `procedures.analysis.launch`.
+"""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from pydantic import Field
+
+from procedures.analysis.launch import report as pictures
+from procedures.analysis.launch.analysis import analyse_launch
+from procedures.analysis.launch.results import LaunchNoise
+from procedures.analysis.launch.settings import LaunchSettings
+from procedures.analysis.launch.summary import ChannelSummary, summarise
+from procedures.core import units
+from procedures.core.errors import UnfitRecording
+from procedures.core.limits import Check, Limit, check
+from procedures.core.recording import Recording
+from procedures.core.report import Report
+from procedures.procedure import Outcome, Parameters
+
+Part = Literal["gyros", "accelerometers", "all", "none"]
+
+
+class NoiseLimits(Parameters):
+    """Requirements on the noise of a unit (thesis 4.3, 5.6)."""
+
+    gyro_random_walk_deg_sqrt_h: float = Field(0.003, gt=0.0, le=1e6)
+    gyro_bias_in_run_deg_h: float = Field(0.015, gt=0.0, le=1e6, description="bias instability")
+    accelerometer_bias_in_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0, description="bias instability")
+
+
+class NoiseParameters(Parameters):
+    """Steps of the analysis, each can be switched; what it changes is in the result's table of steps."""
+
+    cell_s: float = Field(1.0, gt=0.0, le=3600.0, description="cell whose means the slow part works on")
+    full_rate: bool = Field(True, description="also use what is faster than a cell, where the noise model describes it")
+    trim: Part = Field("gyros", description="leave out the warm-up that is found at the start of a launch")
+    trim_s: float | None = Field(
+        None, ge=0.0, le=1e7, description="instead of what is found: leave out so long since the launch"
+    )
+    self_heating: Part = Field("accelerometers", description="fit two exponentials and subtract them (thesis 3.1.3)")
+    wavelet: Literal["thesis", "rescaled", "none"] = Field(
+        "rescaled",
+        description="threshold rule of the split into quantization and the rest: thesis takes unit noise variance, "
+        "rescaled estimates it level by level",
+    )
+    wavelet_levels: int = Field(6, ge=1, le=20, description="2^levels cells is the longest scale that is split")
+    confidence: float = Field(0.95, gt=0.5, lt=1.0, description="of the intervals")
+    level: float = Field(0.01, gt=0.0, le=0.2, description="chance that an absent process is reported present")
+    points_per_decade: int = Field(10, ge=3, le=100, description="of the deviation curves")
+    noise_limits: NoiseLimits = Field(default_factory=lambda: NoiseLimits.model_validate({}))
+
+    def settings(self) -> LaunchSettings:
+        """The same for the numerics."""
+        return LaunchSettings(
+            cell_s=self.cell_s,
+            fast=self.full_rate,
+            trim_gyros=self.trim in ("gyros", "all"),
+            trim_accelerometers=self.trim in ("accelerometers", "all"),
+            trim_s=self.trim_s,
+            heating_gyros=self.self_heating in ("gyros", "all"),
+            heating_accelerometers=self.self_heating in ("accelerometers", "all"),
+            wavelet_rule=None if self.wavelet == "none" else self.wavelet,
+            wavelet_levels=self.wavelet_levels,
+            confidence=self.confidence,
+            level=self.level,
+            points_per_decade=self.points_per_decade,
+        )
+
+
+class NoiseResult(Outcome):
+    """Every launch with its channels, and what they say together."""
+
+    launches: tuple[LaunchNoise, ...]
+    channels: tuple[ChannelSummary, ...]
+    averaging_time_s: float | None
+    """The longest of the channels': the dwell that a calibration needs. None: quantization rules nowhere."""
+
+
+def analyse_launches(recordings: Sequence[Recording], params: NoiseParameters) -> tuple[LaunchNoise, ...]:
+    """Each recording as a launch of its own, block by block. Raises `UnfitRecording`, `MissingChannel`."""
+    if not recordings:
+        raise UnfitRecording("there is no recording to analyse")
+    settings = params.settings()
+    return tuple(
+        analyse_launch(recording, _label(recording, i), settings) for i, recording in enumerate(recordings, start=1)
+    )
+
+
+def noise_checks(channels: Sequence[ChannelSummary], limits: NoiseLimits) -> tuple[Check, ...]:
+    """Random walk of gyros and bias instability of both triads against their limits."""
+    found: list[Check] = []
+    for s in channels:
+        if s.rate_unit == "rad/s":
+            deg_sqrt_h, deg_h = ("deg/√h", units.DEG_PER_SQRT_HOUR), ("deg/h", units.DEG_PER_HOUR)
+            found.append(_check(s, "random_walk", limits.gyro_random_walk_deg_sqrt_h, *deg_sqrt_h))
+            found.append(_check(s, "bias_instability", limits.gyro_bias_in_run_deg_h, *deg_h))
+        elif s.rate_unit == "m/s^2":
+            found.append(_check(s, "bias_instability", limits.accelerometer_bias_in_run_m_s2, "m/s^2", 1.0))
+    return tuple(found)
+
+
+def noise_report(result: NoiseResult) -> Report:
+    """Tables 4.1 and 4.2, the three ways, every step's effect, and the plots of every channel."""
+    launches, channels = result.launches, result.channels
+    doubts = pictures.disagreements(launches)
+    tables = [
+        pictures.side_by_side(channels, launches),
+        *((doubts,) if doubts else ()),
+        pictures.averaging_table(channels, launches),
+        pictures.steps_table(launches),
+        pictures.launch_means_table(channels, launches),
+        *(pictures.three_ways(launch) for launch in launches),
+    ]
+    figures = [figure for s in channels for figure in pictures.channel_figures(s.channel, launches)]
+    return Report(_summary(result), (*tables, *figures))
+
+
+def longest_averaging_time(channels: Sequence[ChannelSummary]) -> float | None:
+    """The longest averaging time of any channel."""
+    return max((s.averaging_time_s for s in channels if s.averaging_time_s is not None), default=None)
+
+
+def summary_of(launches: Sequence[LaunchNoise]) -> tuple[ChannelSummary, ...]:
+    """What the launches say together, channel by channel. Raises `UnfitRecording` where their channels differ."""
+    names = {tuple((c.channel, c.rate_unit) for c in launch.channels) for launch in launches}
+    if len(names) > 1:
+        raise UnfitRecording("the recordings have different channels: analyse them one by one")
+    return summarise(launches)
+
+
+def _label(recording: Recording, number: int) -> str:
+    return recording.info.station.label if recording.info.station else f"recording {number}"
+
+
+def _check(s: ChannelSummary, process: str, maximum: float, unit: str, size: float) -> Check:
+    """The mean over the launches; of a process that no launch shows, the least that it is known to stay below."""
+    found = s.mean(process)
+    name = f"{s.channel} {process.replace('_', ' ')}"
+    limit = Limit(unit, maximum=maximum, source="thesis 4.3, 5.6")
+    if found.mean is not None:
+        return check(name, found.mean / size, limit, None if found.sd is None else found.sd / size)
+    bound = min((r.upper_limit for r in found.values if r.upper_limit is not None), default=float("inf"))
+    return check(name, bound / size, limit, note="not observed: the value is what it stays below")
+
+
+def _summary(result: NoiseResult) -> str:
+    hours = sum(launch.duration_s for launch in result.launches) / units.HOUR
+    dwell = (
+        "Quantization rules at no averaging time."
+        if result.averaging_time_s is None
+        else f"Quantization falls below the rest of the noise after {result.averaging_time_s:.0f} s at the latest."
+    )
+    return f"{len(result.launches)} launches at rest, {hours:.3g} h in all. {dwell}"
