@@ -4,7 +4,7 @@ Knows how the answers are asked for and shown; the numerics are in `procedures.a
 """
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, TypeVar
 
 from pydantic import Field
 
@@ -15,7 +15,7 @@ from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.summary import ChannelSummary, summarise
 from procedures.core import units
 from procedures.core.errors import UnfitRecording
-from procedures.core.limits import Check, Limit, check
+from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording
 from procedures.core.report import Report
 from procedures.procedure import Outcome, Parameters
@@ -79,27 +79,27 @@ class NoiseResult(Outcome):
     """The longest of the channels': the dwell that a calibration needs. None: quantization rules nowhere."""
 
 
-def analyse_launches(recordings: Sequence[Recording], params: NoiseParameters) -> tuple[LaunchNoise, ...]:
-    """Each recording as a launch of its own, block by block. Raises `UnfitRecording`, `MissingChannel`."""
+R = TypeVar("R", bound=NoiseResult)
+
+
+def analyse_launches(result: type[R], recordings: Sequence[Recording], params: NoiseParameters) -> R:
+    """Each recording as a launch of its own, block by block, then all of them together, judged.
+
+    Raises `UnfitRecording`, `MissingChannel`, `BadParameter`.
+    """
     if not recordings:
         raise UnfitRecording("there is no recording to analyse")
     settings = params.settings()
-    return tuple(
-        analyse_launch(recording, _label(recording, i), settings) for i, recording in enumerate(recordings, start=1)
+    launches = tuple(analyse_launch(r, _label(r, i), settings) for i, r in enumerate(recordings, start=1))
+    names = {tuple((c.channel, c.rate_unit) for c in launch.channels) for launch in launches}
+    if len(names) > 1:
+        raise UnfitRecording("the recordings have different channels: analyse them one by one")
+    channels = summarise(launches)
+    checks = _checks(channels, params.noise_limits)
+    longest = max((s.averaging_time_s for s in channels if s.averaging_time_s is not None), default=None)
+    return result(
+        checks=checks, verdict=verdict(checks), launches=launches, channels=channels, averaging_time_s=longest
     )
-
-
-def noise_checks(channels: Sequence[ChannelSummary], limits: NoiseLimits) -> tuple[Check, ...]:
-    """Random walk of gyros and bias instability of both triads against their limits."""
-    found: list[Check] = []
-    for s in channels:
-        if s.rate_unit == "rad/s":
-            deg_sqrt_h, deg_h = ("deg/√h", units.DEG_PER_SQRT_HOUR), ("deg/h", units.DEG_PER_HOUR)
-            found.append(_check(s, "random_walk", limits.gyro_random_walk_deg_sqrt_h, *deg_sqrt_h))
-            found.append(_check(s, "bias_instability", limits.gyro_bias_in_run_deg_h, *deg_h))
-        elif s.rate_unit == "m/s^2":
-            found.append(_check(s, "bias_instability", limits.accelerometer_bias_in_run_m_s2, "m/s^2", 1.0))
-    return tuple(found)
 
 
 def noise_report(result: NoiseResult) -> Report:
@@ -118,17 +118,20 @@ def noise_report(result: NoiseResult) -> Report:
     return Report(_summary(result), (*tables, *figures))
 
 
-def longest_averaging_time(channels: Sequence[ChannelSummary]) -> float | None:
-    """The longest averaging time of any channel."""
-    return max((s.averaging_time_s for s in channels if s.averaging_time_s is not None), default=None)
-
-
-def summary_of(launches: Sequence[LaunchNoise]) -> tuple[ChannelSummary, ...]:
-    """What the launches say together, channel by channel. Raises `UnfitRecording` where their channels differ."""
-    names = {tuple((c.channel, c.rate_unit) for c in launch.channels) for launch in launches}
-    if len(names) > 1:
-        raise UnfitRecording("the recordings have different channels: analyse them one by one")
-    return summarise(launches)
+def _checks(channels: Sequence[ChannelSummary], limits: NoiseLimits) -> tuple[Check, ...]:
+    """Random walk of gyros and bias instability of both triads; of channels in counts only that there is a noise."""
+    found: list[Check] = []
+    for s in channels:
+        if s.rate_unit == "rad/s":
+            deg_sqrt_h, deg_h = ("deg/√h", units.DEG_PER_SQRT_HOUR), ("deg/h", units.DEG_PER_HOUR)
+            found.append(_check(s, "random_walk", limits.gyro_random_walk_deg_sqrt_h, *deg_sqrt_h))
+            found.append(_check(s, "bias_instability", limits.gyro_bias_in_run_deg_h, *deg_h))
+        elif s.rate_unit == "m/s^2":
+            found.append(_check(s, "bias_instability", limits.accelerometer_bias_in_run_m_s2, "m/s^2", 1.0))
+    if not found:
+        seen = float(sum(m.mean is not None for s in channels for m in s.means))
+        found.append(check("noise processes observed", seen, Limit("1", minimum=1.0, source="every record has some")))
+    return tuple(found)
 
 
 def _label(recording: Recording, number: int) -> str:

@@ -15,20 +15,11 @@ from procedures.analysis.launch.prediction import predicted_noise, unresolved_no
 from procedures.analysis.station_plan import windows
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
-from procedures.core.limits import verdict
 from procedures.core.recording import TRIADS, Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
-from procedures.launches import (
-    NoiseParameters,
-    NoiseResult,
-    analyse_launches,
-    longest_averaging_time,
-    noise_checks,
-    noise_report,
-    summary_of,
-)
+from procedures.launches import NoiseParameters, NoiseResult, analyse_launches, noise_report
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 
 DWELL_STEP_S = 5.0
@@ -96,16 +87,7 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
     """Each launch on its own, then all of them together."""
-    launches = analyse_launches(recordings, params)
-    channels = summary_of(launches)
-    checks = noise_checks(channels, params.noise_limits)
-    return Result(
-        checks=checks,
-        verdict=verdict(checks),
-        launches=launches,
-        channels=channels,
-        averaging_time_s=longest_averaging_time(channels),
-    )
+    return analyse_launches(Result, recordings, params)
 
 
 def report(result: Result) -> Report:

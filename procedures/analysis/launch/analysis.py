@@ -24,8 +24,11 @@ from procedures.core.recording import Quantity, RawArray, Recording
 
 FEWEST_CELLS = 120
 """Fewer cells are no launch to analyse."""
-CROSSOVER = 0.25
-"""Of a cell's frequency: above it the spectrum is taken from every sample."""
+CROSSOVER = 0.03
+"""Of a cell's frequency: above it the spectrum is taken from every sample, below it from the cells, whose means fold
+the reading noise of all higher frequencies into theirs."""
+SLOW_MODES = 64
+"""So many modes of the spectrum at least are taken from the cells."""
 FEWEST_A_CELL = 8
 """With fewer samples a cell nothing is gained by looking faster."""
 
@@ -110,7 +113,7 @@ def _second_pass(
     """Deviations at short times and powers at high frequencies, from every sample. Raises `Uncorrelatable`."""
     info = recording.info
     samples = cell_samples(info.rate_hz, settings.cell_s)
-    crossover_hz = CROSSOVER * info.rate_hz / samples
+    crossover_hz = max(CROSSOVER * info.rate_hz / samples, SLOW_MODES * 0.5 / info.duration_s)
     sizes: Sizes = decade_sizes(samples, 1.0 / settings.points_per_decade)
     streams = [
         _Streams(

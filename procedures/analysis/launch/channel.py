@@ -51,7 +51,8 @@ def channel_noise(
     slow = _deviation(series, cell_s, settings)
     whole = slow if fast is None else joined(fast, slow)
     graphical = read_off(whole)
-    least_squares = fit_allan(whole)
+    # from one cell on: what the notch filter leaves of the dither stands above the model at shorter times
+    least_squares = fit_allan(whole, from_s=cell_s, level=settings.level, confidence=settings.confidence)
     likelihood = fit_noise(slow_powers(series, cell_s), powers, level=settings.level, confidence=settings.confidence)
     stages = [*_stages(signal, cell_s, settings), *_split(series, cell_s, rate_unit, settings)]
     last = len(signal.steps) - 1

@@ -5,20 +5,17 @@ exactly, a flicker noise and a quantization noise nearly: their coefficients are
 likelihood of a record is that of its coefficients' squares (Whittle's), with the *exact* variance of each, and
 dividing by its root whitens whatever curve is to be fitted. The mean (k = 0) says nothing about noise and is left out.
 
-With Δ the cell length and r_m the covariance of cells m apart, per unit coefficient (IEEE Std 952 C; `core.noise`):
-
-* quantization ``r_0 = 2/Δ²``, ``r_1 = −1/Δ²``; random walk ``r_0 = 1/Δ``;
-* bias instability, density 1/(πf): ``−(1/π)·δ²[½m² ln m]``, and rate random walk ``−Δ·δ²[m³/12]``, with δ² the
-  second difference over m: covariances up to a constant, which no cosine sees.
+What each process puts into a coefficient is `noise_fit.columns`'; the flicker noise is taken as 1/f throughout.
 """
 
 from dataclasses import dataclass
-from math import pi
+from math import inf
 
 import numpy as np
 from scipy.fft import dct
 from scipy.optimize import nnls
 
+from procedures.analysis.noise_fit.columns import cosine_powers, covariances
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.noise import NoiseCoefficients
@@ -27,6 +24,7 @@ MOST = 2048
 """A longer series is averaged in groups to at most so many cells."""
 FEWEST = 64
 """Fewer cells do not tell noise from transient."""
+WHOLE_BAND = (0.0, inf)
 _SINGLE, _PER_E_FOLD = 24, 8
 _TOLERANCE = 1e-6
 
@@ -73,31 +71,7 @@ def cosines(values: Array) -> Array:
 
 def unit_variances(n: int, cell_s: float) -> Array:
     """Variances of the cosine coefficients of n cells per unit Q², N², B² and K², (4, n−1)."""
-    m = np.arange(n + 1, dtype=np.float64)
-    quantization, white = np.zeros(n), np.zeros(n)
-    quantization[:2] = 2.0 / cell_s**2, -1.0 / cell_s**2
-    white[0] = 1.0 / cell_s
-    twice = 0.5 * m**2 * np.log(np.maximum(m, 1.0))
-    flicker = -(twice[1:] - 2.0 * twice[:-1] + np.concatenate([twice[1:2], twice[:-2]])) / pi
-    walk = -0.5 * cell_s * m[:-1]
-    walk[0] = -cell_s / 6.0
-    return np.array([_cosine_variances(r) for r in (quantization, white, flicker, walk)])
-
-
-def _cosine_variances(r: Array) -> Array:
-    """Diagonal of the Toeplitz matrix of r (n,) between cosines k = 1…n−1, by a product of cosines being a sum."""
-    n = len(r)
-    lags = np.arange(n)
-    differences = np.zeros(2 * n)
-    differences[:n] = (n - lags) * r
-    differences[n + 1 :] = differences[1:n][::-1]
-    along = np.empty(n)  # Σ r_{i−j} over i + j = L, for L < n: the lags of L's parity up to it, both signs
-    along[0::2] = 2.0 * np.cumsum(r[0::2]) - r[0]
-    along[1::2] = 2.0 * np.cumsum(r[1::2])
-    sums = np.zeros(2 * n)
-    sums[1 : n + 1] = along
-    sums[n + 1 :] = along[:-1][::-1]
-    return np.fft.rfft(differences + sums).real[1:n] / n
+    return cosine_powers(covariances(n, cell_s, WHOLE_BAND))
 
 
 @dataclass(frozen=True)
