@@ -7,14 +7,16 @@ Simulated
   errors, axis wobble; whole turns of one axis at a constant rate, while the unit is recorded.
 * A unit of three gyros and three accelerometers: biases, a full 3×3 matrix a triad, asymmetry and a quadratic term,
   run-to-run changes, start-up transient, self-heating, residue of the mechanical dither, angle random walk, bias
-  instability, rate random walk, ramp, and a dithered integer counter whose phase is carried from the moment of power-up.
+  instability, rate random walk, ramp, and a dithered integer counter whose phase is carried from the moment of
+  power-up.
 * A supply, and a clock: time passes only in ``clock.sleep`` and while a recording is read.
 
 Not simulated
 -------------
-Temperature, vibration, cogging, encoder steps, structural modes, supply noise, cross-axis acceleration terms, lever
-arms (the accelerometers stand where the three axes meet), latency and loss of data. Inertias are invented. The table
-is an ideal servo: how it settles says nothing of a real one.
+Temperature on the bench (the physics of a chamber and of the unit in it are in `chamber`, not wired to the world yet),
+vibration, cogging, encoder steps, structural modes, supply noise, cross-axis acceleration terms, lever arms (the
+accelerometers stand where the three axes meet), latency and loss of data. Inertias are invented. The table is an ideal
+servo: how it settles says nothing of a real one.
 
 How truthful
 ------------
@@ -24,5 +26,5 @@ geometry: both know only the conventions written in `procedures`, and a third wi
 in the tests. Every random number is keyed by (seed, launch, channel, process, block), so the same seed gives the same
 bytes in whatever pieces they are read, and after a resume from a checkpoint.
 
-Layers: ``world`` > ``turntable`` | ``imu`` | ``supply`` > ``clock`` | ``truth``. `simulators.world.build` is the door.
+Layers: ``world`` > ``turntable`` | ``imu`` | ``supply`` | ``chamber`` > ``clock`` | ``truth``. `simulators.world.build` is the door.
 """

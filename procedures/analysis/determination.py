@@ -21,7 +21,8 @@ def require_full_rank(what: str, design: Array, names: Sequence[str], tolerance:
     lengths = np.linalg.norm(design, axis=0)
     largest = float(lengths.max(initial=0.0))
     lengths = np.where(lengths > tolerance * largest, lengths, np.inf)
-    _, values, basis = np.linalg.svd(np.vstack([design / lengths, np.zeros((max(0, wanted - rows), wanted))]))
+    padded = np.vstack([design / lengths, np.zeros((max(0, wanted - rows), wanted))])
+    _, values, basis = np.linalg.svd(padded, full_matrices=False)
     condition = float(values[0] / max(values[-1], np.finfo(np.float64).eps * values[0], np.finfo(np.float64).tiny))
     rank = int(np.sum(values > tolerance * values[0]))
     if rank < wanted:

@@ -24,6 +24,7 @@ from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, Undetermined, UnfitRecording
 from procedures.core.imu_model import TriadCalibration, correct
 from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.recording import RecordingInfo
 from procedures.core.report import Report, Table
 from procedures.core.unit import Unit
 from procedures.procedure import Evidence, Method, Outcome, Parameters
@@ -80,7 +81,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
         raise UnfitRecording("there is no recording of a resting unit to align")
     calibrations, basis = _calibrations(evidence, unit)
     means = {triad: station_means(evidence.recordings, triad) for triad in TRIADS}
-    found = [_aligned(i, means, calibrations, params, unit) for i in range(len(evidence.recordings))]
+    found = [_aligned(i, r.info, means, calibrations, params, unit) for i, r in enumerate(evidence.recordings)]
     attitudes = tuple(_told(i, means, params, unit, a) for i, a in enumerate(found))
     checks = tuple(c for a in attitudes for c in _checks(a, params))
     known = unit is not None and all(unit.triad(triad) is not None for triad in TRIADS)
@@ -119,8 +120,14 @@ def _calibrations(evidence: Evidence, unit: Unit | None) -> tuple[dict[str, Tria
 
 
 def _aligned(
-    i: int, means: dict[str, StationMeans], calibrations: dict[str, TriadCalibration], params: Params, unit: Unit | None
+    i: int,
+    info: RecordingInfo,
+    means: dict[str, StationMeans],
+    calibrations: dict[str, TriadCalibration],
+    params: Params,
+    unit: Unit | None,
 ) -> InitialAttitude:
+    window = np.array([[info.since_launch_s, info.since_launch_s + info.duration_s]])
     vectors: list[Array] = []
     covariances: list[Array] = []
     for triad in TRIADS:
@@ -132,7 +139,7 @@ def _aligned(
         record = unit.triad(triad) if unit and mean.output_unit != "count" else None
         vector = correct(mean.outputs[i], calibration)
         errors = calibrated_triad(calibration, record, vector)
-        known = triad_covariance(record, mean.windows[i : i + 1])
+        known = triad_covariance(record, window)
         variance = mean.mean_sd[i] ** 2 if known is None else known[:, 0, 0]
         inverse = np.linalg.inv(calibration.matrix_array)
         vectors.append(vector)

@@ -33,8 +33,10 @@ OURS = (
     "calibration_12_orientations",
     "verification_9_orientations",
     "no_operation",
+    "initial_alignment",
     "scale_factor_whole_turns",
     "static_run",
+    "table_program",
 )
 
 

@@ -1,0 +1,71 @@
+"""Stage one: the signal converter alone, currents of a precision source on its inputs over temperature (T 3.8–3.17; C).
+
+``N± `` are the mean codes at ``±I``: zero ``ΔN = (N⁺ + N⁻)/2`` (3.10), centred code ``N_c = (N⁺ − N⁻)/2`` (3.11), scale
+``K = N_c/I`` (3.12), zero at the input ``ΔI = ΔN/K`` (3.13).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from procedures.analysis.thermal.normalised import Normalised, fit_normalised
+from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter, UnfitRecording
+
+
+@dataclass(frozen=True)
+class ZeroAndScale:
+    """T 3.10–3.13 at each soak, (n,) each."""
+
+    zero_code: Array
+    """ΔN."""
+    scale_code_per_ma: Array
+    """K."""
+    zero_ma: Array
+    """ΔI."""
+
+
+def zero_and_scale(current_ma: float, plus_code: Array, minus_code: Array) -> ZeroAndScale:
+    """From mean codes (n,) at equal and opposite currents [mA]. Raises `BadParameter`, `UnfitRecording`."""
+    if not 0.0 < current_ma < np.inf:
+        raise BadParameter("current_ma", current_ma, "finite and above 0")
+    if len(plus_code) != len(minus_code) or not np.all(np.isfinite([*plus_code, *minus_code])):
+        raise UnfitRecording("a finite mean code at either current is needed of every soak")
+    zero, centred = 0.5 * (plus_code + minus_code), 0.5 * (plus_code - minus_code)
+    if np.any(centred == 0.0):
+        raise UnfitRecording("the converter answers opposite currents with the same code")
+    scale = centred / current_ma
+    return ZeroAndScale(zero, scale, zero / scale)
+
+
+@dataclass(frozen=True)
+class ConverterModel:
+    """``N(I, t) = K0·Fc(t)·I + N0 + Fs(t)`` of one channel, t its own sensor's reading."""
+
+    scale: Normalised
+    """K0 [codes a mA] and Fc."""
+    zero: Normalised
+    """N0 [codes] and Fs."""
+
+    def code(self, current_ma: ArrayLike, temperature_c: Array) -> Array:
+        """What the channel would send, before it is a whole number, at temperatures (n,) [°C]."""
+        return self.scale.value(temperature_c) * np.asarray(current_ma) + self.zero.value(temperature_c)
+
+    def current_ma(self, code: Array, temperature_c: Array) -> Array:
+        """Input current of codes (n,) at temperatures (n,): what stage two is given."""
+        return (code - self.zero.value(temperature_c)) / self.scale.value(temperature_c)
+
+
+def converter_model(
+    current_ma: float, plus_code: Array, minus_code: Array, sensor_c: Array, reference_c: float = 20.0, order: int = 2
+) -> ConverterModel:
+    """Model of a channel from mean codes at ±current, one pair a soak, and what its sensor read there, all (n,).
+
+    Raises as `zero_and_scale` and `fit_normalised`.
+    """
+    found = zero_and_scale(current_ma, plus_code, minus_code)
+    return ConverterModel(
+        fit_normalised(sensor_c, found.scale_code_per_ma, reference_c, order, relative=True),
+        fit_normalised(sensor_c, found.zero_code, reference_c, order, relative=False),
+    )

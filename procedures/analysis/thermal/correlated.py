@@ -1,0 +1,148 @@
+"""Least squares where neighbouring residuals are alike: whitened by the noise's own spectrum, run by run.
+
+Residuals of thermal fits are not independent: an accelerometer's flicker lasts for hours. Cosines of a run are all
+but uncorrelated, with variances that the noise model of IEEE Std 952 gives (`warm_up.coloured`): Q, N, B and K are the
+most likely ones of the residuals, and dividing by the roots of the variances whitens. Tried beforehand: an
+autoregression of six minutes left the claimed uncertainties of the linear coefficients a factor of two too small.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import dct
+
+from procedures.analysis.warm_up.coloured import FEWEST, cosines, fit_noise, unit_variances
+from procedures.core.arrays import Array
+from procedures.core.errors import UnfitRecording
+from procedures.core.noise import NoiseCoefficients
+
+SLOW = 10
+"""Cosines up to this number are where temperature lives in a cycle: there the noise is told as effective samples."""
+EXACT = 1e-24
+"""Of the residuals' power relative to the values': below it a fit is exact to rounding and has no noise to tell."""
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Noise of several runs with the variances of their cosines."""
+
+    noise: NoiseCoefficients
+    """Of the weighted residuals, where they were weighted."""
+    variances: tuple[Array, ...]
+    """Of the cosines k = 0 … n − 1 of each run, (n,). The mean's is unknown and takes that of k = 1: every run has an
+    intercept of its own, so no slope feels it."""
+
+    @property
+    def inflation(self) -> float:
+        """Variance of the slowest `SLOW` cosines over that of independent values of the same spread, at least one."""
+        return max(1.0, float(np.mean([np.mean(v[:SLOW]) / np.mean(v) for v in self.variances])))
+
+
+def spectrum(residuals: Sequence[Array], cell_s: float) -> Spectrum:
+    """One noise for the residuals (n_r,) of several runs of cells of `cell_s` [s]. Raises `UnfitRecording`.
+
+    Runs of different lengths are cut to the shortest for the fit; all of each is whitened.
+    """
+    shortest = min(len(r) for r in residuals)
+    if shortest < FEWEST:
+        raise UnfitRecording(f"a run of {shortest} cells is too short to tell its noise; it takes {FEWEST}")
+    power = np.mean([cosines(r[:shortest]) ** 2 for r in residuals], axis=0)
+    if not np.any(power):
+        raise UnfitRecording("the residuals are exactly zero: there is no noise to tell")
+    noise = fit_noise(np.sqrt(power), unit_variances(shortest, cell_s)).noise
+    squares = np.square([noise.quantization, noise.random_walk, noise.bias_instability, noise.rate_random_walk])
+    variances = [squares @ unit_variances(len(r), cell_s) for r in residuals]
+    return Spectrum(noise, tuple(np.concatenate([v[:1], v]) for v in variances))
+
+
+def whiten(values: Array, variances: Array) -> Array:
+    """Cosines of values (n,) or columns (n, m) over the roots of their variances (n,): as long, and white."""
+    over = 1.0 / np.sqrt(variances)
+    turned = np.asarray(dct(values, type=2, norm="ortho", axis=0), dtype=np.float64)
+    return turned * (over if values.ndim == 1 else over[:, None])
+
+
+@dataclass(frozen=True)
+class LinearFit:
+    """Least squares of several runs with one noise."""
+
+    coefficients: Array
+    """(k,)"""
+    covariance: Array
+    """(k, k)"""
+    spectrum: Spectrum | None
+    """Of the weighted residuals; None where the fit is exact to rounding."""
+    residuals: tuple[Array, ...]
+    """Each run's, not whitened."""
+    effective_samples: float
+    """Cells over the spectrum's inflation."""
+    whitened: bool
+    """Whether the answer is that of whitened cells, or of the cells as they are."""
+
+    @property
+    def degrees_of_freedom(self) -> float:
+        """Of the intervals: effective samples less coefficients, at least one."""
+        return max(1.0, self.effective_samples - len(self.coefficients))
+
+
+def fit_linear(
+    designs: Sequence[Array],
+    values: Sequence[Array],
+    weights: Sequence[Array],
+    cell_s: float,
+    *,
+    generalised: bool = True,
+    passes: int = 2,
+) -> LinearFit:
+    """Fit values (n_r,) of each run r by designs (n_r, k); `weights` (n_r,) are inverse relative standard deviations.
+
+    `generalised`: weighted least squares gives residuals, these a noise, this the weights of generalised least squares,
+    `passes` times; covariance ``(AᵀS⁻¹A)⁻¹``. Else weighted least squares is the answer, for models that are known to
+    miss something, with the covariance ``P·S·Pᵀ`` of its pseudo-inverse P. Raises `UnfitRecording`.
+    """
+    count, wanted = sum(len(y) for y in values), designs[0].shape[1]
+    if count <= wanted:
+        raise UnfitRecording(f"{count} cells cannot determine {wanted} coefficients")
+    scaled = [(w[:, None] * a, w * y) for a, y, w in zip(designs, values, weights, strict=True)]
+    inverse = _inverse(np.concatenate([a for a, _ in scaled]))
+    solution = inverse @ np.concatenate([y for _, y in scaled])
+    found: Spectrum | None = None
+    covariance = np.zeros((wanted, wanted))
+    for _ in range(passes if generalised else 1):
+        left = [y - a @ solution for a, y in scaled]
+        if sum(float(r @ r) for r in left) <= EXACT * sum(float(y @ y) for _, y in scaled):
+            break
+        found = spectrum(left, cell_s)
+        if generalised:
+            whitened = [(whiten(a, v), whiten(y, v)) for (a, y), v in zip(scaled, found.variances, strict=True)]
+            inverse = _inverse(np.concatenate([a for a, _ in whitened]))
+            solution = inverse @ np.concatenate([y for _, y in whitened])
+            covariance = inverse @ inverse.T
+        else:
+            covariance = _sandwich(inverse, found)
+    return LinearFit(
+        solution,
+        covariance,
+        found,
+        tuple(y - a @ solution for a, y in zip(designs, values, strict=True)),
+        count / (found.inflation if found else 1.0),
+        generalised,
+    )
+
+
+def _inverse(design: Array) -> Array:
+    """Pseudo-inverse (k, m) of a design whose columns may differ by orders of magnitude."""
+    scale = np.linalg.norm(design, axis=0)
+    scale[scale == 0.0] = 1.0
+    return np.linalg.pinv(design / scale) / scale[:, None]
+
+
+def _sandwich(inverse: Array, found: Spectrum) -> Array:
+    """``P·S·Pᵀ``, S diagonal among the cosines of each run, (k, k)."""
+    total, at = np.zeros((len(inverse), len(inverse))), 0
+    for variances in found.variances:
+        part = np.asarray(dct(inverse[:, at : at + len(variances)].T, type=2, norm="ortho", axis=0), dtype=np.float64)
+        total += (part * variances[:, None]).T @ part
+        at += len(variances)
+    return total

@@ -1,0 +1,80 @@
+"""Normalised functions of temperature: zero and scale relative to normal conditions (thesis 3.2.2, paper C).
+
+``N(A, t) = A·K0·Fc(t) + N0 + Fs(t)`` with ``Fc = 1`` and ``Fs = 0`` at the reference, each a polynomial in the
+departure from it. C writes the zero's change as its largest in the range times a function of at most one
+(`Normalised.largest_change`).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from procedures.analysis.determination import require_full_rank
+from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter, UnfitRecording
+
+
+@dataclass(frozen=True)
+class Normalised:
+    """``value(t) = value_0·F(t)`` with F(t_0) = 1, or ``value_0 + F(t)`` with F(t_0) = 0: the kind says which."""
+
+    relative: bool
+    reference_c: float
+    at_reference: float
+    """value_0, in the unit of the values."""
+    coefficients: tuple[float, ...]
+    """a_1 … a_q of F, in 1/°C^k, or in the unit of the values a °C^k."""
+    covariance: tuple[tuple[float, ...], ...]
+    """Of value_0, a_1 … a_q, (q + 1, q + 1)."""
+    residual_sd: float
+
+    def function(self, temperature_c: Array) -> Array:
+        """F at temperatures (n,): 1 or 0 at the reference."""
+        departure = temperature_c - self.reference_c
+        powers = [a * departure ** (k + 1) for k, a in enumerate(self.coefficients)]
+        return np.sum(powers, axis=0) + (1.0 if self.relative else 0.0)
+
+    def value(self, temperature_c: Array) -> Array:
+        """The whole value at temperatures (n,)."""
+        f = self.function(temperature_c)
+        return self.at_reference * f if self.relative else self.at_reference + f
+
+    def largest_change(self, low_c: float, high_c: float) -> float:
+        """C's Δmax: the largest change from the reference within a range [°C], in the unit of the values."""
+        grid = np.linspace(low_c, high_c, 1001)
+        return float(np.max(np.abs(self.value(grid) - self.at_reference)))
+
+
+def fit_normalised(temperature_c: Array, values: Array, reference_c: float, order: int, relative: bool) -> Normalised:
+    """Least squares of values (n,) at temperatures (n,) [°C] by a polynomial about the reference.
+
+    Independent errors of equal size are assumed: one value a soak. The covariance of ratios ``a_k = c_k/c_0`` is that
+    of first order. Raises `BadParameter`, `UnfitRecording`, `Undetermined`.
+    """
+    if order not in range(1, 7):
+        raise BadParameter("order", order, "1 … 6")
+    if len(values) != len(temperature_c) or not np.all(np.isfinite([*values, *temperature_c])):
+        raise UnfitRecording("a value and a temperature, both finite, are needed of every soak")
+    if len(values) < order + 2:
+        raise UnfitRecording(f"{len(values)} soaks cannot give a polynomial of order {order} and its uncertainty")
+    design = np.vander(temperature_c - reference_c, order + 1, increasing=True)
+    names = ["value at the reference", *(f"a_{k}" for k in range(1, order + 1))]
+    require_full_rank("the temperature function", design, names)
+    scale = np.linalg.norm(design, axis=0)
+    inverse = np.linalg.pinv(design / scale) / scale[:, None]
+    c = inverse @ values
+    left = values - design @ c
+    variance = float(left @ left) / (len(values) - order - 1)
+    covariance = variance * inverse @ inverse.T
+    coefficients = c[1:]
+    if relative:
+        if c[0] == 0.0:
+            raise UnfitRecording("the value at the reference is zero: nothing is relative to it")
+        jacobian = np.eye(order + 1)
+        jacobian[1:, 1:] /= c[0]
+        jacobian[1:, 0] = -c[1:] / c[0] ** 2
+        covariance, coefficients = jacobian @ covariance @ jacobian.T, c[1:] / c[0]
+    rows = tuple(tuple(float(v) for v in row) for row in covariance)
+    return Normalised(
+        relative, reference_c, float(c[0]), tuple(float(a) for a in coefficients), rows, float(np.sqrt(variance))
+    )

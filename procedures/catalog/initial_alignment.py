@@ -1,0 +1,260 @@
+"""Initial alignment on the bench: heading, pitch and roll over and over, found and predicted (T 1.1; S 3.163-3.166).
+
+The unit rests at known attitudes, aligns itself from its corrected means, is switched off and does it again. The
+errors against the table and its azimuth are judged by what calibration, launches, noise and table let expect; the
+azimuth error of thesis 1.1, in which only the noise within a launch is, stands beside it.
+"""
+
+from collections.abc import AsyncIterator, Sequence
+from typing import Annotated
+
+from pydantic import Field
+
+from procedures import steps
+from procedures.analysis.navigation.alignment import require_alignable
+from procedures.analysis.reference import site_with
+from procedures.analysis.repeated_alignment import report as pictures
+from procedures.analysis.repeated_alignment.expected import (
+    ANGLES,
+    TABLE,
+    ExpectedErrors,
+    expected_errors,
+    planned_alignments,
+    rms_deg,
+)
+from procedures.analysis.repeated_alignment.observed import (
+    Alignment,
+    AngleErrors,
+    ThesisPrediction,
+    alignment_errors,
+    found_attitudes,
+    judged_angle,
+    recorded_alignments,
+    thesis_prediction,
+    told_alignments,
+)
+from procedures.analysis.station_plan import windows
+from procedures.analysis.table_errors import TableUncertainty
+from procedures.bench import Bench
+from procedures.bench.imu import Stream
+from procedures.core import units
+from procedures.core.errors import BadParameter
+from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.recording import Recording, Station
+from procedures.core.report import Report
+from procedures.core.site import Site
+from procedures.core.table_angles import TableAngles
+from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+
+MOST_ALIGNMENTS = 500
+"""Their errors' covariance is a full matrix."""
+
+Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
+Arcsec = Annotated[float, Field(ge=0.0, le=3600.0)]
+
+
+class Limits(Parameters):
+    """Requirements on the alignment and on its agreement with the prediction (ours; the thesis prints none)."""
+
+    heading_sd_max_deg: float = Field(0.1, gt=0.0, le=180.0, description="expected of one alignment's heading")
+    prediction_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the errors' chi-square")
+
+
+class Params(Parameters):
+    """Where, how long, how often. None takes the bench's value."""
+
+    orientations: tuple[tuple[Angle, Angle, Angle], ...] = Field(
+        ((0.0, 0.0, 0.0),),
+        min_length=1,
+        max_length=50,
+        description="(outer, middle, inner) [deg] of each round; level: heading = azimuth − outer",
+    )
+    repetitions: int = Field(5, ge=1, le=300, description="rounds through the orientations")
+    alignment_s: float = Field(600.0, ge=1.0, le=86_400.0, description="averaged for one alignment")
+    off_time_s: float = Field(
+        60.0, ge=0.0, le=604_800.0, description="switched off before each alignment; 0: all of them in one launch"
+    )
+    settle_s: float = Field(2.0, ge=0.0, le=86_400.0, description="at rest before the first sample")
+    base_turn_arcsec: float = Field(0.0, ge=0.0, le=3600.0, description="turn of the base meanwhile, for thesis 1.1")
+    latitude_deg: float | None = Field(None, ge=-90.0, le=90.0)
+    gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9)
+    azimuth_deg: float | None = Field(None, ge=-360.0, le=360.0, description="heading of the table's zero")
+    azimuth_sd_arcsec: Arcsec | None = None
+    orthogonality_sd_arcsec: Arcsec | None = Field(None, description="of each of the table's two right angles")
+    pointing_sd_arcsec: Arcsec | None = Field(None, description="of each axis, anew at each alignment")
+    level_sd_arcsec: Arcsec | None = Field(None, description="of the outer axis about each horizontal direction")
+    limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
+
+
+class Result(Outcome):
+    """Every alignment, and each angle's errors beside their prediction."""
+
+    basis: str
+    alignments: tuple[Alignment, ...]
+    angles: tuple[AngleErrors, AngleErrors, AngleErrors]
+    """Heading, pitch, roll."""
+    thesis: ThesisPrediction | None
+
+
+def resolve(params: Params, context: Context) -> Params:
+    """Site and table accuracy from the bench."""
+    site, accuracy = context.bench.site, context.bench.accuracy
+    defaults = {
+        "latitude_deg": site.latitude_deg,
+        "gravity_m_s2": site.gravity_m_s2,
+        "azimuth_deg": site.azimuth_deg,
+        "azimuth_sd_arcsec": site.azimuth_sd_arcsec,
+        "orthogonality_sd_arcsec": accuracy.orthogonality_sd_arcsec,
+        "pointing_sd_arcsec": accuracy.pointing_sd_arcsec,
+        "level_sd_arcsec": accuracy.level_sd_arcsec,
+    }
+    return params.filled(defaults)
+
+
+def schedule(params: Params) -> tuple[Station, ...]:
+    """Round after round through the orientations, one station an alignment."""
+    wanted = params.repetitions * len(params.orientations)
+    if wanted > MOST_ALIGNMENTS:
+        raise BadParameter("repetitions", params.repetitions, f"{wanted} alignments, {MOST_ALIGNMENTS} are the most")
+    places = [place for _ in range(params.repetitions) for place in params.orientations]
+    return tuple(
+        Station(
+            i,
+            f"alignment {i + 1}",
+            TableAngles(*place),
+            None,
+            params.settle_s,
+            params.alignment_s,
+            power_off_s=params.off_time_s,
+        )
+        for i, place in enumerate(places)
+    )
+
+
+def predict(params: Params, context: Context) -> Prediction:
+    """Duration and the errors to expect. Refuses a pole, an attitude on end, and a unit without a calibration."""
+    params = resolve(params, context)
+    site, stations, axes = _site(params, context), schedule(params), context.bench.axis_motion
+    require_alignable(site.latitude_deg)
+    expected = expected_errors(planned_alignments(context.unit, site, _table(params), stations, axes))
+    found = [_predicted(angle, expected) for angle in range(3)]
+    thesis = thesis_prediction(context.unit, site, params.base_turn_arcsec, params.alignment_s)
+    if thesis is not None:
+        names = (("added", thesis.added_deg), ("independent", thesis.independent_deg))
+        found += [
+            PredictedUncertainty(f"heading by thesis 1.1, {how}", "rad", value * units.DEG, value * units.DEG)
+            for how, value in names
+        ]
+    duration_s = float(windows(stations, axes)[-1, 1])
+    return Prediction(duration_s, tuple(found), _warnings(params, context, expected), _basis(context))
+
+
+async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
+    """Off, on, turn to the orientation, record; alignment after alignment."""
+    for station in stations:
+        yield await steps.record_station(bench, station)
+
+
+def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
+    """Align from each recording's corrected means; judge all errors together. Raises as `predict`, `UnfitRecording`."""
+    params = resolve(params, context)
+    site = _site(params, context)
+    plan = recorded_alignments(recordings, context.unit, site, _table(params))
+    expected = expected_errors(plan)
+    found = found_attitudes(recordings, plan)
+    errors = alignment_errors(found, plan)
+    heading, pitch, roll = (judged_angle(angle, errors, expected) for angle in range(3))
+    checks = _checks((heading, pitch, roll), params.limits)
+    return Result(
+        checks=checks,
+        verdict=verdict(checks),
+        warnings=_warnings(params, context, expected),
+        basis=_basis(context),
+        alignments=told_alignments(recordings, plan, found, errors, expected),
+        angles=(heading, pitch, roll),
+        thesis=thesis_prediction(context.unit, site, params.base_turn_arcsec, params.alignment_s),
+    )
+
+
+def report(result: Result) -> Report:
+    """Found beside predicted, where the prediction comes from, and every alignment."""
+    sections = (
+        pictures.errors_table(result.angles),
+        pictures.sources_table(result.angles),
+        pictures.heading_figure(result.alignments),
+        pictures.alignments_table(result.alignments),
+    )
+    return Report(f"{result.basis}. {pictures.sentence(result.angles[0], result.thesis)}", sections)
+
+
+def _site(params: Params, context: Context) -> Site:
+    p = params
+    return site_with(context.bench.site, p.latitude_deg, p.gravity_m_s2, p.azimuth_deg, p.azimuth_sd_arcsec)
+
+
+def _table(params: Params) -> TableUncertainty:
+    p = params
+    return TableUncertainty(
+        p.orthogonality_sd_arcsec or 0.0,
+        p.pointing_sd_arcsec or 0.0,
+        p.level_sd_arcsec or 0.0,
+        p.azimuth_sd_arcsec or 0.0,
+    )
+
+
+def _predicted(angle: int, expected: ExpectedErrors) -> PredictedUncertainty:
+    whole, table = rms_deg(expected.of_angle(angle)) * units.DEG, rms_deg(expected.part(TABLE, angle)) * units.DEG
+    of_unit = max(0.0, whole**2 - table**2) ** 0.5
+    return PredictedUncertainty(f"{ANGLES[angle]} of one alignment", "rad", whole, of_unit, table)
+
+
+def _warnings(params: Params, context: Context, expected: ExpectedErrors) -> tuple[str, ...]:
+    heading, most = rms_deg(expected.of_angle(0)), params.limits.heading_sd_max_deg
+    found: list[str] = []
+    if heading > most:
+        found.append(
+            f"heading: the limit of {most:g} deg cannot be reached, one alignment's standard uncertainty is "
+            f"{heading:.3g} deg"
+        )
+    if not expected.noise_known:
+        found.append("the noise of a triad is not known: the errors are not judged by a prediction")
+    for triad in ("gyro", "accelerometer"):
+        record = context.unit.triad(triad)
+        if record is not None and record.bias_run_to_run_sd == 0.0:
+            found.append(
+                f"nothing is known of how the {triad} biases change from launch to launch: the prediction holds only "
+                "for the launch of the calibration"
+            )
+    return tuple(found)
+
+
+def _basis(context: Context) -> str:
+    return f"Aligned with calibration {context.unit.calibration_id or 'of the unit'}"
+
+
+def _checks(angles: Sequence[AngleErrors], limits: Limits) -> tuple[Check, ...]:
+    most = Limit("deg", limits.heading_sd_max_deg, source="ours")
+    found = [check("heading, expected standard uncertainty of one alignment", angles[0].expected_sd_deg, most)]
+    agreement = Limit("1", minimum=limits.prediction_p_value_min, source="ours")
+    found += [
+        check(f"{a.angle} errors as predicted, p-value of chi-square", a.p_value, agreement)
+        for a in angles
+        if a.p_value is not None
+    ]
+    return tuple(found)
+
+
+PROCEDURE = Procedure(
+    "initial_alignment",
+    "Initial alignment, repeated",
+    "1.0.0",
+    Params,
+    Result,
+    resolve,
+    schedule,
+    predict,
+    acquire,
+    analyse,
+    report,
+    uses_calibration=True,
+)

@@ -1,0 +1,91 @@
+"""How the unit's outputs follow the temperatures of its parts: pure functions of the nodes.
+
+Everything is a departure from what the unit is with all nodes at `REFERENCE_C`. Written without sight of the inverse
+that the analysis uses.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from procedures.core import units
+from simulators.chamber.network import BLOCK, CASE, CONVERTER, GYRO
+from simulators.truth import Array
+from simulators.truth.thermal import (
+    REFERENCE_C,
+    AccelerometerThermalTruth,
+    ConverterTruth,
+    GyroThermalTruth,
+    UnitThermalTruth,
+)
+
+CURRENT_MA_PER_G = 1.1
+"""Accelerometer's current (thesis table 1.3, AKS-05N) [mA a standard g]."""
+MA_PER_NOMINAL = CURRENT_MA_PER_G / units.STANDARD_GRAVITY
+"""Nominal output [m/s²] to the converter's input [mA]."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """What temperature does to the three accelerometer and three gyro channels, each (n, 3).
+
+    Nominal accelerometer output of a bias b and a through-put a = (K·f)_i [m/s²]:
+    ``U = converter_gain·(b + sensor_gain·a + sensor_added) + converter_added``; of a gyro ``U + gyro_added``.
+    """
+
+    sensor_gain: Array
+    sensor_added_m_s2: Array
+    converter_gain: Array
+    converter_added_m_s2: Array
+    gyro_added_rad_s: Array
+
+    def accelerometer_output(self, bias: Array, through: Array) -> Array:
+        """U (n, 3) of b (3,) and a, (3,) or (n, 3) [m/s²]."""
+        inner = bias + self.sensor_gain * through + self.sensor_added_m_s2
+        return self.converter_gain * inner + self.converter_added_m_s2
+
+
+def response(truth: UnitThermalTruth, temperatures_c: Array) -> Response:
+    """The response at node temperatures (n, 8) in the order of `NODES` [°C]."""
+    gain, added = accelerometers(truth.accelerometers, temperatures_c)
+    converter_gain, zero = converters(truth.converter, temperatures_c[:, CONVERTER])
+    return Response(gain, added, converter_gain, zero, gyros(truth.gyro, temperatures_c))
+
+
+def accelerometers(truths: Sequence[AccelerometerThermalTruth], temperatures_c: Array) -> tuple[Array, Array]:
+    """Gain 1/(1 + A) and added −B [m/s²] of each channel, (n, 3) both."""
+    departure = temperatures_c - REFERENCE_C
+    board = departure[:, CONVERTER]
+    gains, added = [], []
+    for truth in truths:
+        structure = departure[:, CASE] + truth.block_share * (departure[:, BLOCK] - departure[:, CASE])
+        torquer = _square(truth.scale_static, structure) + _square(truth.scale_dynamic, board)
+        rest = _square(truth.bias_static, structure) + _square(truth.bias_dynamic, board)
+        gains.append(1.0 / (1.0 + torquer))
+        added.append(-rest)
+    return np.column_stack(gains), np.column_stack(added)
+
+
+def converters(truths: Sequence[ConverterTruth], board_c: Array) -> tuple[Array, Array]:
+    """Gain Fc and change of zero Fs as nominal output [m/s²] at board temperatures (n,), (n, 3) both."""
+    departure = board_c - REFERENCE_C
+    gains = [1.0 + _square(t.scale_drift, departure) for t in truths]
+    zeros = [_square(t.zero_drift, departure) / (t.codes_a_ma * MA_PER_NOMINAL) for t in truths]
+    return np.column_stack(gains), np.column_stack(zeros)
+
+
+def converter_codes(truth: ConverterTruth, current_ma: Array, board_c: Array) -> Array:
+    """Codes a cycle (n,), before they are whole numbers, of currents [mA] at board temperatures [°C], both (n,)."""
+    departure = board_c - REFERENCE_C
+    gain = truth.codes_a_ma * (1.0 + _square(truth.scale_drift, departure))
+    return gain * current_ma + truth.zero_code + _square(truth.zero_drift, departure)
+
+
+def gyros(truth: GyroThermalTruth, temperatures_c: Array) -> Array:
+    """What a failing perimeter control lets through, (n, 3) [rad/s]; zero for a healthy one."""
+    return np.array(truth.fault_residue_rad_s_c) * (temperatures_c[:, GYRO] - REFERENCE_C)
+
+
+def _square(pair: tuple[float, float], departure: Array) -> Array:
+    return pair[0] * departure + pair[1] * departure**2

@@ -1,0 +1,165 @@
+"""The chamber's port, and the unit's heat and thermometers beside it: implements `procedures.bench.chamber.Chamber`.
+
+Knows the bench's clock only as a number of ticks that pass. Temperatures are made once a second; within a second the
+response is that of its end.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from procedures.bench.chamber import ChamberLimits, ChamberReading
+from procedures.bench.errors import DeviceFault, Disconnected, OutOfRange
+from simulators.chamber.behaviour import Response, response
+from simulators.chamber.plant import STEP_S, ChamberPlant
+from simulators.chamber.thermometers import Codes, Thermometers
+from simulators.truth import Array
+from simulators.truth.thermal import ChamberTruth, UnitThermalTruth
+
+FAULTS = ("heater_stuck", "control_sensor_stuck", "cooling_lost", "heating_lost", "link_lost")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something breaks at a moment of bench time and stays broken."""
+
+    name: str
+    from_s: float
+
+    def __post_init__(self) -> None:
+        if self.name not in FAULTS or not 0.0 <= self.from_s < float("inf"):
+            raise ValueError(f"fault {self.name!r} from {self.from_s!r} s: one of {', '.join(FAULTS)}, from 0 s on")
+
+
+@dataclass(frozen=True)
+class Warmth:
+    """What some ticks did: temperatures and codes of every whole second that ended within them."""
+
+    temperatures_c: Array
+    """(n, 8) in the order of `NODES`."""
+    codes: Codes
+    """(n, 5) in the order of `THERMOMETERS`."""
+    end_ticks: tuple[int, ...]
+    """At which of the ticks, 1 … ticks, each second ended."""
+    before_c: Array
+    """(8,), at the end of the last second before these ticks: they hold until the first one ends."""
+
+
+class SimChamber:
+    """Chamber, unit's heat, thermometers. `advance` is what the world's clock moves."""
+
+    def __init__(
+        self,
+        chamber: ChamberTruth,
+        unit: UnitThermalTruth,
+        seed: int,
+        rate_hz: float,
+        now_s: Callable[[], float],
+        faults: tuple[Fault, ...] = (),
+    ) -> None:
+        """`rate_hz`: ticks of the clock in a second; `now_s`: bench time."""
+        self.truth, self.unit = chamber, unit
+        self.plant = ChamberPlant(chamber, unit.network, seed)
+        self.thermometers = Thermometers(unit.thermometers, seed, chamber.ambient_c)
+        self.faults = faults
+        self._rate_hz, self._now_s = rate_hz, now_s
+        self._ticks = 0
+
+    @property
+    def limits(self) -> ChamberLimits:
+        t = self.truth
+        return ChamberLimits(t.least_c, t.most_c, t.ramp_c_min, t.ambient_c)
+
+    async def command(self, temperature_c: float, ramp_c_min: float) -> None:
+        """Go to an air temperature; see the port."""
+        self._need_link()
+        t, s = self.truth, self.plant.state
+        if not (isfinite(temperature_c) and t.least_c <= temperature_c <= t.most_c):
+            raise OutOfRange(f"temperature_c = {temperature_c!r} is outside {t.least_c:g} … {t.most_c:g}")
+        if not 0.0 < ramp_c_min <= t.ramp_c_min:
+            raise OutOfRange(f"ramp_c_min = {ramp_c_min!r} must be above 0 and at most {t.ramp_c_min:g}")
+        if s.tripped:
+            raise DeviceFault("the chamber's over-temperature limiter has tripped: a person must reset it")
+        if s.door_open:
+            raise DeviceFault("the chamber's door is open")
+        self.plant.command(temperature_c, ramp_c_min / 60.0)
+
+    async def read(self) -> ChamberReading:
+        """What the chamber says of itself; see the port."""
+        self._need_link()
+        s = self.plant.state
+        set_point = s.control_reading_c if s.target_c is None else s.set_point_c
+        return ChamberReading(self._now_s(), s.control_reading_c, set_point, s.target_c, s.door_open, s.tripped)
+
+    async def make_safe(self) -> None:
+        """To ambient; a chamber that has tripped or stands open stays off."""
+        self._need_link()
+        if not (self.plant.state.tripped or self.plant.state.door_open):
+            self.plant.command(self.truth.ambient_c, self.truth.ramp_c_min / 60.0)
+
+    def unit_power(self, on: bool) -> None:
+        """The unit's supply was switched: from the next second on it heats itself, or no more."""
+        self.plant.state.unit_on = on
+
+    def set_door(self, is_open: bool) -> None:
+        """What a person does, for instance to turn the unit over between two runs. Open, the plant stops."""
+        self.plant.state.door_open = is_open
+        if is_open:
+            self.plant.switch_off()
+
+    def reset_limiter(self) -> None:
+        """What a person does at the chamber itself after an over-temperature; nothing in the service can."""
+        self.plant.state.tripped = False
+        self.plant.switch_off()
+
+    def advance(self, ticks: int) -> Warmth:
+        """Let whole ticks pass; cheap where no second ends within them."""
+        per_second = self._rate_hz * STEP_S
+        first = int(self._ticks / per_second + 1e-9)
+        seconds = int((self._ticks + ticks) / per_second + 1e-9) - first
+        before = np.array(self.plant.state.temperatures_c)
+        path = np.concatenate([before[None][:0], *self._pieces(first, seconds)])
+        ends = tuple(round((first + k) * per_second) - self._ticks for k in range(1, seconds + 1))
+        self._ticks += ticks
+        return Warmth(path, self.thermometers.read(first, path), ends, before)
+
+    def _pieces(self, first: int, seconds: int) -> list[Array]:
+        """Node temperatures of so many seconds, cut where something breaks."""
+        cuts = {min(max(int(f.from_s / STEP_S) - first, 0), seconds) for f in self.faults}
+        edges = sorted({0, seconds} | cuts)
+        pieces: list[Array] = []
+        for begin, end in pairwise(edges):
+            self._break((first + begin) * STEP_S)
+            pieces.append(self.plant.run(end - begin))
+        return pieces
+
+    def _break(self, now_s: float) -> None:
+        for fault in self.faults:
+            if fault.from_s < now_s + STEP_S:
+                self.plant.fail(fault.name)
+
+    def response(self, temperatures_c: Array) -> Response:
+        """What the unit's outputs make of node temperatures (n, 8)."""
+        return response(self.unit, temperatures_c)
+
+    def _need_link(self) -> None:
+        if any(f.name == "link_lost" and f.from_s <= self._now_s() for f in self.faults):
+            raise Disconnected("the chamber does not answer")
+
+    def checkpoint(self) -> dict[str, Any]:
+        """State to resume from, JSON-ready."""
+        return {
+            "ticks": self._ticks,
+            "plant": self.plant.checkpoint(),
+            "thermometers": self.thermometers.checkpoint(),
+        }
+
+    def resume(self, state: dict[str, Any]) -> None:
+        """Go on from a checkpoint of a chamber of the same truths, seed and rate."""
+        self._ticks = int(state["ticks"])
+        self.plant.resume(state["plant"])
+        self.thermometers.resume(state["thermometers"])
