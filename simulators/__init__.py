@@ -26,5 +26,6 @@ geometry: both know only the conventions written in `procedures`, and a third wi
 in the tests. Every random number is keyed by (seed, launch, channel, process, block), so the same seed gives the same
 bytes in whatever pieces they are read, and after a resume from a checkpoint.
 
-Layers: ``world`` > ``turntable`` | ``imu`` | ``supply`` | ``chamber`` > ``clock`` | ``truth``. `simulators.world.build` is the door.
+Layers: ``world`` > ``turntable`` | ``imu`` | ``supply`` | ``chamber`` > ``clock`` | ``truth``. The door is
+`simulators.world.build`.
 """

@@ -2,7 +2,7 @@
 
 ``F(t) = p₁·e^(p₂(t − t₀)) + p₃·e^(p₄(t − t₀)) + p₅`` (thesis 3.3) with t₀ the record's beginning, so p₁ and p₃ are
 amplitudes there; for a record from power-up on it is the thesis's own. Found by Levenberg-Marquardt, as there, but with
-two differences: the squares are weighted by the noise's spectrum, fitted beside the curve (`warm_up.coloured`), since
+two differences: the squares are weighted by the noise's spectrum, fitted beside the curve (`coloured_noise`), since
 flicker would else pass for heat and the uncertainties would be of white noise; and an exponential is only taken where
 noise, or noise and one exponential, does not explain the record (`warm_up.fit`): two equal ones are one.
 """
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from procedures.analysis.coloured_noise import cosine_series
 from procedures.analysis.station_noise import mean_covariance
-from procedures.analysis.warm_up.coloured import cosine_series
 from procedures.analysis.warm_up.fit import Fit, fit_exponentials
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter

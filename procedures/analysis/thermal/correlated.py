@@ -1,7 +1,7 @@
 """Least squares where neighbouring residuals are alike: whitened by the noise's own spectrum, run by run.
 
 Residuals of thermal fits are not independent: an accelerometer's flicker lasts for hours. Cosines of a run are all
-but uncorrelated, with variances that the noise model of IEEE Std 952 gives (`warm_up.coloured`): Q, N, B and K are the
+but uncorrelated, with variances that the noise model of IEEE Std 952 gives (`coloured_noise`): Q, N, B and K are the
 most likely ones of the residuals, and dividing by the roots of the variances whitens. Tried beforehand: an
 autoregression of six minutes left the claimed uncertainties of the linear coefficients a factor of two too small.
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import dct
 
-from procedures.analysis.warm_up.coloured import FEWEST, cosines, fit_noise, unit_variances
+from procedures.analysis.coloured_noise import FEWEST, cosines, fit_noise, unit_variances
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.noise import NoiseCoefficients

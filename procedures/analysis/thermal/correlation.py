@@ -12,7 +12,7 @@ from math import erfc, sqrt
 
 import numpy as np
 
-from procedures.analysis.warm_up.coloured import FEWEST, cosines, fit_noise, unit_variances
+from procedures.analysis.coloured_noise import FEWEST, cosines, fit_noise, unit_variances
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.noise import NoiseCoefficients

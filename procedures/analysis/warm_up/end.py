@@ -12,7 +12,7 @@ from math import sqrt
 import numpy as np
 
 from procedures.analysis.averaging_time import allan_variance
-from procedures.analysis.warm_up.coloured import CosineSeries, cosine_series
+from procedures.analysis.coloured_noise import CosineSeries, cosine_series
 from procedures.analysis.warm_up.fit import (
     SHORTEST,
     Family,

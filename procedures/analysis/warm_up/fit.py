@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from procedures.analysis.warm_up.coloured import CosineSeries, FittedNoise, cosines, fit_noise
+from procedures.analysis.coloured_noise import CosineSeries, FittedNoise, cosines, fit_noise
 from procedures.analysis.warm_up.shapes import Shape, cell_means, exponential, value
 from procedures.core.arrays import Array
 
