@@ -150,7 +150,10 @@ class Engine:
         """Note a bad end, as soon as it can be: while the disk is full the job waits, and the bench is safe already."""
         while True:
             try:
-                return self._runner.end_early(job_id, outcome)
+                job = self._runner.end_early(job_id, outcome)
+                if job.state is JobState.QUEUED:  # the wish to pause was taken back while the bench was made safe
+                    self.enqueue(job)
+                return
             except ServiceError as error:
                 log.warning("the end of job %s cannot be noted yet: %s", job_id, error)
             if self._ending.wait(RETRY_S):

@@ -6,7 +6,7 @@ from threading import Event
 from typing import Any
 
 from bench_service.jobs.driver import BenchDriver
-from bench_service.jobs.errors import ServiceError
+from bench_service.jobs.errors import IllegalTransition, ServiceError
 from bench_service.jobs.job import FINAL, Failure, Job, JobState
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
 from bench_service.jobs.session import BenchSession, ShuttingDown
@@ -81,7 +81,10 @@ class JobRunner:
             return -1
         context = self._planner.refreshed(CONTEXT.validate_python(job.context))
         job = jobs.set_context(job_id, CONTEXT.dump_python(context, mode="json"))
-        jobs.transition(job_id, JobState.RUNNING, at=now())
+        try:
+            jobs.transition(job_id, JobState.RUNNING, at=now())
+        except IllegalTransition:  # it was cancelled or put aside this moment
+            return -1
         return len(job.stations)
 
     def acquire(self, job_id: str, index: int) -> StepOutcome:
@@ -147,18 +150,17 @@ class JobRunner:
         self._stores.jobs.transition(job_id, JobState.SUCCEEDED, at=now(), verdict=stored.verdict, result_id=stored.id)
         return StepOutcome()
 
-    def end_early(self, job_id: str, outcome: StepOutcome) -> None:
+    def end_early(self, job_id: str, outcome: StepOutcome) -> Job:
         """End a job that was cancelled or failed, or put it aside; its complete recordings are kept."""
         job = self._stores.jobs.get(job_id)
         if job.state in FINAL:
-            return
+            return job
         self._stores.recordings.interrupt_open(job_id)
         if outcome.paused:
-            self._stores.jobs.transition(job_id, JobState.PAUSED, at=now())
-            return
+            return self._stores.jobs.put_aside(job_id, now())
         to = JobState.CANCELLED if outcome.cancelled else JobState.FAILED
         verdict = None if outcome.cancelled else Verdict.ERROR
-        self._stores.jobs.transition(job_id, to, at=now(), verdict=verdict, failure=outcome.failure)
+        return self._stores.jobs.transition(job_id, to, at=now(), verdict=verdict, failure=outcome.failure)
 
     def shut_down(self) -> None:
         """The service is ending: leave the running job to the next start, and the bench safe."""

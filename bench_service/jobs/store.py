@@ -154,6 +154,10 @@ class JobStore(Protocol):
         """
         ...
 
+    def put_aside(self, job_id: str, at: datetime) -> Job:
+        """A job whose bench was made safe for a pause becomes paused; queued again, where the wish was taken back."""
+        ...
+
     def resume(self, job_id: str, at: datetime) -> Job:
         """Queue a paused or interrupted job again, as its next attempt; from a running one a wish to pause is taken.
 

@@ -126,6 +126,16 @@ class SqlJobStore:
                 _move(session, row, JobState.PAUSED, at, None, None, None)
             return job_of_row(row)
 
+    def put_aside(self, job_id: str, at: datetime) -> Job:
+        with self._database.write() as session:
+            row = _found(session, job_id, lock=True)
+            if JobState(row.state) is JobState.RUNNING:
+                wanted = row.pause_requested
+                _move(session, row, JobState.PAUSED, at, None, None, None)
+                if not wanted:
+                    _move(session, row, JobState.QUEUED, at, None, None, None)
+            return job_of_row(row)
+
     def resume(self, job_id: str, at: datetime) -> Job:
         with self._database.write() as session:
             row = _found(session, job_id, lock=True)

@@ -101,3 +101,36 @@ def test_a_job_survives_a_killed_service(
         service.client.close()
         service.process.terminate()
         assert service.process.wait(30) in (0, -signal.SIGTERM), service.log.read_text()
+
+
+@pytest.mark.timeout(240)
+def test_a_launch_that_is_cut_off_is_kept_and_repeated_whole(tmp_path: Path, free_port: int) -> None:
+    """Its continuity is the measurement: half a launch is no launch, and the unit is switched off and on again."""
+    service = Process(f"sqlite:///{tmp_path / 'bench.sqlite'}", free_port, tmp_path)
+    try:
+        parameters = {"launches": 2, "duration_s": 1200.0, "off_time_s": 30.0}
+        body = {"procedure": "static_run", "unit": "SIM-0001", "seed": 7, "parameters": parameters}
+        undisturbed = service.client.post("/api/v1/jobs", json=body).json()["id"]
+        assert service.until(undisturbed, 3)["state"] == "succeeded"
+        disturbed = service.client.post("/api/v1/jobs", json=body).json()["id"]
+        service.until(disturbed, 1)
+        pause(2.0)  # two thirds into the second launch: more than one chunk of it is committed
+        service.kill()
+        service.start()
+        job = service.until(disturbed, 3)
+        assert job["state"] == "succeeded", job
+        items = service.client.get("/api/v1/recordings", params={"job": disturbed}).json()["items"]
+        states = sorted((r["station"]["index"], r["state"], r["count"]) for r in items)
+        whole = 1200 * 400
+        assert [s for s in states if s[1] == "complete"] == [(0, "complete", whole), (1, "complete", whole)]
+        (cut,) = [s for s in states if s[1] == "interrupted"]
+        assert cut[0] == 1
+        assert 0 < cut[2] < whole
+        complete = {r["station"]["index"]: r for r in items if r["state"] == "complete"}
+        expected = {k: r["content_hash"] for k, r in service.recordings(undisturbed).items()}
+        assert {k: r["content_hash"] for k, r in complete.items()} == expected
+        assert complete[1]["launched_s"] > complete[0]["start_s"] + 1200.0
+    finally:
+        service.client.close()
+        service.process.terminate()
+        assert service.process.wait(30) in (0, -signal.SIGTERM), service.log.read_text()

@@ -85,6 +85,7 @@ def test_a_software_stop_ends_the_running_job(client: Client) -> None:
     assert answer.json()["job"] == job["id"]
     assert "hardware" in answer.json()["note"]
     assert client.wait(job["id"])["state"] == "cancelled"
+    assert client.http.post("/api/v1/benches/sim/release").json()["stopped"] is None
 
 
 def test_a_queued_job_is_cancelled_at_once_and_never_runs(client: Client) -> None:

@@ -67,6 +67,18 @@ def test_a_queued_job_is_paused_at_once_and_a_wish_can_be_taken_back(client: Cli
     assert client.wait(waiting)["state"] == "succeeded"
 
 
+def test_a_wish_that_is_taken_back_at_any_moment_never_strands_a_job(client: Client, undisturbed: dict) -> None:
+    job = client.submit(seed=5, parameters=SLOW)["id"]
+    until_station(client, job, 1)
+    for round_ in range(12):
+        client.http.post(f"/api/v1/jobs/{job}/pause")  # 409 once it has ended
+        pause(0.02 * (round_ % 4))  # before, while and after the bench is made safe
+        client.http.post(f"/api/v1/jobs/{job}/resume")  # 409 where it is queued again already
+        pause(0.05)
+    assert client.wait(job)["state"] == "succeeded"
+    assert hashes(client, job) == hashes(client, undisturbed["id"])
+
+
 def test_a_paused_job_can_be_cancelled_and_an_ended_one_neither_paused_nor_resumed(client: Client) -> None:
     running = client.submit(seed=5, parameters=SLOW)["id"]
     job = client.submit("no_operation")["id"]

@@ -127,13 +127,19 @@ def test_a_job_is_put_aside_and_taken_up_again_as_its_next_attempt(stores: Store
     assert stores.jobs.resume(job.id, now()).pause_requested is False  # the wish was taken back
     assert [e.data for e in stores.jobs.events(job.id, after=1)] == [{"pause_requested": w} for w in (True, False)]
     stores.jobs.request_pause(job.id, now())
-    stores.jobs.transition(job.id, JobState.PAUSED, at=now())
+    assert stores.jobs.put_aside(job.id, now()).state is JobState.PAUSED
+    assert stores.jobs.put_aside(job.id, now()).state is JobState.PAUSED
     assert stores.jobs.request_pause(job.id, now()).state is JobState.PAUSED
     again = stores.jobs.resume(job.id, now())
     assert (again.state, again.attempt, again.pause_requested) == (JobState.QUEUED, 2, False)
     with pytest.raises(IllegalTransition, match="is queued; it cannot become queued"):
         stores.jobs.resume(job.id, now())
     assert stores.jobs.request_pause(job.id, now()).state is JobState.PAUSED  # one that waits, at once
+    late = stores.jobs.add(new_job(state=JobState.RUNNING))
+    stores.jobs.request_pause(late.id, now())
+    stores.jobs.resume(late.id, now())  # while its bench is made safe
+    back = stores.jobs.put_aside(late.id, now())
+    assert (back.state, back.attempt) == (JobState.QUEUED, 2)
     for state in FINAL:
         ended = stores.jobs.add(new_job(state=state))
         for verb in (stores.jobs.request_pause, stores.jobs.resume):
