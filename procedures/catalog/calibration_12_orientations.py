@@ -25,7 +25,7 @@ from procedures.analysis.calibration_plan import (
 )
 from procedures.analysis.calibration_summary import TriadSummary, coefficient_unit
 from procedures.analysis.estimator import Weighting
-from procedures.analysis.reference import INPUT_UNITS, TRIAD_NAMES, site_with
+from procedures.analysis.reference import INPUT_UNITS, TRIAD_NAMES
 from procedures.analysis.scalar import require_scalar_determined
 from procedures.analysis.station_means import launch_warnings
 from procedures.analysis.station_plan import THESIS_ORIENTATIONS, windows
@@ -39,11 +39,10 @@ from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
 from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
-from procedures.core.site import Site
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+from procedures.site_parameters import TableParameters, declared_table
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
-Arcsec = Annotated[float, Field(ge=0.0, le=3600.0)]
 
 
 class Limits(Parameters):
@@ -59,7 +58,7 @@ class Limits(Parameters):
     condition_max: float = Field(100.0, ge=1.0, le=1e9, description="of the column-scaled design")
 
 
-class Params(Parameters):
+class Params(TableParameters):
     """What to do, where, and what to hold the unit to. None takes the unit's or the bench's value."""
 
     orientations: tuple[tuple[Angle, Angle], ...] = Field(
@@ -70,13 +69,6 @@ class Params(Parameters):
     )
     dwell_s: float | None = Field(None, ge=1.0, le=86_400.0, description="None: the unit's averaging time")
     settle_s: float = Field(2.0, ge=0.0, le=3600.0)
-    latitude_deg: float | None = Field(None, ge=-90.0, le=90.0)
-    gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9)
-    azimuth_deg: float | None = Field(None, ge=-360.0, le=360.0, description="heading of the table's zero")
-    azimuth_sd_arcsec: Arcsec | None = None
-    orthogonality_sd_arcsec: Arcsec | None = Field(None, description="of each of the table's two right angles")
-    pointing_sd_arcsec: Arcsec | None = Field(None, description="of each axis, anew at each station")
-    level_sd_arcsec: Arcsec | None = Field(None, description="of the outer axis about each horizontal direction")
     weighting: Weighting = Field(
         "noise_and_table",
         description="noise_and_table: least squares that allows for the table's declared accuracy; noise: the table's "
@@ -94,18 +86,7 @@ class Result(Outcome):
 
 def resolve(params: Params, context: Context) -> Params:
     """Dwell from the unit; site and table accuracy from the bench."""
-    site, accuracy = context.bench.site, context.bench.accuracy
-    defaults = {
-        "dwell_s": context.unit.averaging_time_s,
-        "latitude_deg": site.latitude_deg,
-        "gravity_m_s2": site.gravity_m_s2,
-        "azimuth_deg": site.azimuth_deg,
-        "azimuth_sd_arcsec": site.azimuth_sd_arcsec,
-        "orthogonality_sd_arcsec": accuracy.orthogonality_sd_arcsec,
-        "pointing_sd_arcsec": accuracy.pointing_sd_arcsec,
-        "level_sd_arcsec": accuracy.level_sd_arcsec,
-    }
-    return params.filled(defaults)
+    return params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
@@ -140,7 +121,7 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
     """Least squares over the station means of both triads."""
     params = resolve(params, context)
-    site, uncertainty = _site(params, context), _uncertainty(params, context)
+    site, uncertainty = params.site(context), _uncertainty(params, context)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     _require_scalar(params, plans[1])
     triads = tuple(
@@ -178,13 +159,8 @@ def report(result: Result) -> Report:
     return Report(sections=(*tables, *figures, *stations))
 
 
-def _site(params: Params, context: Context) -> Site:
-    p = params
-    return site_with(context.bench.site, p.latitude_deg, p.gravity_m_s2, p.azimuth_deg, p.azimuth_sd_arcsec)
-
-
 def _uncertainty(params: Params, context: Context) -> TableUncertainty:
-    site = _site(params, context)
+    site = params.site(context)
     return TableUncertainty(
         params.orthogonality_sd_arcsec or 0.0,
         params.pointing_sd_arcsec or 0.0,
@@ -195,7 +171,7 @@ def _uncertainty(params: Params, context: Context) -> TableUncertainty:
 
 
 def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
-    site, uncertainty = _site(params, context), _uncertainty(params, context)
+    site, uncertainty = params.site(context), _uncertainty(params, context)
     return triad_plan(
         triad, context.unit, schedule(params), context.bench.axis_motion, site, uncertainty, params.weighting
     )

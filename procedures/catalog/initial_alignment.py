@@ -12,7 +12,6 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis.navigation.alignment import require_alignable
-from procedures.analysis.reference import site_with
 from procedures.analysis.repeated_alignment import report as pictures
 from procedures.analysis.repeated_alignment.expected import (
     ANGLES,
@@ -42,15 +41,14 @@ from procedures.core.errors import BadParameter
 from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
-from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+from procedures.site_parameters import TableParameters, declared_table
 
 MOST_ALIGNMENTS = 500
 """Their errors' covariance is a full matrix."""
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
-Arcsec = Annotated[float, Field(ge=0.0, le=3600.0)]
 
 
 class Limits(Parameters):
@@ -60,7 +58,7 @@ class Limits(Parameters):
     prediction_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the errors' chi-square")
 
 
-class Params(Parameters):
+class Params(TableParameters):
     """Where, how long, how often. None takes the bench's value."""
 
     orientations: tuple[tuple[Angle, Angle, Angle], ...] = Field(
@@ -76,13 +74,6 @@ class Params(Parameters):
     )
     settle_s: float = Field(2.0, ge=0.0, le=86_400.0, description="at rest before the first sample")
     base_turn_arcsec: float = Field(0.0, ge=0.0, le=3600.0, description="turn of the base meanwhile, for thesis 1.1")
-    latitude_deg: float | None = Field(None, ge=-90.0, le=90.0)
-    gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9)
-    azimuth_deg: float | None = Field(None, ge=-360.0, le=360.0, description="heading of the table's zero")
-    azimuth_sd_arcsec: Arcsec | None = None
-    orthogonality_sd_arcsec: Arcsec | None = Field(None, description="of each of the table's two right angles")
-    pointing_sd_arcsec: Arcsec | None = Field(None, description="of each axis, anew at each alignment")
-    level_sd_arcsec: Arcsec | None = Field(None, description="of the outer axis about each horizontal direction")
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
 
@@ -98,17 +89,7 @@ class Result(Outcome):
 
 def resolve(params: Params, context: Context) -> Params:
     """Site and table accuracy from the bench."""
-    site, accuracy = context.bench.site, context.bench.accuracy
-    defaults = {
-        "latitude_deg": site.latitude_deg,
-        "gravity_m_s2": site.gravity_m_s2,
-        "azimuth_deg": site.azimuth_deg,
-        "azimuth_sd_arcsec": site.azimuth_sd_arcsec,
-        "orthogonality_sd_arcsec": accuracy.orthogonality_sd_arcsec,
-        "pointing_sd_arcsec": accuracy.pointing_sd_arcsec,
-        "level_sd_arcsec": accuracy.level_sd_arcsec,
-    }
-    return params.filled(defaults)
+    return params.filled(declared_table(context))
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
@@ -134,7 +115,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 def predict(params: Params, context: Context) -> Prediction:
     """Duration and the errors to expect. Refuses a pole, an attitude on end, and a unit without a calibration."""
     params = resolve(params, context)
-    site, stations, axes = _site(params, context), schedule(params), context.bench.axis_motion
+    site, stations, axes = params.site(context), schedule(params), context.bench.axis_motion
     require_alignable(site.latitude_deg)
     expected = expected_errors(planned_alignments(context.unit, site, _table(params), stations, axes))
     found = [_predicted(angle, expected) for angle in range(3)]
@@ -158,7 +139,7 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
     """Align from each recording's corrected means; judge all errors together. Raises as `predict`, `UnfitRecording`."""
     params = resolve(params, context)
-    site = _site(params, context)
+    site = params.site(context)
     plan = recorded_alignments(recordings, context.unit, site, _table(params))
     expected = expected_errors(plan)
     found = found_attitudes(recordings, plan)
@@ -185,11 +166,6 @@ def report(result: Result) -> Report:
         pictures.alignments_table(result.alignments),
     )
     return Report(f"{result.basis}. {pictures.sentence(result.angles[0], result.thesis)}", sections)
-
-
-def _site(params: Params, context: Context) -> Site:
-    p = params
-    return site_with(context.bench.site, p.latitude_deg, p.gravity_m_s2, p.azimuth_deg, p.azimuth_sd_arcsec)
 
 
 def _table(params: Params) -> TableUncertainty:

@@ -32,8 +32,8 @@ from procedures.core.report import Report
 from procedures.core.site import Site
 from procedures.core.turn import PEAK_ACCELERATION
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+from procedures.site_parameters import Arcsec
 
-Arcsec = Annotated[float, Field(ge=0.0, le=3600.0)]
 Rate = Annotated[float, Field(ge=0.1, le=3600.0)]
 
 ACCELERATION_SHARE = 0.9

@@ -14,7 +14,7 @@ from pydantic import Field
 from procedures import steps
 from procedures.analysis import calibration_report as pictures
 from procedures.analysis.calibration_plan import TriadPlan, basis, in_run_unresolved, triad_plan
-from procedures.analysis.reference import TRIAD_NAMES, site_with
+from procedures.analysis.reference import TRIAD_NAMES
 from procedures.analysis.station_means import launch_warnings
 from procedures.analysis.station_plan import windows
 from procedures.analysis.table_errors import TableUncertainty
@@ -32,9 +32,9 @@ from procedures.core.errors import BadParameter
 from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
-from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+from procedures.site_parameters import Arcsec, SiteParameters, declared_site
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 
@@ -50,7 +50,7 @@ class Limits(Parameters):
     prediction_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the errors' chi-square")
 
 
-class Params(Parameters):
+class Params(SiteParameters):
     """Where to look and what to hold the unit to. None takes the unit's or the bench's value."""
 
     orientations: tuple[tuple[Angle, Angle, Angle], ...] = Field(
@@ -58,12 +58,7 @@ class Params(Parameters):
     )
     dwell_s: float | None = Field(None, ge=1.0, le=86_400.0, description="None: the unit's averaging time")
     settle_s: float = Field(2.0, ge=0.0, le=3600.0)
-    latitude_deg: float | None = Field(None, ge=-90.0, le=90.0)
-    gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9)
-    azimuth_deg: float | None = Field(None, ge=-360.0, le=360.0, description="heading of the table's zero")
-    azimuth_sd_arcsec: float | None = Field(
-        None, ge=0.0, le=3600.0, description="kept with the result; no effect on it"
-    )
+    azimuth_sd_arcsec: Arcsec | None = Field(None, description="kept with the result; no effect on it")
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
 
@@ -75,15 +70,7 @@ class Result(Outcome):
 
 def resolve(params: Params, context: Context) -> Params:
     """Dwell from the unit; site from the bench."""
-    site = context.bench.site
-    defaults = {
-        "dwell_s": context.unit.averaging_time_s,
-        "latitude_deg": site.latitude_deg,
-        "gravity_m_s2": site.gravity_m_s2,
-        "azimuth_deg": site.azimuth_deg,
-        "azimuth_sd_arcsec": site.azimuth_sd_arcsec,
-    }
-    return params.filled(defaults)
+    return params.filled({"dwell_s": context.unit.averaging_time_s, **declared_site(context)})
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
@@ -122,7 +109,7 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
     """Magnitudes of the corrected station means of both triads."""
     params = resolve(params, context)
-    site = _site(params, context)
+    site = params.site(context)
     triads = tuple(verify_triad(recordings, triad, site, context.unit) for triad in TRIAD_NAMES)
     checks = tuple(c for t in triads for c in _checks(t, params.limits))
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
@@ -138,15 +125,10 @@ def report(result: Result) -> Report:
     return Report(sections=(table, *figures, *(pictures.station_table(m) for m in magnitudes)))
 
 
-def _site(params: Params, context: Context) -> Site:
-    p = params
-    return site_with(context.bench.site, p.latitude_deg, p.gravity_m_s2, p.azimuth_deg, p.azimuth_sd_arcsec)
-
-
 def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
     """Magnitudes do not see where the table really stands, so its uncertainty stays out."""
     calibration_of(context.unit, triad)
-    site = _site(params, context)
+    site = params.site(context)
     return triad_plan(triad, context.unit, schedule(params), context.bench.axis_motion, site, TableUncertainty())
 
 
