@@ -13,7 +13,8 @@ from bench_service.persistence.tables import IdempotencyKeyRow
 
 T = TypeVar("T")
 
-_RIVALS = 4
+_RIVALS = 32
+"""Each conflict means that some rival committed, so who has this many rivals at once still comes through."""
 
 
 def made_before(session: Session, idempotency: Idempotency | None, kind: str) -> str | None:
