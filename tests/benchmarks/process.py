@@ -23,13 +23,13 @@ class Service:
         self.client = client
         self.start_s = start_s
 
-    def finish(self, **body: object) -> dict:
-        """Submit a job and wait for its end."""
+    def finish(self, poll_s: float = 0.002, **body: object) -> dict:
+        """Submit a job and wait for its end, asking every `poll_s`: each answer takes its time from the job."""
         answer = self.client.post("/api/v1/jobs", json={"unit": "SIM-0001", **body})
         answer.raise_for_status()
         job = answer.json()
         while job["state"] in ("queued", "running"):
-            pause(0.002)
+            pause(poll_s)
             job = self.client.get(f"/api/v1/jobs/{job['id']}").json()
         assert job["state"] == "succeeded", job
         return job

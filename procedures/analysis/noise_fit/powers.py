@@ -67,7 +67,8 @@ def slow_powers(cells: Array, cell_s: float, *, flicker_band_s: FlickerBand = FL
     if np.all(y == y[0]):
         raise UnfitRecording(f"the channel is constant ({y[0]!r}): a stuck channel has no noise to analyse")
     coefficients = _cosines(y - np.mean(y))
-    expected = columns.cosine_powers(columns.covariances(n, cell_s, flicker_band_s))
+    # one process at a time: transforms of all four would be the largest thing in memory
+    expected = np.stack([columns.cosine_powers(gamma) for gamma in columns.covariances(n, cell_s, flicker_band_s)])
     expected[columns.QUANTIZATION] = columns.free_ended_quantization(n, cell_s)
     ends = np.zeros((2, n))
     ends[0, 0] = ends[1, -1] = 1.0
