@@ -29,6 +29,8 @@ CROSSOVER = 0.03
 the reading noise of all higher frequencies into theirs."""
 SLOW_MODES = 64
 """So many modes of the spectrum at least are taken from the cells."""
+LONG, AT_ONCE = 20_000_000, 2
+"""Of a recording of more samples than `LONG`, so many channels at once: memory is spared, and time spent reading."""
 FEWEST_A_CELL = 8
 """With fewer samples a cell nothing is gained by looking faster."""
 
@@ -47,10 +49,14 @@ def analyse_launch(recording: Recording, label: str, settings: LaunchSettings) -
     samples = cell_samples(info.rate_hz, settings.cell_s)
     parts: list[tuple[Deviation | None, Powers | None]] = [(None, None)] * len(names)
     if settings.fast and samples >= FEWEST_A_CELL:
-        try:
-            parts = _second_pass(recording, names, signals, settings, correlate=True)
-        except Uncorrelatable:
-            parts = _second_pass(recording, names, signals, settings, correlate=False)
+        size = len(names) if info.count <= LONG else AT_ONCE
+        parts = []
+        for i in range(0, len(names), size):
+            group = names[i : i + size], signals[i : i + size]
+            try:
+                parts += _second_pass(recording, *group, settings, correlate=True)
+            except Uncorrelatable:
+                parts += _second_pass(recording, *group, settings, correlate=False)
     channels = tuple(
         channel_noise(name, info.channels[info.column(name)].rate_unit, cells, signal, *part, findings[name], settings)
         for name, signal, part in zip(names, signals, parts, strict=True)
