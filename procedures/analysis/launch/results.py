@@ -19,7 +19,7 @@ class Reading:
     upper: float | None = None
     """Ends of the interval at the confidence asked for."""
     upper_limit: float | None = None
-    """Of a process that was not observed: it is below this at the same confidence, as far as that can be said."""
+    """The coefficient is below this with a probability of 95 % (one-sided), observed or not."""
     p_value: float | None = None
     """How probable the data are without the process."""
     from_s: float | None = None
