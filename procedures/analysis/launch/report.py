@@ -34,8 +34,8 @@ def side_by_side(summaries: Sequence[ChannelSummary], launches: Sequence[LaunchN
     ]
     columns = ("channel", "process", "unit", *(launch.label for launch in launches), "mean", "± standard uncertainty")
     note = (
-        "Efficient estimates. A dash: not observed; “<” is what it stays below (95 %). The mean counts a process that was not "
-        "observed as zero; its uncertainty is the greater of what the fits claim and what the launches scatter."
+        "Efficient estimates. A dash: not observed; “<” is what it stays below (95 %). The mean counts a process that "
+        "was not observed as zero; its uncertainty is the greater of what the fits claim and what the launches scatter."
     )
     return Table("Noise coefficients, launch by launch", columns, tuple(rows), note)
 
