@@ -60,12 +60,11 @@ class JobRunner:
         """While a person's stop stands, the job waits in its queue. Raises `ShuttingDown` when the service ends."""
         jobs, told = self._stores.jobs, False
         while True:
-            job = jobs.get(job_id)
-            stop = self._stores.units.bench_stop(job.bench)
-            if stop is None or job.state is not JobState.QUEUED:
+            stop = self._stores.units.bench_stop(self._driver.description.id)
+            if stop is None or jobs.get(job_id).state is not JobState.QUEUED:
                 return
             if not told:
-                jobs.note(job_id, "note", now(), {"text": f"bench {job.bench} is stopped: {stop.reason}"})
+                jobs.note(job_id, "note", now(), {"text": f"bench {stop.bench} is stopped: {stop.reason}"})
                 told = True
             if self._ending.wait(RELEASE_CHECK_S):
                 raise ShuttingDown

@@ -6,8 +6,6 @@ from procedures.core import units
 from procedures.core.recording import AXES
 from procedures.core.report import Figure, Series, Table
 
-TERM_LABELS = {"asymmetry": "asymmetry", "quadratic": "nonlinearity, quadratic", "cubic": "nonlinearity, cubic"}
-
 
 def coefficient_table(found: WholeTurns) -> Table:
     """Estimate ± standard uncertainty in the units people read; scale factors as departures from one [ppm]."""

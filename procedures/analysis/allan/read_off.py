@@ -24,14 +24,14 @@ TOLERANCE = 0.1
 SHARPEST = 0.125
 """A local slope with a greater standard deviation tells no line from the next."""
 
-# slope, and σ at τ = 1 s of a unit coefficient
-_LINES = {
+LINES = {
     "quantization": (-1.0, sqrt(3.0)),
     "random_walk": (-0.5, 1.0),
     "bias_instability": (0.0, sqrt(2.0 * log(2.0) / pi)),
     "rate_random_walk": (0.5, 1.0 / sqrt(3.0)),
     "rate_ramp": (1.0, 1.0 / sqrt(2.0)),
 }
+"""Slope, and σ at τ = 1 s of a unit coefficient."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def read_off(deviation: Deviation) -> ReadOff:
         raise BadParameter("statistic", deviation.statistic.name, "allan or overlapping_allan")
     tau, sigma, edf = deviation.tau_s, deviation.deviation, deviation.edf
     first, last, slope, sd = _local_slopes(tau, sigma, edf)
-    lines = {name: _line(tau, sigma, edf, first, last, slope, sd, *law) for name, law in _LINES.items()}
+    lines = {name: _line(tau, sigma, edf, first, last, slope, sd, *law) for name, law in LINES.items()}
     return ReadOff(**lines)
 
 

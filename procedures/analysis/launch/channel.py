@@ -22,7 +22,7 @@ from procedures.analysis.launch.results import (
     Stage,
 )
 from procedures.analysis.launch.settings import LaunchSettings
-from procedures.analysis.launch.signal import CleanSignal
+from procedures.analysis.launch.signal import CleanSignal, Step
 from procedures.analysis.noise_fit.comparison import compare
 from procedures.analysis.noise_fit.estimate import Estimate, NoiseFit
 from procedures.analysis.noise_fit.least_squares import fit_allan
@@ -54,9 +54,8 @@ def channel_noise(
     # from one cell on: what the notch filter leaves of the dither stands above the model at shorter times
     least_squares = fit_allan(whole, from_s=cell_s, level=settings.level, confidence=settings.confidence)
     likelihood = fit_noise(slow_powers(series, cell_s), powers, level=settings.level, confidence=settings.confidence)
-    stages = [*_stages(signal, cell_s, settings), *_split(series, cell_s, rate_unit, settings)]
-    last = len(signal.steps) - 1
-    stages[last] = replace(stages[last], curve=_curve(whole), readings=_values(graphical))
+    last = Stage(signal.steps[-1].name, _curve(whole), _values(graphical), signal.steps[-1].note)
+    stages = [*_stages(signal.steps[:-1], cell_s, settings), last, *_split(series, cell_s, rate_unit, settings)]
     return ChannelNoise(
         channel=name,
         rate_unit=rate_unit,
@@ -110,10 +109,10 @@ def _sizes(count: int, settings: LaunchSettings) -> Sizes:
     return decade_sizes(OVERLAPPING_ALLAN.largest(count), 1.0 / settings.points_per_decade)
 
 
-def _stages(signal: CleanSignal, cell_s: float, settings: LaunchSettings) -> list[Stage]:
+def _stages(steps: Sequence[Step], cell_s: float, settings: LaunchSettings) -> list[Stage]:
     """Each step's curve from one cell on, and what is read off it."""
     found: list[Stage] = []
-    for step in signal.steps:
+    for step in steps:
         curve = _deviation(step.cells, cell_s, settings)
         found.append(Stage(step.name, _curve(curve), _values(read_off(curve)), step.note))
     return found

@@ -1,8 +1,9 @@
 """Tables and figures of launches at rest: Tables 4.1 and 4.2, figures 4.1-4.7 of the thesis in our words."""
 
 from collections.abc import Sequence
-from math import log, pi, sqrt
+from math import sqrt
 
+from procedures.analysis.allan.read_off import LINES
 from procedures.analysis.launch.results import PROCESSES, ChannelNoise, Coefficient, LaunchNoise, Reading, Stage
 from procedures.analysis.launch.summary import ChannelSummary
 from procedures.core.report import Cell, Figure, Series, Table
@@ -14,13 +15,6 @@ TITLES = {
     "bias_instability": "bias instability B",
     "rate_random_walk": "rate random walk K",
     "rate_ramp": "rate ramp R",
-}
-_UNIT_LINE = {  # slope, and σ at 1 s of a unit coefficient (thesis 3.1)
-    "quantization": (-1.0, sqrt(3.0)),
-    "random_walk": (-0.5, 1.0),
-    "bias_instability": (0.0, sqrt(2.0 * log(2.0) / pi)),
-    "rate_random_walk": (0.5, 1.0 / sqrt(3.0)),
-    "rate_ramp": (1.0, 1.0 / sqrt(2.0)),
 }
 
 
@@ -170,7 +164,7 @@ def _stage_figure(channel: ChannelNoise, stages: Sequence[Stage], title: str) ->
 
 def _line(channel: ChannelNoise, coefficient: Coefficient, size: float) -> tuple[Series, ...]:
     """The line of a process over the times where it matters, and the point where it was read off the plot."""
-    slope, level = _UNIT_LINE[coefficient.process]
+    slope, level = LINES[coefficient.process]
     curve = channel.analysed.curve
     found: list[Series] = []
     value = coefficient.likelihood.value
