@@ -6,7 +6,7 @@ from alembic import context
 from sqlalchemy import Connection
 
 from bench_service.persistence.database import connect
-from bench_service.persistence.tables import Table
+from bench_service.persistence.tables_around_jobs import Table  # with them, every table is known
 from bench_service.settings import Settings
 
 

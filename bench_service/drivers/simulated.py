@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from bench_service.jobs.driver import TrueTriad
 from bench_service.jobs.errors import Misconfigured, NotMounted
 from bench_service.wall_clock import pause_async
-from procedures.bench import Bench, BenchDescription
+from procedures.bench import Bench, BenchDescription, BenchNeeds
 from procedures.core.unit import Unit
 from simulators.truth import (
     UnitTruth,
@@ -67,11 +67,12 @@ class SimulatedDriver:
             units.append(self._truth_of(serial))
         return tuple(declared_unit(unit) for unit in units)
 
-    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None) -> Bench:
+    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None, needs: BenchNeeds) -> Bench:
         """A world with that unit on the table, at its beginning or at a checkpoint."""
         from simulators.world import build  # with MuJoCo: not needed before a bench is opened
 
-        return build(self._config(unit, 0 if seed is None else seed), checkpoint)
+        config = replace(self._config(unit, 0 if seed is None else seed), sample_rate_hz=needs.sample_rate_hz)
+        return build(config, checkpoint)
 
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
         """Bias and matrix of the job's launch, run-to-run changes included."""

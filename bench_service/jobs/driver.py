@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from procedures.bench import Bench, BenchDescription
+from procedures.bench import Bench, BenchDescription, BenchNeeds
 from procedures.core.unit import Unit
 
 
@@ -27,7 +27,7 @@ class BenchDriver(Protocol):
         """The units that this bench can test, as declared; a simulated bench mounts some when they are asked for."""
         ...
 
-    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None) -> Bench:
+    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None, needs: BenchNeeds) -> Bench:
         """The bench with a unit on it; from a checkpoint, a simulated world goes on where it was.
 
         Raises `NotMounted`, `BenchError`.

@@ -86,6 +86,19 @@ class Job:
     """How often it was queued: once, and again at each resume."""
     deadline_at: datetime | None = None
     """No station begins later; the job then fails."""
+    queued_at: datetime | None = None
+    """When it came into its bench's queue, the last time."""
+    not_before: datetime | None = None
+    """It waits in the queue until then: the pause before an automatic retry."""
+    retries: int = 0
+    """How often a fault of the bench may be answered by trying again from the station that failed."""
+    retries_left: int = 0
+    reservation: str | None = None
+    """The reservation under which it runs; None: it waits while its bench or unit is reserved."""
+    requested_by: str = ""
+    """Who asked for it, as far as the client said."""
+    prompt: dict[str, Any] | None = None
+    """What a person at the bench is asked to do: {"text", "asked_at"}; None: nothing."""
     started_at: datetime | None = None
     finished_at: datetime | None = None
     result_id: str | None = None

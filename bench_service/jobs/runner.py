@@ -13,6 +13,7 @@ from bench_service.jobs.session import BenchSession, ShuttingDown
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import Idempotency, StoredResult
 from bench_service.wall_clock import new_id, now
+from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, Stopped
 from procedures.core.errors import DomainError
 from procedures.core.limits import Verdict
@@ -191,7 +192,7 @@ class JobRunner:
             return self._session
         self._stores.recordings.interrupt_open(job.id)
         checkpoint = self._stores.recordings.checkpoint(job.id)
-        bench = self._driver.open(job.unit, job.seed, checkpoint)
+        bench = self._driver.open(job.unit, job.seed, checkpoint, BenchNeeds.of(job.stations))
         self._session = BenchSession(
             job,
             self._planner.procedure(job.procedure),

@@ -98,6 +98,7 @@ class JobRow(Table):
         Index("ix_jobs_state_id", "state", "id"),
         Index("ix_jobs_procedure_id", "procedure", "id"),
         Index("ix_jobs_unit_id", "unit", "id"),
+        Index("ix_jobs_bench_state", "bench", "state"),
     )
 
     id: Mapped[str] = mapped_column(Id, primary_key=True)
@@ -123,6 +124,13 @@ class JobRow(Table):
     pause_requested: Mapped[bool]
     attempt: Mapped[int]
     deadline_at: Mapped[datetime | None]
+    queued_at: Mapped[datetime | None]
+    not_before: Mapped[datetime | None]
+    retries: Mapped[int]
+    retries_left: Mapped[int]
+    reservation: Mapped[str | None] = mapped_column(Id)
+    requested_by: Mapped[str]
+    prompt: Mapped[dict[str, Any] | None] = mapped_column(Document)
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
     result_id: Mapped[str | None] = mapped_column(Id)
@@ -247,6 +255,37 @@ class ResultCalibrationRow(Table):
     result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"), primary_key=True)
     position: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
     calibration_id: Mapped[str] = mapped_column(Id, ForeignKey("calibrations.id"))
+
+
+class CorrectionRow(Table):
+    __tablename__ = "corrections"
+    __table_args__ = (
+        Index("ix_corrections_unit_id", "unit", "id"),
+        Index(
+            "uq_corrections_current_unit",
+            "unit",
+            unique=True,
+            sqlite_where=text("is_current"),
+            postgresql_where=text("is_current"),
+        ),
+    )
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    unit: Mapped[str]
+    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"))
+    made_at: Mapped[datetime]
+    is_current: Mapped[bool]
+    simulated: Mapped[bool]
+    document: Mapped[dict[str, Any]]
+
+
+class ResultCorrectionRow(Table):
+    __tablename__ = "result_corrections"
+    __table_args__ = (Index("ix_result_corrections_correction_id", "correction_id"),)
+
+    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"), primary_key=True)
+    position: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    correction_id: Mapped[str] = mapped_column(Id, ForeignKey("corrections.id"))
 
 
 class IdempotencyKeyRow(Table):

@@ -3,32 +3,41 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+from procedures.bench.chamber import Chamber
 from procedures.bench.clock import Clock
 from procedures.bench.description import BenchDescription
 from procedures.bench.imu import Imu
+from procedures.bench.needs import BenchNeeds
+from procedures.bench.operator import Operator
 from procedures.bench.supply import Supply
 from procedures.bench.turntable import Turntable
 
-__all__ = ["Bench", "BenchDescription", "Clock", "Imu", "Supply", "Turntable"]
+__all__ = ["Bench", "BenchDescription", "BenchNeeds", "Chamber", "Clock", "Imu", "Operator", "Supply", "Turntable"]
 
 
 @dataclass
 class Bench:
-    """The devices around one unit, and the one way to leave them safe. A chamber joins with the thermal cycle."""
+    """The devices around one unit, and the one way to leave them safe; `chamber` is None where there is none."""
 
     description: BenchDescription
     clock: Clock
     turntable: Turntable
     imu: Imu
     supply: Supply
-    _devices: tuple[str, ...] = field(default=("turntable", "supply"), repr=False)
+    chamber: Chamber | None = None
+    operator: Operator | None = None
+    _devices: tuple[str, ...] = field(default=("turntable", "chamber", "supply"), repr=False)
 
     async def make_safe(self) -> None:
-        """Stop the table, switch the unit off. Every device is tried; raises an `ExceptionGroup` of what failed."""
+        """Stop the table, lead the chamber to ambient, switch the unit off.
+
+        Every device is tried; raises an `ExceptionGroup` of what failed.
+        """
         failures: list[Exception] = []
         for device in self._devices:
             try:
-                await getattr(self, device).make_safe()
+                if (there := getattr(self, device)) is not None:
+                    await there.make_safe()
             except Exception as failure:
                 failures.append(failure)
         if failures:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from procedures.bench.chamber import ChamberLimits
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import AxisName, Turn
@@ -45,6 +46,8 @@ class BenchDescription:
     accuracy: TableAccuracy
     simulated: bool
     title: str = ""
+    chamber: ChamberLimits | None = None
+    """None: the bench has no thermal chamber."""
 
     @property
     def axis_motion(self) -> tuple[tuple[float, float], ...]:

@@ -89,6 +89,10 @@ class Station:
     """Above zero: the unit is switched off for so long before, so that the station is a launch of its own."""
     turn: Turn | None = None
     """Whole turns of one axis that begin with the recording and are over, at rest again, before its end; None: none."""
+    temperatures: bool = False
+    """Whether the unit's temperature sensors are recorded beside its triads."""
+    sample_rate_hz: float | None = None
+    """How often the unit is to send; None: its own rate. The same for all stations of a job."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
 from bench_service.jobs.worker import Worker
 from bench_service.persistence import open_stores
-from procedures.bench import Bench
+from procedures.bench import Bench, BenchNeeds
 from procedures.bench.errors import DeviceFault
 from tests.service.client import FAST
 
@@ -33,8 +33,8 @@ class IdleEngine:
 class JammedDriver(SimulatedDriver):
     """A bench whose table does not obey the last demand."""
 
-    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None) -> Bench:
-        bench = super().open(unit, seed, checkpoint)
+    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None, needs: BenchNeeds) -> Bench:
+        bench = super().open(unit, seed, checkpoint, needs)
 
         async def refuse() -> None:
             raise DeviceFault("the table's brake does not close")

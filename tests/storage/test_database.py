@@ -22,7 +22,8 @@ from bench_service.jobs.store import RecordingWriter, Stores
 from bench_service.jobs.stored import NewRecording, RecordingState
 from bench_service.persistence import Database, open_stores
 from bench_service.persistence.database import connect
-from bench_service.persistence.tables import ChunkRow, RecordingRow, Table
+from bench_service.persistence.tables import ChunkRow, RecordingRow
+from bench_service.persistence.tables_around_jobs import Table
 from bench_service.wall_clock import now
 from procedures.core.recording import RawArray
 
