@@ -257,37 +257,6 @@ class ResultCalibrationRow(Table):
     calibration_id: Mapped[str] = mapped_column(Id, ForeignKey("calibrations.id"))
 
 
-class CorrectionRow(Table):
-    __tablename__ = "corrections"
-    __table_args__ = (
-        Index("ix_corrections_unit_id", "unit", "id"),
-        Index(
-            "uq_corrections_current_unit",
-            "unit",
-            unique=True,
-            sqlite_where=text("is_current"),
-            postgresql_where=text("is_current"),
-        ),
-    )
-
-    id: Mapped[str] = mapped_column(Id, primary_key=True)
-    unit: Mapped[str]
-    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"))
-    made_at: Mapped[datetime]
-    is_current: Mapped[bool]
-    simulated: Mapped[bool]
-    document: Mapped[dict[str, Any]]
-
-
-class ResultCorrectionRow(Table):
-    __tablename__ = "result_corrections"
-    __table_args__ = (Index("ix_result_corrections_correction_id", "correction_id"),)
-
-    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"), primary_key=True)
-    position: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
-    correction_id: Mapped[str] = mapped_column(Id, ForeignKey("corrections.id"))
-
-
 class IdempotencyKeyRow(Table):
     """A client's key, what was asked with it, and the id of what it made."""
 

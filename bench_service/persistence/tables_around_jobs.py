@@ -1,14 +1,27 @@
-"""The tables around jobs: reservations, live state, audit, campaigns and schedules. See `tables` for the manner."""
+"""The tables around jobs: reservations, live state, audit, campaigns and schedules, corrections.
+
+See `tables` for the manner.
+"""
 
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Index
+from sqlalchemy import ForeignKey, Index, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from bench_service.persistence.tables import Id, Table
 
-__all__ = ["AuditRow", "BenchLiveRow", "CampaignRow", "CampaignRunRow", "ReservationRow", "ScheduleRow", "Table"]
+__all__ = [
+    "AuditRow",
+    "BenchLiveRow",
+    "CampaignRow",
+    "CampaignRunRow",
+    "CorrectionRow",
+    "ReservationRow",
+    "ResultCorrectionRow",
+    "ScheduleRow",
+    "Table",
+]
 
 
 class ReservationRow(Table):
@@ -98,3 +111,40 @@ class ScheduleRow(Table):
     next_at: Mapped[datetime | None]
     last_at: Mapped[datetime | None]
     document: Mapped[dict[str, Any]]
+
+
+class CorrectionRow(Table):
+    """A correction set of a unit, of the kind "thermal" or "converter"; one of a kind is current."""
+
+    __tablename__ = "corrections"
+    __table_args__ = (
+        Index("ix_corrections_unit_id", "unit", "id"),
+        Index(
+            "uq_corrections_current_unit_kind",
+            "unit",
+            "kind",
+            unique=True,
+            sqlite_where=text("is_current"),
+            postgresql_where=text("is_current"),
+        ),
+    )
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    unit: Mapped[str]
+    kind: Mapped[str]
+    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"))
+    made_at: Mapped[datetime]
+    is_current: Mapped[bool]
+    simulated: Mapped[bool]
+    document: Mapped[dict[str, Any]]
+
+
+class ResultCorrectionRow(Table):
+    """Which correction sets a result used."""
+
+    __tablename__ = "result_corrections"
+    __table_args__ = (Index("ix_result_corrections_correction_id", "correction_id"),)
+
+    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"), primary_key=True)
+    position: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    correction_id: Mapped[str] = mapped_column(Id, ForeignKey("corrections.id"))

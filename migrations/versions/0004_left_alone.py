@@ -115,6 +115,7 @@ def _corrections() -> None:
         "corrections",
         sa.Column("id", ID, nullable=False),
         sa.Column("unit", sa.String(), nullable=False),
+        sa.Column("kind", sa.String(), nullable=False),
         sa.Column("result_id", ID, nullable=False),
         sa.Column("made_at", MOMENT, nullable=False),
         sa.Column("is_current", sa.Boolean(), nullable=False),
@@ -125,9 +126,9 @@ def _corrections() -> None:
     )
     op.create_index("ix_corrections_unit_id", "corrections", ["unit", "id"])
     op.create_index(
-        "uq_corrections_current_unit",
+        "uq_corrections_current_unit_kind",
         "corrections",
-        ["unit"],
+        ["unit", "kind"],
         unique=True,
         sqlite_where=sa.text("is_current"),
         postgresql_where=sa.text("is_current"),

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from procedures.analysis.thermal.correction import AxisCorrection, Form, ThermalCorrection
 from procedures.analysis.thermal.fit import fit_axis, fit_correction
 from procedures.analysis.thermal.runs import ThermalRun, thermal_run, without_lag
 from procedures.core.errors import BadParameter, Undetermined, UnfitRecording
+from procedures.core.thermal_correction import AxisCorrection, Form, ThermalCorrection
 
 G = 9.81
 CELL_S = 60.0

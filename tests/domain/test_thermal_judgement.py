@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.stats import binom, kstest, norm, pearsonr
 
-from procedures.analysis.thermal.correction import AxisCorrection, ThermalCorrection
 from procedures.analysis.thermal.correlation import correlation
 from procedures.analysis.thermal.judgement import Soak, magnitude, nearest, soaks, three_sigma
 from procedures.analysis.thermal.runs import ThermalRun
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.noise import NoiseCoefficients
+from procedures.core.thermal_correction import AxisCorrection, ThermalCorrection
 
 N, CELL_S = 512, 60.0
 TEMPERATURE = 20.0 + 40.0 * np.sin(2 * np.pi * np.arange(N) / N) + 10.0 * np.cos(4 * np.pi * np.arange(N) / N)

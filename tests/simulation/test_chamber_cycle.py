@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from procedures.analysis.thermal.correction import Form
 from procedures.analysis.thermal.correlation import correlation
 from procedures.analysis.thermal.fit import fit_correction
 from procedures.analysis.thermal.regime import RegimeSettings, regimes
 from procedures.analysis.thermal.runs import ThermalRun
+from procedures.core.thermal_correction import Form
 from simulators.truth.thermal import UnitThermalTruth
 from tests.validation.thermal_population import (
     AFTER,

@@ -16,7 +16,7 @@ from rich.progress import track
 from rich.table import Table
 from scipy.stats import binom, norm
 
-from procedures.analysis.thermal.correction import COEFFICIENTS, Form
+from procedures.core.thermal_correction import COEFFICIENTS, Form
 from simulators.truth import Array
 from simulators.truth.thermal import UnitThermalTruth
 from tests.validation.judgement import Check

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from procedures.analysis.thermal.correction import Form, ThermalCorrection
 from procedures.analysis.thermal.correlation import Correlation, correlation
 from procedures.analysis.thermal.fit import AxisFit, fit_correction
 from procedures.analysis.thermal.judgement import magnitude, nearest, soaks, three_sigma
 from procedures.analysis.thermal.runs import ThermalRun
 from procedures.core import units
 from procedures.core.noise import NoiseCoefficients
+from procedures.core.thermal_correction import Form, ThermalCorrection
 from simulators.chamber.behaviour import gyros
 from simulators.truth import Array, keyed_generator
 from simulators.truth.thermal import GyroThermalTruth, UnitThermalTruth, random_thermal_truth

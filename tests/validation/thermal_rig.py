@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import lfilter
 
-from procedures.analysis.thermal.converter import ConverterModel, converter_model
+from procedures.analysis.thermal.converter import converter_model
 from procedures.analysis.thermal.regime import RegimeSettings
 from procedures.analysis.thermal.runs import ThermalRun, thermal_run, without_lag
 from procedures.core import units
+from procedures.core.converter import ConverterModel
 from simulators.chamber.behaviour import MA_PER_NOMINAL, converter_codes, response
 from simulators.chamber.plant import ChamberPlant
 from simulators.chamber.thermometers import Thermometers

@@ -7,10 +7,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from procedures.analysis.thermal.normalised import Normalised, fit_normalised
+from procedures.analysis.thermal.normalised import fit_normalised
 from procedures.core.arrays import Array
+from procedures.core.converter import ConverterModel
 from procedures.core.errors import BadParameter, UnfitRecording
 
 
@@ -37,24 +37,6 @@ def zero_and_scale(current_ma: float, plus_code: Array, minus_code: Array) -> Ze
         raise UnfitRecording("the converter answers opposite currents with the same code")
     scale = centred / current_ma
     return ZeroAndScale(zero, scale, zero / scale)
-
-
-@dataclass(frozen=True)
-class ConverterModel:
-    """``N(I, t) = K0·Fc(t)·I + N0 + Fs(t)`` of one channel, t its own sensor's reading."""
-
-    scale: Normalised
-    """K0 [codes a mA] and Fc."""
-    zero: Normalised
-    """N0 [codes] and Fs."""
-
-    def code(self, current_ma: ArrayLike, temperature_c: Array) -> Array:
-        """What the channel would send, before it is a whole number, at temperatures (n,) [°C]."""
-        return self.scale.value(temperature_c) * np.asarray(current_ma) + self.zero.value(temperature_c)
-
-    def current_ma(self, code: Array, temperature_c: Array) -> Array:
-        """Input current of codes (n,) at temperatures (n,): what stage two is given."""
-        return (code - self.zero.value(temperature_c)) / self.scale.value(temperature_c)
 
 
 def converter_model(

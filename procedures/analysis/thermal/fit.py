@@ -13,7 +13,12 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from procedures.analysis.determination import require_full_rank
-from procedures.analysis.thermal.correction import (
+from procedures.analysis.thermal.correlated import LinearFit, fit_linear, whiten
+from procedures.analysis.thermal.runs import AXES, ThermalRun
+from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.noise import NoiseCoefficients
+from procedures.core.thermal_correction import (
     COEFFICIENTS,
     POWERS_OF_ALPHA,
     POWERS_OF_BETA,
@@ -23,11 +28,6 @@ from procedures.analysis.thermal.correction import (
     acting,
     terms,
 )
-from procedures.analysis.thermal.correlated import LinearFit, fit_linear, whiten
-from procedures.analysis.thermal.runs import AXES, ThermalRun
-from procedures.core.arrays import Array
-from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.noise import NoiseCoefficients
 
 PASSES = 3
 """Gauss–Newton: the model is linear but for a scale that moves by parts in a hundred."""

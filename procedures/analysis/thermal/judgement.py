@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from procedures.analysis.thermal.correction import ThermalCorrection
 from procedures.analysis.thermal.runs import ThermalRun
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.thermal_correction import ThermalCorrection
 
 
 @dataclass(frozen=True)

@@ -5,44 +5,12 @@ departure from it. C writes the zero's change as its largest in the range times 
 (`Normalised.largest_change`).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from procedures.analysis.determination import require_full_rank
 from procedures.core.arrays import Array
+from procedures.core.converter import Normalised
 from procedures.core.errors import BadParameter, UnfitRecording
-
-
-@dataclass(frozen=True)
-class Normalised:
-    """``value(t) = value_0·F(t)`` with F(t_0) = 1, or ``value_0 + F(t)`` with F(t_0) = 0: the kind says which."""
-
-    relative: bool
-    reference_c: float
-    at_reference: float
-    """value_0, in the unit of the values."""
-    coefficients: tuple[float, ...]
-    """a_1 … a_q of F, in 1/°C^k, or in the unit of the values a °C^k."""
-    covariance: tuple[tuple[float, ...], ...]
-    """Of value_0, a_1 … a_q, (q + 1, q + 1)."""
-    residual_sd: float
-
-    def function(self, temperature_c: Array) -> Array:
-        """F at temperatures (n,): 1 or 0 at the reference."""
-        departure = temperature_c - self.reference_c
-        powers = [a * departure ** (k + 1) for k, a in enumerate(self.coefficients)]
-        return np.sum(powers, axis=0) + (1.0 if self.relative else 0.0)
-
-    def value(self, temperature_c: Array) -> Array:
-        """The whole value at temperatures (n,)."""
-        f = self.function(temperature_c)
-        return self.at_reference * f if self.relative else self.at_reference + f
-
-    def largest_change(self, low_c: float, high_c: float) -> float:
-        """C's Δmax: the largest change from the reference within a range [°C], in the unit of the values."""
-        grid = np.linspace(low_c, high_c, 1001)
-        return float(np.max(np.abs(self.value(grid) - self.at_reference)))
 
 
 def fit_normalised(temperature_c: Array, values: Array, reference_c: float, order: int, relative: bool) -> Normalised:

@@ -1,0 +1,60 @@
+"""The signal converter of one accelerometer channel over temperature (thesis 3.8-3.13, paper C): the model alone.
+
+``N(I, t) = K0·Fc(t)·I + N0 + Fs(t)`` with Fc = 1 and Fs = 0 at the reference, t the converter's own sensor.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from procedures.core.arrays import Array
+
+
+@dataclass(frozen=True)
+class Normalised:
+    """``value(t) = value_0·F(t)`` with F(t_0) = 1, or ``value_0 + F(t)`` with F(t_0) = 0: the kind says which."""
+
+    relative: bool
+    reference_c: float
+    at_reference: float
+    """value_0, in the unit of the values."""
+    coefficients: tuple[float, ...]
+    """a_1 … a_q of F, in 1/°C^k, or in the unit of the values a °C^k."""
+    covariance: tuple[tuple[float, ...], ...]
+    """Of value_0, a_1 … a_q, (q + 1, q + 1)."""
+    residual_sd: float
+
+    def function(self, temperature_c: Array) -> Array:
+        """F at temperatures (n,): 1 or 0 at the reference."""
+        departure = temperature_c - self.reference_c
+        powers = [a * departure ** (k + 1) for k, a in enumerate(self.coefficients)]
+        return np.sum(powers, axis=0) + (1.0 if self.relative else 0.0)
+
+    def value(self, temperature_c: Array) -> Array:
+        """The whole value at temperatures (n,)."""
+        f = self.function(temperature_c)
+        return self.at_reference * f if self.relative else self.at_reference + f
+
+    def largest_change(self, low_c: float, high_c: float) -> float:
+        """C's Δmax: the largest change from the reference within a range [°C], in the unit of the values."""
+        grid = np.linspace(low_c, high_c, 1001)
+        return float(np.max(np.abs(self.value(grid) - self.at_reference)))
+
+
+@dataclass(frozen=True)
+class ConverterModel:
+    """``N(I, t) = K0·Fc(t)·I + N0 + Fs(t)`` of one channel, t its own sensor's reading."""
+
+    scale: Normalised
+    """K0 [codes a mA] and Fc."""
+    zero: Normalised
+    """N0 [codes] and Fs."""
+
+    def code(self, current_ma: ArrayLike, temperature_c: Array) -> Array:
+        """What the channel would send, before it is a whole number, at temperatures (n,) [°C]."""
+        return self.scale.value(temperature_c) * np.asarray(current_ma) + self.zero.value(temperature_c)
+
+    def current_ma(self, code: Array, temperature_c: Array) -> Array:
+        """Input current of codes (n,) at temperatures (n,): what stage two is given."""
+        return (code - self.zero.value(temperature_c)) / self.scale.value(temperature_c)
