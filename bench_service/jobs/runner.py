@@ -197,7 +197,7 @@ class JobRunner:
             return self._session
         self._stores.recordings.interrupt_open(job.id)
         checkpoint = self._stores.recordings.checkpoint(job.id)
-        bench = self._driver.open(job.unit, job.seed, checkpoint, BenchNeeds.of(job.stations))
+        bench = self._driver.open(job.unit, job.seed, checkpoint, BenchNeeds.of(job.stations), job.id)
         self._session = BenchSession(
             job,
             self._planner.procedure(job.procedure),
