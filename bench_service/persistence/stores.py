@@ -1,8 +1,9 @@
-"""Putting the stores together: one database, four stores. Must not know who uses them."""
+"""Putting the stores together: one database, all stores. Must not know who uses them."""
 
 from bench_service.jobs.store import Stores
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.job_store import SqlJobStore
+from bench_service.persistence.live_store import SqlLiveStore
 from bench_service.persistence.migration import upgrade_to_head
 from bench_service.persistence.recording_store import SqlRecordingStore
 from bench_service.persistence.result_store import SqlResultStore
@@ -27,4 +28,5 @@ def stores_of(database: Database) -> Stores:
         recordings=SqlRecordingStore(database),
         results=SqlResultStore(database),
         units=SqlUnitStore(database),
+        live=SqlLiveStore(database),
     )
