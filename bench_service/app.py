@@ -9,11 +9,13 @@ from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
-from bench_service.api import analyses, benches, errors, health, jobs, procedures, recordings, units
+from bench_service.api import analyses, benches, errors, event_stream, health, jobs, procedures, recordings, units
 from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs.code_version import code_version
+from bench_service.jobs.event_hub import EventHub
+from bench_service.jobs.live import Heartbeat, LiveBoard
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.service import BenchService
@@ -39,11 +41,17 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     planner = Planner(stores, driver)
     code = code_version()
     worker: Worker | None = None
+    board = LiveBoard(stores.live)
     if drive:
         lease = acquire_lease(settings.database_url, settings.bench_id)
         closing.callback(lease.release)
-        worker = Worker(JobRunner(stores, planner, driver, code, lease.held), partial(_engine, settings, stores))
-    service = BenchService(stores, driver, planner, worker, code)
+        board = LiveBoard(stores.live, settings.bench_id)
+        heartbeat = Heartbeat(board, stores.live)
+        heartbeat.begin()
+        closing.callback(heartbeat.end)
+        runner = JobRunner(stores, planner, driver, code, lease.held, board)
+        worker = Worker(runner, partial(_engine, settings, stores))
+    service = BenchService(stores, driver, planner, worker, code, board)
     closing.callback(service.stop)
     service.register()
     return service
@@ -84,6 +92,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.service = service
+    app.state.hub = EventHub(service.stores.jobs, service.live, event_stream.FRAMES)
     app.state.max_import_bytes = max_import_bytes
     for module in ROUTERS:
         app.include_router(module.router)

@@ -8,6 +8,8 @@ from typing import Any
 from bench_service.jobs.driver import BenchDriver
 from bench_service.jobs.errors import IllegalTransition, ServiceError
 from bench_service.jobs.job import FINAL, Failure, Job, JobState
+from bench_service.jobs.live import LiveBoard
+from bench_service.jobs.live_tap import LiveTap
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
 from bench_service.jobs.session import BenchSession, ShuttingDown
 from bench_service.jobs.store import Stores
@@ -49,13 +51,18 @@ class JobRunner:
         driver: BenchDriver,
         code_version: str,
         lease_held: Callable[[], bool],
+        live: LiveBoard | None = None,
     ) -> None:
-        """`lease_held`: whether this process still has the right to drive the bench; asked before every station."""
+        """`lease_held`: whether this process still has the right to drive the bench; asked before every station.
+
+        `live`: where it is said what the bench does; None: nowhere.
+        """
         self._stores = stores
         self._planner = planner
         self._driver = driver
         self._code_version = code_version
         self._lease_held = lease_held
+        self._live = live
         self._session: BenchSession | None = None
         self._ending = Event()
 
@@ -204,6 +211,7 @@ class JobRunner:
             bench,
             self._stores.recordings,
             lambda: self._stores.jobs.cancel_requested(job.id),
+            None if self._live is None else LiveTap(job, bench, self._live),
         )
         return self._session
 

@@ -8,6 +8,7 @@ from bench_service.jobs.analyses import AnalysisDesk
 from bench_service.jobs.driver import BenchDriver, TrueTriad
 from bench_service.jobs.errors import IllegalTransition, NotDriving, NotFound
 from bench_service.jobs.job import Job, JobState
+from bench_service.jobs.live import LiveBoard
 from bench_service.jobs.planning import CONTEXT, Plan, Planner, register
 from bench_service.jobs.request import JobRequest, fingerprint
 from bench_service.jobs.store import Stores
@@ -31,7 +32,9 @@ class BenchService:
         planner: Planner,
         worker: Worker | None,
         code_version: str,
+        live: LiveBoard | None = None,
     ) -> None:
+        self.live = live or LiveBoard(stores.live)
         self.stores = stores
         self.driver = driver
         self.planner = planner

@@ -4,6 +4,7 @@ Every change reads the job's row under a lock (`FOR UPDATE`; on SQLite the writi
 processes that want different ends for one job, one wins and the other is told `IllegalTransition`.
 """
 
+from collections.abc import Callable
 from datetime import datetime
 from typing import Any
 
@@ -13,7 +14,7 @@ from sqlalchemy.orm import Session
 from bench_service.jobs.errors import IllegalTransition, NotFound
 from bench_service.jobs.job import FINAL, LEGAL, Event, Failure, Job, JobState
 from bench_service.jobs.stored import Idempotency, Page
-from bench_service.persistence.database import Database
+from bench_service.persistence.database import Database, announce
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.job_rows import event_of_row, failure_document, job_of_row, row_of_job
 from bench_service.persistence.pages import page
@@ -171,6 +172,17 @@ class SqlJobStore:
                 raise NotFound("job", job_id)
         return events
 
+    def last_event(self, job_id: str) -> tuple[int, JobState]:
+        newest = select(func.max(EventRow.sequence)).where(EventRow.job_id == job_id).scalar_subquery()
+        with self._database.read() as session:
+            row = session.execute(select(newest, JobRow.state).where(JobRow.id == job_id)).one_or_none()
+        if row is None:
+            raise NotFound("job", job_id)
+        return row[0] or 0, JobState(row[1])
+
+    def on_event(self, tell: Callable[[str], None]) -> None:
+        self._database.on_news(tell)
+
 
 def _found(session: Session, job_id: str, *, lock: bool = False) -> JobRow:
     query = select(JobRow).where(JobRow.id == job_id)
@@ -219,3 +231,4 @@ def _append(session: Session, job_id: str, kind: str, at: datetime, data: dict[s
     last = session.scalar(select(func.max(EventRow.sequence)).where(EventRow.job_id == job_id)) or 0
     session.add(EventRow(job_id=job_id, sequence=last + 1, at=at, kind=kind, data=data))
     session.flush()
+    announce(session, job_id)
