@@ -28,7 +28,7 @@ class Settings(BaseModel):
     real_time_factor: float | None = Field(None, gt=0)
     """Simulated seconds per real second; None: as fast as the machine allows."""
     poll_s: float = Field(0.1, gt=0, le=10)
-    """How often the job engine looks for queued work."""
+    """How often a worker looks for jobs that other processes queued; its own it sees at once."""
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported."""
 
