@@ -10,6 +10,8 @@ from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
 from bench_service.api import analyses, benches, errors, health, jobs, procedures, recordings, units
+from bench_service.drivers.device_faults import FaultPlan
+from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs.code_version import code_version
 from bench_service.jobs.dispatcher import Dispatcher, JobEngine
@@ -32,7 +34,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     Raises `BenchBusy`, `StorageFailure`, `NotMounted`.
     """
     threadpool_limits(1)  # our matrices have at most 72 rows: BLAS threads would only spin against the bench's own
-    driver = SimulatedDriver(settings.bench_id, settings.unit_truth, settings.bench_truth, settings.real_time_factor)
+    driver = _driver(settings)
     stores, database = open_stores(settings.database_url)
     closing.callback(database.dispose)
     planner = Planner(stores, driver)
@@ -47,6 +49,14 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     closing.callback(service.stop)
     service.register()
     return service
+
+
+def _driver(settings: Settings) -> SimulatedDriver:
+    """The bench, with what its devices remember."""
+    register = DeviceRegister(settings.devices_in(), settings.bench_id)
+    faults = None if settings.device_faults is None else FaultPlan.parse(settings.device_faults)
+    truths = settings.unit_truth, settings.bench_truth
+    return SimulatedDriver(settings.bench_id, *truths, settings.real_time_factor, register, faults)
 
 
 def _engine(settings: Settings, runner: JobRunner) -> JobEngine:

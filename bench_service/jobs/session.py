@@ -67,10 +67,11 @@ class BenchSession:
         asyncio.run_coroutine_threadsafe(self._make_safe(), self._loop).result()
 
     def close(self) -> None:
-        """End the thread. The bench must be safe by now."""
+        """End the thread, and give the devices' links back. The bench must be safe by now."""
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
+        self._bench.close()
 
     def _wait(self, future: "Future[T]") -> T:
         while True:

@@ -48,8 +48,15 @@ class IdleDispatcher:
 class JammedDriver(SimulatedDriver):
     """A bench whose table does not obey the last demand."""
 
-    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None, needs: BenchNeeds) -> Bench:
-        bench = super().open(unit, seed, checkpoint, needs)
+    def open(
+        self,
+        unit: str,
+        seed: int | None,
+        checkpoint: dict[str, Any] | None,
+        needs: BenchNeeds,
+        job: str | None = None,
+    ) -> Bench:
+        bench = super().open(unit, seed, checkpoint, needs, job)
 
         async def refuse() -> None:
             raise DeviceFault("the table's brake does not close")
