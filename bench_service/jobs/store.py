@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from bench_service.jobs.corrections import CorrectionStore
 from bench_service.jobs.job import Event, Failure, Job, JobState
 from bench_service.jobs.live import LiveStore
+from bench_service.jobs.queue import QueueStore
+from bench_service.jobs.reservation import ReservationStore
 from bench_service.jobs.stored import (
     BenchStop,
     Idempotency,
@@ -265,6 +267,8 @@ class Stores:
     """All memory of one service."""
 
     jobs: JobStore
+    queue: QueueStore
+    reservations: ReservationStore
     recordings: RecordingStore
     results: ResultStore
     units: UnitStore
