@@ -16,11 +16,13 @@ from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs.code_version import code_version
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
+from bench_service.jobs.safety import SafetyDesk
 from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
 from bench_service.jobs.worker import JobEngine, Worker
 from bench_service.pages import figures, routes
 from bench_service.persistence import acquire_lease, engine_database, open_stores
+from bench_service.persistence.host_files import HostFiles
 from bench_service.settings import Settings
 
 ROUTERS = (procedures, jobs, recordings, analyses, units, benches, health)
@@ -36,14 +38,17 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     driver = _driver(settings)
     stores, database = open_stores(settings.database_url)
     closing.callback(database.dispose)
+    files = HostFiles(settings.devices_in(), settings.bench_id)
     planner = Planner(stores, driver)
     code = code_version()
     worker: Worker | None = None
     if drive:
         lease = acquire_lease(settings.database_url, settings.bench_id)
         closing.callback(lease.release)
+        files.begin_driving()
+        closing.callback(files.end_driving)
         worker = Worker(JobRunner(stores, planner, driver, code, lease.held), partial(_engine, settings, stores))
-    service = BenchService(stores, driver, planner, worker, code)
+    service = BenchService(stores, driver, planner, worker, code, SafetyDesk(stores, driver, files))
     closing.callback(service.stop)
     service.register()
     return service

@@ -11,7 +11,7 @@ from bench_service.jobs.job import FINAL, Failure, Job, JobState
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
 from bench_service.jobs.session import BenchSession, ShuttingDown
 from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import Idempotency, StoredResult
+from bench_service.jobs.stored import BenchStop, Idempotency, StoredResult
 from bench_service.wall_clock import new_id, now
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, Stopped
@@ -99,7 +99,7 @@ class JobRunner:
             jobs.station_done(job_id, index, now(), {})
             return StepOutcome()
         job = jobs.get(job_id)
-        if job.cancel_requested or job.state in FINAL:
+        if job.cancel_requested or job.state in FINAL or self._stop_wanted(job_id):
             return StepOutcome(cancelled=True)
         if job.pause_requested:
             return StepOutcome(paused=True)
@@ -184,8 +184,14 @@ class JobRunner:
 
     def _not_safe(self, job_id: str, why: str) -> StepOutcome:
         text = f"the bench could not be made safe: {why}"
+        self._stores.units.stop_bench(BenchStop(self._driver.description.id, now(), f"could not be made safe: {why}"))
         self._stores.jobs.note(job_id, "note", now(), {"text": text})
         return StepOutcome(Failure("NotSafe", text))
+
+    def _stop_wanted(self, job_id: str) -> bool:
+        """Whether the job was cancelled or its bench stopped, whichever process was asked."""
+        bench_stop = self._stores.units.bench_stop(self._driver.description.id)
+        return bench_stop is not None or self._stores.jobs.cancel_requested(job_id)
 
     def _session_of(self, job: Job) -> BenchSession:
         if self._session is not None and self._session.job.id == job.id:
@@ -198,7 +204,7 @@ class JobRunner:
             self._planner.procedure(job.procedure),
             bench,
             self._stores.recordings,
-            lambda: self._stores.jobs.cancel_requested(job.id),
+            lambda: self._stop_wanted(job.id),
         )
         return self._session
 

@@ -30,17 +30,36 @@ class BenchLease(Protocol):
     def release(self) -> None: ...
 
 
-def acquire_lease(database_url: str, bench_id: str) -> BenchLease:
-    """Take the bench, at once or not at all. Raises `BenchBusy`, naming the holder where it is known."""
+PASSING_S = 5.0
+"""How long a process that starts waits for a supervisor that makes the bench safe at this moment [s]."""
+SUPERVISOR = "supervisor"
+
+
+def acquire_lease(database_url: str, bench_id: str, role: str = "process") -> BenchLease:
+    """Take the bench, at once or not at all; only a supervisor, which has it for a moment, is waited for.
+
+    `role`: as what others shall name the holder. Raises `BenchBusy`, naming the holder where it is known.
+    """
+    deadline = wall_clock.monotonic_s() + PASSING_S
+    while True:
+        try:
+            return _lease(database_url, bench_id, role)
+        except BenchBusy as busy:
+            if not busy.passing or role == SUPERVISOR or wall_clock.monotonic_s() > deadline:
+                raise
+        wall_clock.pause(0.02)
+
+
+def _lease(database_url: str, bench_id: str, role: str) -> BenchLease:
     with storage_errors():
         url = make_url(database_url)
         if url.get_backend_name() == "sqlite":
-            return FileLease(Path(url.database or "bench.sqlite").parent / f"bench-{bench_id}.lock", bench_id)
-        return ServerLease(url, bench_id)
+            return FileLease(Path(url.database or "bench.sqlite").parent / f"bench-{bench_id}.lock", bench_id, role)
+        return ServerLease(url, bench_id, role)
 
 
 def _written_holder(file: int) -> str:
-    """The process id in a lock file; its holder writes it a moment after it took the lock."""
+    """Role and process id in a lock file; its holder writes it a moment after it took the lock."""
     for _ in range(20):
         holder = os.pread(file, 32, 0).decode(errors="replace").strip()
         if holder:
@@ -52,7 +71,7 @@ def _written_holder(file: int) -> str:
 class FileLease:
     """A locked file, with the holder's process id in it."""
 
-    def __init__(self, path: Path, bench_id: str) -> None:
+    def __init__(self, path: Path, bench_id: str, role: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._path = path
         self._file: int | None = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
@@ -61,9 +80,9 @@ class FileLease:
         except BlockingIOError:
             holder = _written_holder(self._file)
             os.close(self._file)
-            raise BenchBusy(f"bench {bench_id!r} is driven by {_process(holder)}") from None
+            raise _busy(bench_id, holder or "another process") from None
         os.ftruncate(self._file, 0)
-        os.pwrite(self._file, f"{os.getpid()}\n".encode(), 0)
+        os.pwrite(self._file, f"{role} {os.getpid()}\n".encode(), 0)
 
     def held(self) -> bool:
         """Whether the locked file is still the one that others would lock."""
@@ -86,7 +105,7 @@ class FileLease:
 class ServerLease:
     """An advisory lock of a connection of its own."""
 
-    def __init__(self, url: URL, bench_id: str) -> None:
+    def __init__(self, url: URL, bench_id: str, role: str) -> None:
         self._mutex = threading.Lock()
         engine = create_engine(
             url,
@@ -94,7 +113,7 @@ class ServerLease:
             isolation_level="AUTOCOMMIT",
             connect_args={
                 "connect_timeout": 10,
-                "application_name": f"bench {bench_id} pid {os.getpid()} on {socket.gethostname()}"[:63],
+                "application_name": f"bench {bench_id} {role} pid {os.getpid()} on {socket.gethostname()}"[:63],
                 "keepalives_idle": 5,
                 "keepalives_interval": 2,
                 "keepalives_count": 3,
@@ -106,7 +125,7 @@ class ServerLease:
         if not connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": key}):
             holder = _holder(connection, key)
             connection.close()
-            raise BenchBusy(f"bench {bench_id!r} is driven by {holder}")
+            raise _busy(bench_id, holder)
         self._connection: Connection | None = connection
 
     def held(self) -> bool:
@@ -133,8 +152,9 @@ class ServerLease:
             self._connection = None
 
 
-def _process(holder: str) -> str:
-    return f"process {holder}" if holder else "another process"
+def _busy(bench_id: str, holder: str) -> BenchBusy:
+    """For example: bench 'sim' is driven by process 4711."""
+    return BenchBusy(f"bench {bench_id!r} is driven by {holder}", passing=f"{SUPERVISOR} " in holder)
 
 
 def _holder(connection: Connection, key: int) -> str:

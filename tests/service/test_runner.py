@@ -11,6 +11,7 @@ from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.request import JobRequest
 from bench_service.jobs.runner import JobRunner
+from bench_service.jobs.safety import SafetyDesk
 from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
 from bench_service.jobs.worker import Worker
@@ -28,6 +29,14 @@ class IdleEngine:
     def enqueue(self, job: Job) -> None: ...
 
     def shut_down(self) -> None: ...
+
+
+class NoWatch:
+    """A host on which nobody says who drives the bench."""
+
+    def driving(self) -> None: ...
+
+    def supervisor(self) -> None: ...
 
 
 class JammedDriver(SimulatedDriver):
@@ -62,7 +71,7 @@ def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], b
     planner = Planner(stores, driver)
     runner = JobRunner(stores, planner, driver, "test", lease_held)
     worker = Worker(runner, lambda _: IdleEngine())
-    service = BenchService(stores, driver, planner, worker, "test")
+    service = BenchService(stores, driver, planner, worker, "test", SafetyDesk(stores, driver, NoWatch()))
     service.register()
     service.begin()
     job = service.submit(JobRequest("calibration_12_orientations", "SIM-0001", parameters=FAST, seed=1))
@@ -111,7 +120,7 @@ def test_an_engine_that_does_not_start_is_told_to_whoever_needs_it(stores: Store
         raise OSError("no books")
 
     worker = Worker(JobRunner(stores, planner, driver, "test", lambda: True), fail)
-    service = BenchService(stores, driver, planner, worker, "test")
+    service = BenchService(stores, driver, planner, worker, "test", SafetyDesk(stores, driver, NoWatch()))
     service.register()
     service.begin()
     with pytest.raises(NotDriving, match="did not start: no books"):
