@@ -14,14 +14,15 @@ from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs.code_version import code_version
+from bench_service.jobs.dispatcher import Dispatcher, JobEngine
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.safety import SafetyDesk
 from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
-from bench_service.jobs.worker import JobEngine, Worker
+from bench_service.jobs.worker import Worker
 from bench_service.pages import figures, routes
-from bench_service.persistence import acquire_lease, engine_database, open_stores
+from bench_service.persistence import BenchLease, acquire_lease, engine_database, open_stores
 from bench_service.persistence.host_files import HostFiles
 from bench_service.settings import Settings
 
@@ -47,7 +48,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
         closing.callback(lease.release)
         files.begin_driving()
         closing.callback(files.end_driving)
-        worker = Worker(JobRunner(stores, planner, driver, code, lease.held), partial(_engine, settings, stores))
+        runner = JobRunner(stores, planner, driver, code, lease.held)
+        worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease))
     service = BenchService(stores, driver, planner, worker, code, SafetyDesk(stores, driver, files))
     closing.callback(service.stop)
     service.register()
@@ -62,12 +64,18 @@ def _driver(settings: Settings) -> SimulatedDriver:
     return SimulatedDriver(settings.bench_id, *truths, settings.real_time_factor, register, faults)
 
 
-def _engine(settings: Settings, stores: Stores, runner: JobRunner) -> JobEngine:
+def _engine(settings: Settings, runner: JobRunner) -> JobEngine:
     """The job engine, which is imported here because it takes as long as the rest of the service."""
     from bench_service.jobs.engine import Engine
 
-    books = engine_database(settings.database_url)
-    return Engine(*books, settings.bench_id, settings.poll_s, runner, stores.jobs)
+    books = engine_database(settings.database_url, settings.bench_id)
+    return Engine(*books, settings.bench_id, runner)
+
+
+def _dispatcher(
+    settings: Settings, stores: Stores, lease: BenchLease, runner: JobRunner, engine: JobEngine
+) -> Dispatcher:
+    return Dispatcher(settings.bench_id, stores, runner, engine, lease, settings.poll_s)
 
 
 def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[], None]) -> FastAPI:

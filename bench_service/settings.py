@@ -35,7 +35,7 @@ class Settings(BaseModel):
     device_faults: str | None = None
     """For exercises: faults put into a simulated bench's devices (see `bench_service.drivers.device_faults`)."""
     poll_s: float = Field(0.1, gt=0, le=10)
-    """How often the job engine looks for queued work."""
+    """How often a worker looks for jobs that other processes queued; its own it sees at once."""
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported."""
 

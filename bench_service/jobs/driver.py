@@ -18,6 +18,22 @@ class TrueTriad:
     matrix: tuple[tuple[float, ...], ...]
 
 
+class Lease(Protocol):
+    """The right to drive a bench, held for a process's life unless it is lost."""
+
+    def held(self) -> bool:
+        """Whether it is still ours."""
+        ...
+
+    def regain(self) -> bool:
+        """Take it again after it was lost; False where somebody else has it, or the database does not answer."""
+        ...
+
+    def release(self) -> None:
+        """Give the bench back; a second time does nothing."""
+        ...
+
+
 class BenchDriver(BenchDevices, Protocol):
     """One bench's devices. `open` is called once per job, and again after a restart."""
 

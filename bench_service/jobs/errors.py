@@ -8,6 +8,7 @@ ServiceError
 ├── Misconfigured        a file that the settings name cannot be used
 ├── NotDriving           this process drives no bench
 ├── NotSafe              the bench's devices are not known to be safe
+├── AlreadyReserved      somebody keeps this bench or unit
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
@@ -53,6 +54,10 @@ class NotDriving(ServiceError):
 
 class NotSafe(ServiceError):
     """The bench's devices are not known to be safe."""
+
+
+class AlreadyReserved(ServiceError):
+    """Somebody keeps this bench or unit."""
 
 
 class NotMounted(ServiceError):

@@ -6,9 +6,10 @@ from threading import Event
 from typing import Any
 
 from bench_service.jobs.driver import BenchDriver
-from bench_service.jobs.errors import IllegalTransition, ServiceError
+from bench_service.jobs.errors import ServiceError
 from bench_service.jobs.job import FINAL, Failure, Job, JobState
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
+from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.session import BenchSession, ShuttingDown
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import BenchStop, Idempotency, StoredResult
@@ -19,9 +20,6 @@ from procedures.core.errors import DomainError
 from procedures.core.limits import Verdict
 from procedures.core.recording import Recording
 from procedures.procedure import Outcome
-
-RELEASE_CHECK_S = 0.2
-"""How often a waiting job asks whether its bench was released [s]."""
 
 
 @dataclass(frozen=True)
@@ -57,35 +55,19 @@ class JobRunner:
         self._session: BenchSession | None = None
         self._ending = Event()
 
-    def wait_for_release(self, job_id: str) -> None:
-        """While a person's stop stands, the job waits in its queue. Raises `ShuttingDown` when the service ends."""
-        jobs, told = self._stores.jobs, False
-        while True:
-            stop = self._stores.units.bench_stop(self._driver.description.id)
-            if stop is None or jobs.get(job_id).state is not JobState.QUEUED:
-                return
-            if not told:
-                jobs.note(job_id, "note", now(), {"text": f"bench {stop.bench} is stopped: {stop.reason}"})
-                told = True
-            if self._ending.wait(RELEASE_CHECK_S):
-                raise ShuttingDown
+    def claim(self, entry: QueueEntry) -> Job | None:
+        """Begin a queued job, with what is known of its unit now; None where it cannot begin any more."""
+        job = self._stores.jobs.get(entry.job)
+        context = self._planner.refreshed(CONTEXT.validate_python(job.context))
+        return self._stores.queue.claim(entry, CONTEXT.dump_python(context, mode="json"), now())
 
-    def prepare(self, job_id: str, attempt: int) -> int:
-        """Note what is known of the unit now, and start. How many stations there are; 0 stations, nothing moves.
+    def stations(self, job_id: str, attempt: int) -> int:
+        """How many stations a claimed job has; 0 stations, nothing moves.
 
         -1 where there is nothing to do: the job has ended, is put aside, or was queued again since.
         """
-        jobs = self._stores.jobs
-        job = jobs.get(job_id)
-        if job.state not in (JobState.QUEUED, JobState.RUNNING) or job.attempt != attempt:
-            return -1
-        context = self._planner.refreshed(CONTEXT.validate_python(job.context))
-        job = jobs.set_context(job_id, CONTEXT.dump_python(context, mode="json"))
-        try:
-            jobs.transition(job_id, JobState.RUNNING, at=now())
-        except IllegalTransition:  # it was cancelled or put aside this moment
-            return -1
-        return len(job.stations)
+        job = self._stores.jobs.get(job_id)
+        return len(job.stations) if job.state is JobState.RUNNING and job.attempt == attempt else -1
 
     def acquire(self, job_id: str, index: int) -> StepOutcome:
         """Record one station. Where its recording exists already, a crash came between storing and noting it.
@@ -121,10 +103,13 @@ class JobRunner:
 
     def make_safe(self, job_id: str) -> StepOutcome:
         """Leave the bench safe; after a restart in which no session survived, by opening it for that alone."""
-        try:
-            session = self._session_of(self._stores.jobs.get(job_id))
-        except (BenchError, ServiceError) as error:
-            return self._not_safe(job_id, str(error))
+        session = self._session
+        if session is None or session.job.id != job_id:
+            job = self._stores.jobs.get(job_id)
+            try:
+                session = self._session_of(job)
+            except (BenchError, ServiceError) as error:
+                return self._not_safe(job_id, str(error))
         try:
             session.make_safe()
         except ExceptionGroup as group:
@@ -135,8 +120,10 @@ class JobRunner:
         return StepOutcome()
 
     def conclude(self, job_id: str) -> StepOutcome:
-        """Analyse, store the result with its calibrations, and end the job with the verdict."""
+        """Analyse, store the result with its calibrations, and end the job with the verdict; may be repeated."""
         job = self._stores.jobs.get(job_id)
+        if job.state in FINAL:  # a crash came after its end was noted
+            return StepOutcome()
         procedure = self._planner.procedure(job.procedure)
         try:
             recordings = recordings_of(self._stores, job_id)

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench_service.jobs.job import Event, Failure, Job, JobState
+from bench_service.jobs.queue import QueueStore
+from bench_service.jobs.reservation import ReservationStore
 from bench_service.jobs.stored import (
     BenchStop,
     Idempotency,
@@ -256,6 +258,8 @@ class Stores:
     """All memory of one service."""
 
     jobs: JobStore
+    queue: QueueStore
+    reservations: ReservationStore
     recordings: RecordingStore
     results: ResultStore
     units: UnitStore
