@@ -5,6 +5,7 @@ a station that the job engine counts as done would have lost its samples. The pr
 Writers begin with ``BEGIN IMMEDIATE``, so two processes queue for the lock instead of failing in mid-transaction.
 """
 
+import hashlib
 import json
 import sqlite3
 from collections.abc import Generator
@@ -13,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event, make_url
+from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
 from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError, SQLAlchemyError
 from sqlalchemy.orm import Session
 
@@ -55,6 +56,15 @@ class Database:
         """The same for work below the tables: migrations."""
         with storage_errors(), self._writing_engine.begin() as connection:
             yield connection
+
+    def one_at_a_time(self, session: Session, what: str) -> None:
+        """In a writing transaction: go on only once no other one that said the same words is open.
+
+        On SQLite writers queue for the whole database anyway.
+        """
+        if self.is_postgres:
+            key = int.from_bytes(hashlib.sha256(what.encode()).digest()[:8], "big", signed=True)
+            session.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": key})
 
     @property
     def is_postgres(self) -> bool:

@@ -14,7 +14,7 @@ from bench_service.persistence.database import Database
 from bench_service.persistence.job_changes import append_event, found_job, move_job
 from bench_service.persistence.job_rows import failure_document, job_of_row
 from bench_service.persistence.reservation_store import active_reservations, reservation_of_row
-from bench_service.persistence.tables import BenchRow, BenchStopRow, JobRow
+from bench_service.persistence.tables import BenchStopRow, JobRow
 from bench_service.persistence.tables_around_jobs import ReservationRow
 
 QUEUED, RUNNING = JobState.QUEUED.value, JobState.RUNNING.value
@@ -34,7 +34,7 @@ class SqlQueueStore:
     def claim(self, entry: QueueEntry, context: dict[str, Any], at: datetime) -> Job | None:
         with self._database.write() as session:
             bench = session.scalar(select(JobRow.bench).where(JobRow.id == entry.job)) or ""
-            session.scalar(select(BenchRow.id).where(BenchRow.id == bench).with_for_update())  # one claim at a time
+            self._database.one_at_a_time(session, f"claim a job of bench {bench}")
             row = found_job(session, entry.job, lock=True)
             queue = _look(session, bench, at)
             current = next((e for e in queue.entries if e.job == entry.job and e.attempt == entry.attempt), None)

@@ -1,9 +1,8 @@
-"""Reservations in SQL. Of two who want the same thing at once, one gets it: writers of one thing queue for a lock."""
+"""Reservations in SQL. Of two who want the same thing at once, one gets it: they take turns."""
 
-import hashlib
 from datetime import datetime
 
-from sqlalchemy import select, text
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from bench_service.jobs.errors import AlreadyReserved, NotFound
@@ -27,9 +26,7 @@ class SqlReservationStore:
                 known = made_before(session, idempotency, "reservation")
                 if known is not None:
                     return reservation_of_row(_found(session, known))
-                if self._database.is_postgres:
-                    lock = {"key": _key(reservation)}
-                    session.execute(text("SELECT pg_advisory_xact_lock(:key)"), lock)
+                self._database.one_at_a_time(session, f"reserve {reservation.kind.value} {reservation.name}")
                 for other in active_reservations(session, reservation.created_at):
                     if (other.kind, other.name) == (reservation.kind, reservation.name):
                         raise AlreadyReserved(
@@ -95,9 +92,3 @@ def _found(session: Session, reservation_id: str) -> ReservationRow:
     if row is None:
         raise NotFound("reservation", reservation_id)
     return row
-
-
-def _key(reservation: Reservation) -> int:
-    """The advisory lock of those who want to reserve one thing."""
-    digest = hashlib.sha256(f"reserve {reservation.kind.value} {reservation.name}".encode()).digest()
-    return int.from_bytes(digest[:8], "big", signed=True)
