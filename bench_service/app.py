@@ -19,11 +19,13 @@ from bench_service.jobs.event_hub import EventHub
 from bench_service.jobs.live import Heartbeat, LiveBoard
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
+from bench_service.jobs.safety import SafetyDesk
 from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
 from bench_service.jobs.worker import Worker
 from bench_service.pages import figures, routes
 from bench_service.persistence import BenchLease, acquire_lease, engine_database, open_stores
+from bench_service.persistence.host_files import HostFiles
 from bench_service.settings import Settings
 
 ROUTERS = (procedures, jobs, recordings, analyses, units, benches, health)
@@ -39,6 +41,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     driver = _driver(settings)
     stores, database = open_stores(settings.database_url)
     closing.callback(database.dispose)
+    files = HostFiles(settings.devices_in(), settings.bench_id)
     planner = Planner(stores, driver)
     code = code_version()
     worker: Worker | None = None
@@ -46,13 +49,16 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     if drive:
         lease = acquire_lease(settings.database_url, settings.bench_id)
         closing.callback(lease.release)
+        files.begin_driving()
+        closing.callback(files.end_driving)
         board = LiveBoard(stores.live, settings.bench_id)
         heartbeat = Heartbeat(board, stores.live)
         heartbeat.begin()
         closing.callback(heartbeat.end)
         runner = JobRunner(stores, planner, driver, code, lease.held, board)
         worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease))
-    service = BenchService(stores, driver, planner, worker, code, board)
+    safety = SafetyDesk(stores, driver, files)
+    service = BenchService(stores, driver, planner, worker, code, safety, board)
     closing.callback(service.stop)
     service.register()
     return service

@@ -8,13 +8,67 @@ from pydantic import BaseModel, Field
 from bench_service.api.dependencies import Service
 from bench_service.api.errors import problems
 from bench_service.api.requests import StopRequest
+from bench_service.jobs.devices import DeviceState
 from bench_service.jobs.errors import NotFound
 from bench_service.jobs.live import BenchLive
+from bench_service.jobs.safety import Safety
 from bench_service.jobs.service import BenchService
 from bench_service.wall_clock import now
 from procedures.bench import BenchDescription
 
 router = APIRouter(prefix="/api/v1/benches", tags=["benches"])
+
+
+class DevicesView(BaseModel):
+    """What a bench's devices last said of themselves, as the bench's own host has it."""
+
+    at: datetime | None = Field(description="When something was last asked of them; null: nothing ever was")
+    by: str = Field(description="Who asked")
+    job: str | None = Field(description="The job for which it was asked")
+    table: str = Field(description='"at rest", or "moving": a demand has not ended, whoever sent it')
+    angles_deg: tuple[float, float, float] | None = Field(
+        description="Outer, middle, inner axis where the table last came to rest; null: not known"
+    )
+    powered: bool = Field(description="Whether the unit has power")
+    chamber_target_c: float | None = Field(description="Where the chamber goes; null: nowhere, or there is none")
+    unsafe: list[str] = Field(description="What is not as it must be on a bench that is left alone")
+
+    @classmethod
+    def of(cls, state: DeviceState | None) -> "DevicesView | None":
+        """None where this host does not know."""
+        if state is None:
+            return None
+        return cls(
+            at=state.at,
+            by=state.by,
+            job=state.job,
+            table=state.table,
+            angles_deg=state.angles_deg,
+            powered=state.powered,
+            chamber_target_c=state.chamber_target_c,
+            unsafe=list(state.unsafe),
+        )
+
+
+class SafetyView(BaseModel):
+    """What is known of a bench's safety. Software is not the emergency stop: that is a circuit beside the table."""
+
+    safe: bool | None = Field(description="Table at rest, unit off, chamber led to ambient; null: not known here")
+    explanation: str = Field(description="What is known, and who sees to it")
+    devices: DevicesView | None = Field(description="null: they are on another host")
+    worker: str | None = Field(description="The process of this host that drives the bench")
+    supervisor: str | None = Field(description="The process of this host that makes it safe where the worker cannot")
+
+    @classmethod
+    def of(cls, safety: Safety) -> "SafetyView":
+        """As HTTP says it."""
+        return cls(
+            safe=safety.safe,
+            explanation=safety.explanation,
+            devices=DevicesView.of(safety.devices),
+            worker=None if safety.worker is None else str(safety.worker),
+            supervisor=None if safety.supervisor is None else str(safety.supervisor),
+        )
 
 
 class BenchView(BaseModel):
@@ -29,13 +83,15 @@ class BenchView(BaseModel):
     live: BenchLive | None = Field(description="The last that its driver said; null: it never had one")
     driver_seen_at: datetime | None = Field(description="When that was")
     driver_there: bool = Field(description="Whether a driver is there now, as far as can be known from here")
+    safety: SafetyView
 
 
 class Stopping(BaseModel):
     """The answer to a stop. Software is not the emergency stop: that is a hardware circuit beside the table."""
 
     bench: str
-    job: str | None = Field(description="The job that was running; its bench is safe once it is cancelled")
+    job: str | None = Field(description="The job that was running, which is being cancelled")
+    safety: SafetyView = Field(description="What was known within a second of the stop; ask the bench for later")
     note: str = "This is a software stop. The emergency stop is a hardware circuit beside the table."
 
 
@@ -53,6 +109,7 @@ def _view(service: BenchService) -> BenchView:
         live=live,
         driver_seen_at=None if live is None else live.at,
         driver_there=live is not None and live.there(now()),
+        safety=SafetyView.of(service.safety.known(service.driver.description.id)),
     )
 
 
@@ -72,13 +129,16 @@ def read_bench(bench_id: str, service: Service) -> BenchView:
 
 @router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 507))
 def stop(bench_id: str, service: Service, body: StopRequest | None = None) -> Stopping:
-    """Software stop: end the running job, stop the table, switch the unit off; until the bench is released."""
-    job = service.stop_bench(bench_id, (body or StopRequest.model_validate({})).reason)
-    return Stopping(bench=bench_id, job=None if job is None else job.id)
+    """Software stop: end the running job, stop the table, switch the unit off; until the bench is released.
+
+    It is noted first, so it holds whoever is alive: a worker sees it, and in its place the bench's supervisor.
+    """
+    job, safety = service.stop_bench(bench_id, (body or StopRequest.model_validate({})).reason)
+    return Stopping(bench=bench_id, job=None if job is None else job.id, safety=SafetyView.of(safety))
 
 
-@router.post("/{bench_id}/release", responses=problems(404, 507))
+@router.post("/{bench_id}/release", responses=problems(404, 409, 507))
 def release(bench_id: str, service: Service) -> BenchView:
-    """Let a stopped bench work again: the jobs that wait in its queue go on."""
+    """Let a stopped bench work again, once it is known to be safe: the jobs that wait in its queue go on."""
     service.release_bench(bench_id)
     return _view(service)

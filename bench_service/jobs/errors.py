@@ -7,6 +7,7 @@ ServiceError
 ├── BenchBusy            another process drives this bench
 ├── Misconfigured        a file that the settings name cannot be used
 ├── NotDriving           this process drives no bench
+├── NotSafe              the bench's devices are not known to be safe
 ├── AlreadyReserved      somebody keeps this bench or unit
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
@@ -36,7 +37,11 @@ class IdempotencyConflict(ServiceError):
 
 
 class BenchBusy(ServiceError):
-    """Another process drives this bench."""
+    """Another process drives this bench; `passing`: its supervisor, which gives it back in a moment."""
+
+    def __init__(self, message: str, passing: bool = False) -> None:
+        super().__init__(message)
+        self.passing = passing
 
 
 class Misconfigured(ServiceError):
@@ -45,6 +50,10 @@ class Misconfigured(ServiceError):
 
 class NotDriving(ServiceError):
     """This process drives no bench: it only reads."""
+
+
+class NotSafe(ServiceError):
+    """The bench's devices are not known to be safe."""
 
 
 class AlreadyReserved(ServiceError):

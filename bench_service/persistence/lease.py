@@ -33,17 +33,36 @@ class BenchLease(Protocol):
     def release(self) -> None: ...
 
 
-def acquire_lease(database_url: str, bench_id: str) -> BenchLease:
-    """Take the bench, at once or not at all. Raises `BenchBusy`, naming the holder where it is known."""
+PASSING_S = 5.0
+"""How long a process that starts waits for a supervisor that makes the bench safe at this moment [s]."""
+SUPERVISOR = "supervisor"
+
+
+def acquire_lease(database_url: str, bench_id: str, role: str = "process") -> BenchLease:
+    """Take the bench, at once or not at all; only a supervisor, which has it for a moment, is waited for.
+
+    `role`: as what others shall name the holder. Raises `BenchBusy`, naming the holder where it is known.
+    """
+    deadline = wall_clock.monotonic_s() + PASSING_S
+    while True:
+        try:
+            return _lease(database_url, bench_id, role)
+        except BenchBusy as busy:
+            if not busy.passing or role == SUPERVISOR or wall_clock.monotonic_s() > deadline:
+                raise
+        wall_clock.pause(0.02)
+
+
+def _lease(database_url: str, bench_id: str, role: str) -> BenchLease:
     with storage_errors():
         url = make_url(database_url)
         if url.get_backend_name() == "sqlite":
-            return FileLease(Path(url.database or "bench.sqlite").parent / f"bench-{bench_id}.lock", bench_id)
-        return ServerLease(url, bench_id)
+            return FileLease(Path(url.database or "bench.sqlite").parent / f"bench-{bench_id}.lock", bench_id, role)
+        return ServerLease(url, bench_id, role)
 
 
 def _written_holder(file: int) -> str:
-    """The process id in a lock file; its holder writes it a moment after it took the lock."""
+    """Role and process id in a lock file; its holder writes it a moment after it took the lock."""
     for _ in range(20):
         holder = os.pread(file, 32, 0).decode(errors="replace").strip()
         if holder:
@@ -55,10 +74,11 @@ def _written_holder(file: int) -> str:
 class FileLease:
     """A locked file, with the holder's process id in it."""
 
-    def __init__(self, path: Path, bench_id: str) -> None:
+    def __init__(self, path: Path, bench_id: str, role: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._path = path
         self._bench_id = bench_id
+        self._role = role
         self._file: int | None = self._locked()
 
     def held(self) -> bool:
@@ -93,18 +113,18 @@ class FileLease:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            holder = _written_holder(file)
+            who = _written_holder(file)
             os.close(file)
-            raise BenchBusy(f"bench {self._bench_id!r} is driven by {_process(holder)}") from None
+            raise _busy(self._bench_id, who) from None
         os.ftruncate(file, 0)
-        os.pwrite(file, f"{os.getpid()}\n".encode(), 0)
+        os.pwrite(file, f"{self._role} {os.getpid()}\n".encode(), 0)
         return file
 
 
 class ServerLease:
     """An advisory lock of a connection of its own."""
 
-    def __init__(self, url: URL, bench_id: str) -> None:
+    def __init__(self, url: URL, bench_id: str, role: str) -> None:
         self._mutex = threading.Lock()
         self._bench_id = bench_id
         self._key = lease_key(bench_id)
@@ -114,7 +134,7 @@ class ServerLease:
             isolation_level="AUTOCOMMIT",
             connect_args={
                 "connect_timeout": 10,
-                "application_name": f"bench {bench_id} pid {os.getpid()} on {socket.gethostname()}"[:63],
+                "application_name": f"bench {bench_id} {role} pid {os.getpid()} on {socket.gethostname()}"[:63],
                 "keepalives_idle": 5,
                 "keepalives_interval": 2,
                 "keepalives_count": 3,
@@ -156,7 +176,7 @@ class ServerLease:
         if not connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": self._key}):
             who = holder(connection, self._key)
             connection.close()
-            raise BenchBusy(f"bench {self._bench_id!r} is driven by {who or 'another process'}")
+            raise _busy(self._bench_id, who)
         return connection
 
     def _drop(self) -> None:
@@ -166,8 +186,10 @@ class ServerLease:
             self._connection = None
 
 
-def _process(holder: str) -> str:
-    return f"process {holder}" if holder else "another process"
+def _busy(bench_id: str, who: str | None) -> BenchBusy:
+    """For example: bench 'sim' is driven by process 4711."""
+    named = who or "another process"
+    return BenchBusy(f"bench {bench_id!r} is driven by {named}", passing=f"{SUPERVISOR} " in named)
 
 
 def lease_key(bench_id: str) -> int:

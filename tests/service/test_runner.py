@@ -12,6 +12,7 @@ from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.request import JobRequest
 from bench_service.jobs.runner import JobRunner
+from bench_service.jobs.safety import SafetyDesk
 from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
 from bench_service.jobs.worker import Worker
@@ -43,6 +44,14 @@ class IdleDispatcher:
     def wake(self) -> None: ...
 
     def shut_down(self) -> None: ...
+
+
+class NoWatch:
+    """A host on which nobody says who drives the bench."""
+
+    def driving(self) -> None: ...
+
+    def supervisor(self) -> None: ...
 
 
 class JammedDriver(SimulatedDriver):
@@ -77,7 +86,7 @@ def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], b
     planner = Planner(stores, driver)
     runner = JobRunner(stores, planner, driver, "test", lease_held)
     worker = Worker(runner, lambda _: IdleEngine(), lambda *_: IdleDispatcher())
-    service = BenchService(stores, driver, planner, worker, "test")
+    service = BenchService(stores, driver, planner, worker, "test", SafetyDesk(stores, driver, NoWatch()))
     service.register()
     service.begin()
     job = service.submit(JobRequest("calibration_12_orientations", "SIM-0001", parameters=FAST, seed=1))
@@ -129,7 +138,7 @@ def test_an_engine_that_does_not_start_is_told_to_whoever_needs_it(stores: Store
         raise OSError("no books")
 
     worker = Worker(JobRunner(stores, planner, driver, "test", lambda: True), fail, lambda *_: IdleDispatcher())
-    service = BenchService(stores, driver, planner, worker, "test")
+    service = BenchService(stores, driver, planner, worker, "test", SafetyDesk(stores, driver, NoWatch()))
     service.register()
     service.begin()
     with pytest.raises(NotDriving, match="did not start: no books"):
