@@ -5,6 +5,7 @@ Knows how clock, table, supply, unit, chamber and operator are wired; knows none
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -139,7 +140,8 @@ def _connect_warm(clock: SimClock, table: SimTurntable, supply: SimSupply, imu: 
 def climate_of(chamber: SimChamber, warmth: Warmth, ticks: int) -> Climate:
     """What the temperatures of some ticks do to the unit: the last second's until the next one ends."""
     felt = chamber.response(np.concatenate([warmth.before_c[None], warmth.temperatures_c]))
-    lengths = np.diff([0, *warmth.end_ticks, ticks])
+    edges = (0, *warmth.end_ticks, ticks)
+    lengths = np.array([end - begin for begin, end in pairwise(edges)])
     gyro, gyro_added = None, felt.gyro_added_rad_s.T
     if np.any(gyro_added):
         same, none = np.ones_like(gyro_added), np.zeros_like(gyro_added)
