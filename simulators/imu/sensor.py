@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from procedures.core import units
 from simulators.imu.blocks import Dither
+from simulators.imu.climate import Drift
 from simulators.imu.counter import FRACTION_BITS, Counter, Counts
 from simulators.imu.noise import TriadNoise
 from simulators.truth import Array, TriadTruth, keyed_generator
@@ -32,10 +34,24 @@ class Coefficients:
 
     def output(self, v: Array) -> Array:
         """Noise-free nominal output of inputs of shape (n, 3) [rate], as (3, n)."""
+        through, even = self._through(v)
+        return self.bias[:, None] + through + even
+
+    def drifting(self, v: Array, drift: Drift, lengths: NDArray[np.intp]) -> Array:
+        """The same before the converter, in pieces of so many ticks, (3, ticks); v (ticks, 3), or (1, 3) at rest."""
+        through, even = self._through(v)
+        gain, added = drift.sensor_gain, drift.sensor_added
+        if len(v) == 1:
+            return np.repeat(self.bias[:, None] + gain * (through + even) + added, lengths, axis=1)
+        gain, added = np.repeat(gain, lengths, axis=1), np.repeat(added, lengths, axis=1)
+        return self.bias[:, None] + gain * (through + even) + added
+
+    def _through(self, v: Array) -> tuple[Array, Array]:
+        """``a = K·v`` and its even terms, each (3, n) [rate]."""
         inputs = v.T
         through = np.array([row[0] * inputs[0] + row[1] * inputs[1] + row[2] * inputs[2] for row in self.matrix])
         even = 0.5 * self.asymmetry[:, None] * np.abs(through) + self.quadratic[:, None] * through**2
-        return self.bias[:, None] + through + even
+        return through, even
 
 
 def launch_coefficients(truth: TriadTruth, seed: int, launch: int, triad: str) -> Coefficients:
@@ -81,6 +97,16 @@ class TriadSensor:
         self._total[...] = self._output(increments)
         self.noise.add_increments(self._total, tick)
         return self.counter.count(self._total, tick, out)
+
+    def feel_warm(
+        self, tick: int, increments: Array, drift: Drift, lengths: NDArray[np.intp], out: Counts | None = None
+    ) -> Counts:
+        """`feel` while temperature acts, in pieces of so many ticks. Every count is the same however time is cut."""
+        total = self.coefficients.drifting(increments * self._rate_hz, drift, lengths) / self._rate_hz
+        self.noise.add_increments(total, tick)
+        total *= np.repeat(drift.gain, lengths, axis=1)
+        total += np.repeat(drift.added / self._rate_hz, lengths, axis=1)
+        return self.counter.count(total, tick, out)
 
     def _output(self, increments: Array) -> Array:
         """Noise-free increments of the integrated output; kept, because a table at rest sends the same for hours."""
