@@ -140,5 +140,3 @@ class _Replay:
         for name, column in zip(SENSORS, self._columns, strict=False):
             if np.any(block[:, column] == DISCONNECTED_CODE):
                 raise UnfitRecording(f"recording {self._id}: {name} was disconnected")
-
-

@@ -24,7 +24,7 @@ AIR, SET_POINT = "chamber_air", "chamber_set_point"
 DISCONNECTED_CODE = -32768
 """The least of 16 bits: what the unit sends for a sensor that is not there."""
 STUCK_C = 5.0
-"""A sensor whose code stays the same while most of the others move by more than this is stuck."""
+"""A sensor whose code stays the same while all others but one move by more than this is stuck."""
 
 
 def check_samples(rate_hz: float) -> int:
@@ -151,37 +151,36 @@ class ProfileProgress:
 
 
 class SensorWatch:
-    """Judges the unit's temperature sensors, reading by reading."""
+    """Judges the unit's temperature sensors, reading by reading; plain arithmetic, for it runs thousands of times."""
 
     def __init__(self, profile: TemperatureProfile) -> None:
         low, high = profile.span_c
         self._low, self._high = low - profile.unit_margin_c, high + profile.unit_margin_c
-        self._codes = np.empty(0, dtype=np.int64)
-        self._readings_then = np.empty((0, 0))
+        self._codes: list[int] = []
+        self._then: list[tuple[float, ...]] = []
+        """Of each sensor: what all of them read when its code last changed."""
 
     def step(self, codes: Sequence[int], readings_c: Sequence[float]) -> str | None:
         """A sentence where a sensor is disconnected, stuck, or reads what the unit must not be; else None.
 
         Codes and readings [°C] in the order of `SENSORS`.
         """
-        now, readings = np.asarray(codes, dtype=np.int64), np.asarray(readings_c, dtype=np.float64)
-        for name, code in zip(SENSORS, now.tolist(), strict=True):
-            if code == DISCONNECTED_CODE:
-                return f"{name} is disconnected: it sends code {DISCONNECTED_CODE}"
-        if not len(self._codes):
-            self._codes = now.copy()
-            self._readings_then = np.tile(readings, (len(now), 1))
-            self._low, self._high = min(self._low, *readings.tolist()), max(self._high, *readings.tolist())
-        moved = now != self._codes
-        self._codes[moved] = now[moved]
-        self._readings_then[moved] = readings
+        if DISCONNECTED_CODE in codes:
+            return f"{SENSORS[list(codes).index(DISCONNECTED_CODE)]} is disconnected: it sends code {DISCONNECTED_CODE}"
+        now = tuple(readings_c)
+        if not self._codes:
+            self._codes, self._then = list(codes), [now] * len(now)
+            self._low, self._high = min(self._low, *now), max(self._high, *now)
         for i, name in enumerate(SENSORS):
-            others = np.delete(np.abs(readings - self._readings_then[i]), i)
-            if np.median(others) > STUCK_C:
+            if not self._low <= now[i] <= self._high:
+                return f"{name} reads {now[i]:.1f} °C, outside {self._low:.1f} … {self._high:.1f} °C"
+            if codes[i] != self._codes[i]:
+                self._codes[i], self._then[i] = codes[i], now
+                continue
+            moved = sorted(abs(b - a) for j, (a, b) in enumerate(zip(self._then[i], now, strict=True)) if j != i)
+            if moved[1] > STUCK_C:
                 return (
-                    f"{name} is stuck at {readings[i]:.2f} °C: its code has not changed while the others moved by "
-                    f"{np.median(others):.1f} °C"
+                    f"{name} is stuck at {now[i]:.2f} °C: its code has not changed while the others moved by "
+                    f"{moved[1]:.1f} °C and more"
                 )
-            if not self._low <= readings[i] <= self._high:
-                return f"{name} reads {readings[i]:.1f} °C, outside {self._low:.1f} … {self._high:.1f} °C"
         return None
