@@ -110,6 +110,11 @@ class ThermalCorrection:
     triad: str
     axes: tuple[AxisCorrection, AxisCorrection, AxisCorrection]
 
+    @property
+    def scales(self) -> Array:
+        """K0 of each axis, (3,)."""
+        return np.array([axis.scale for axis in self.axes])
+
     def apply(self, output_m_s2: Array, case_c: Array, converter_c: Array, dynamic: ArrayLike) -> Array:
         """Corrected specific forces (n, 3) [m/s²] of nominal outputs (n, 3).
 

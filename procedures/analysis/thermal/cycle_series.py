@@ -69,7 +69,7 @@ class CycleSeries:
     @property
     def t_s(self) -> Array:
         """Middles of the rows since the recording's beginning, (n,)."""
-        return (np.arange(len(self.air_c)) + 0.5) * self.sample_s
+        return (np.arange(len(self.air_c), dtype=np.float64) + 0.5) * self.sample_s
 
 
 def read_cycle(recording: Recording, up: int) -> CycleSeries:
