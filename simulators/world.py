@@ -140,13 +140,13 @@ def climate_of(chamber: SimChamber, warmth: Warmth, ticks: int) -> Climate:
     """What the temperatures of some ticks do to the unit: the last second's until the next one ends."""
     felt = chamber.response(np.concatenate([warmth.before_c[None], warmth.temperatures_c]))
     lengths = np.diff([0, *warmth.end_ticks, ticks])
-    gyro_added = felt.gyro_added_rad_s.T
-    same, none = np.ones_like(gyro_added), np.zeros_like(gyro_added)
-    gyro = Drift(same, none, same, gyro_added)
-    accelerometer = Drift(
-        felt.sensor_gain.T, felt.sensor_added_m_s2.T, felt.converter_gain.T, felt.converter_added_m_s2.T
-    )
-    return Climate(lengths, gyro, accelerometer, np.concatenate([warmth.codes_before[None], warmth.codes]))
+    gyro, gyro_added = None, felt.gyro_added_rad_s.T
+    if np.any(gyro_added):
+        same, none = np.ones_like(gyro_added), np.zeros_like(gyro_added)
+        gyro = Drift(lengths, same, none, same, gyro_added)
+    forces = (felt.sensor_gain, felt.sensor_added_m_s2, felt.converter_gain, felt.converter_added_m_s2)
+    accelerometer = Drift(lengths, *(part.T for part in forces))
+    return Climate(gyro, accelerometer, np.concatenate([warmth.codes_before[None], warmth.codes]))
 
 
 def _resume(bench: SimulatedBench, checkpoint: Mapping[str, Any]) -> None:

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from simulators.imu.counter import Counts
 from simulators.truth import Array
 
+Lengths = NDArray[np.intp]
+"""Ticks of pieces of time that follow one another, (pieces,)."""
+
 
 @dataclass(frozen=True)
 class Drift:
@@ -20,6 +23,7 @@ class Drift:
     converter as its signal does, for it is a current too; the counter's own error comes after.
     """
 
+    lengths: Lengths
     sensor_gain: Array
     sensor_added: Array
     """[rate]"""
@@ -27,18 +31,30 @@ class Drift:
     added: Array
     """[rate]"""
 
+    def sensed(self, bias: Array, through: Array) -> Array:
+        """The sensor's own output (3, ticks) [rate] of b (3,) and a, (3, ticks) or (3, 1) where it is at rest."""
+        if through.shape[1] == 1:
+            return self._held(bias[:, None] + self.sensor_gain * through + self.sensor_added)
+        return bias[:, None] + self._held(self.sensor_gain) * through + self._held(self.sensor_added)
+
+    def convert(self, increments: Array, rate_hz: float) -> None:
+        """What the converter makes of increments (3, ticks) [rate·s], in place."""
+        increments *= self._held(self.gain)
+        increments += self._held(self.added / rate_hz)
+
+    def _held(self, pieces: Array) -> Array:
+        return np.repeat(pieces, self.lengths, axis=1)
+
 
 @dataclass(frozen=True)
 class Climate:
-    """Ticks in pieces: what each does to both triads, and what the unit's temperature sensors say meanwhile."""
+    """What some ticks do to both triads, None: nothing; and what the unit's temperature sensors say meanwhile."""
 
-    lengths: NDArray[np.intp]
-    """Ticks of each piece, (pieces,)."""
-    gyro: Drift
+    gyro: Drift | None
     accelerometer: Drift
     codes: Counts
     """(pieces, 5)"""
 
     def codes_at_ticks(self) -> Counts:
         """Codes held at the sample rate, (ticks, 5)."""
-        return np.repeat(self.codes, self.lengths, axis=0)
+        return np.repeat(self.codes, self.accelerometer.lengths, axis=0)

@@ -81,24 +81,16 @@ class SimImu:
         """Go through some motion, in some climate where the world has one; nothing happens while off."""
         if not self._sensors:
             return
-        tick, ticks, gyro, accelerometer = (
-            self._ticks,
-            motion.ticks,
-            self._sensors["gyro"],
-            self._sensors["accelerometer"],
-        )
         width = max((tape.columns for tape in self._tapes), default=len(self._channels))
-        counts = np.empty((ticks, width), dtype=np.int32)
-        angles, velocities = counts[:, :3].T, counts[:, 3:6].T
-        if climate is None:
-            gyro.feel(tick, ticks, motion.angle_rad, angles)
-            accelerometer.feel(tick, ticks, motion.velocity_m_s, velocities)
-        else:
-            gyro.feel_warm(tick, motion.angle_rad, climate.gyro, climate.lengths, angles)
-            accelerometer.feel_warm(tick, motion.velocity_m_s, climate.accelerometer, climate.lengths, velocities)
-            if width > len(self._channels):
-                counts[:, len(self._channels) :] = climate.codes_at_ticks()
-        self._ticks += ticks
+        counts = np.empty((motion.ticks, width), dtype=np.int32)
+        gyro, accelerometer = (None, None) if climate is None else (climate.gyro, climate.accelerometer)
+        self._sensors["gyro"].feel(self._ticks, motion.ticks, motion.angle_rad, counts[:, :3].T, gyro)
+        self._sensors["accelerometer"].feel(
+            self._ticks, motion.ticks, motion.velocity_m_s, counts[:, 3:6].T, accelerometer
+        )
+        if climate is not None and width > len(self._channels):
+            counts[:, len(self._channels) :] = climate.codes_at_ticks()
+        self._ticks += motion.ticks
         for tape in self._tapes:
             tape.put(counts)
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from procedures.core import units
 from simulators.imu.blocks import Dither
@@ -37,17 +36,12 @@ class Coefficients:
         through, even = self._through(v)
         return self.bias[:, None] + through + even
 
-    def drifting(self, v: Array, drift: Drift, lengths: NDArray[np.intp]) -> Array:
-        """The same before the converter, in pieces of so many ticks, (3, ticks); v (ticks, 3), or (1, 3) at rest."""
+    def through(self, v: Array) -> Array:
+        """What inputs of shape (n, 3) put through without the bias, (3, n) [rate]."""
         through, even = self._through(v)
-        gain, added = drift.sensor_gain, drift.sensor_added
-        if len(v) == 1:
-            return np.repeat(self.bias[:, None] + gain * (through + even) + added, lengths, axis=1)
-        gain, added = np.repeat(gain, lengths, axis=1), np.repeat(added, lengths, axis=1)
-        return self.bias[:, None] + gain * (through + even) + added
+        return through + even
 
     def _through(self, v: Array) -> tuple[Array, Array]:
-        """``a = K·v`` and its even terms, each (3, n) [rate]."""
         inputs = v.T
         through = np.array([row[0] * inputs[0] + row[1] * inputs[1] + row[2] * inputs[2] for row in self.matrix])
         even = 0.5 * self.asymmetry[:, None] * np.abs(through) + self.quadratic[:, None] * through**2
@@ -87,26 +81,24 @@ class TriadSensor:
         else:
             self.counter = Counter(truth.pulse, phase.tolist())
 
-    def feel(self, tick: int, ticks: int, increments: Array, out: Counts | None = None) -> Counts:
+    def feel(
+        self, tick: int, ticks: int, increments: Array, out: Counts | None = None, drift: Drift | None = None
+    ) -> Counts:
         """Counts (3, ticks) of the ticks from `tick` since power-up, perhaps into `out`; true `increments` (ticks, 3).
 
-        Or (1, 3) where every tick is alike.
+        Or (1, 3) where every tick is alike. `drift`: what temperature does to the triad meanwhile, None: nothing.
         """
         if self._total.shape[1] != ticks:
             self._total = np.empty((3, ticks))
-        self._total[...] = self._output(increments)
+        if drift is None:
+            self._total[...] = self._output(increments)
+        else:
+            through = self.coefficients.through(increments * self._rate_hz)
+            np.divide(drift.sensed(self.coefficients.bias, through), self._rate_hz, out=self._total)
         self.noise.add_increments(self._total, tick)
+        if drift is not None:
+            drift.convert(self._total, self._rate_hz)
         return self.counter.count(self._total, tick, out)
-
-    def feel_warm(
-        self, tick: int, increments: Array, drift: Drift, lengths: NDArray[np.intp], out: Counts | None = None
-    ) -> Counts:
-        """`feel` while temperature acts, in pieces of so many ticks. Every count is the same however time is cut."""
-        total = self.coefficients.drifting(increments * self._rate_hz, drift, lengths) / self._rate_hz
-        self.noise.add_increments(total, tick)
-        total *= np.repeat(drift.gain, lengths, axis=1)
-        total += np.repeat(drift.added / self._rate_hz, lengths, axis=1)
-        return self.counter.count(total, tick, out)
 
     def _output(self, increments: Array) -> Array:
         """Noise-free increments of the integrated output; kept, because a table at rest sends the same for hours."""
