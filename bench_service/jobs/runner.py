@@ -16,8 +16,10 @@ from bench_service.wall_clock import new_id, now
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, Stopped
 from procedures.core.errors import DomainError
+from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import Recording
+from procedures.core.unit_correction import UnitCorrection
 from procedures.procedure import Outcome
 
 RELEASE_CHECK_S = 0.2
@@ -135,14 +137,17 @@ class JobRunner:
         return StepOutcome()
 
     def conclude(self, job_id: str) -> StepOutcome:
-        """Analyse, store the result with its calibrations, and end the job with the verdict."""
+        """Analyse, store the result with its calibrations and corrections, and end the job with the verdict."""
         job = self._stores.jobs.get(job_id)
         procedure = self._planner.procedure(job.procedure)
         try:
             recordings = recordings_of(self._stores, job_id)
             result = analysed(job, procedure, job.parameters, recordings, self._code_version)
             stored = self._stores.results.add(
-                result.stored, result.calibrations, idempotency=Idempotency(f"job:{job_id}", job_id)
+                result.stored,
+                result.calibrations,
+                idempotency=Idempotency(f"job:{job_id}", job_id),
+                corrections=result.corrections,
             )
             self._remember(procedure, result.outcome, stored)
         except (DomainError, ServiceError) as error:
@@ -205,11 +210,12 @@ class JobRunner:
 
 @dataclass(frozen=True)
 class Analysed:
-    """A result ready to be stored, with the calibrations that it gives."""
+    """A result ready to be stored, with the calibrations and corrections that it gives."""
 
     outcome: Outcome
     stored: StoredResult
-    calibrations: tuple[Any, ...]
+    calibrations: tuple[TriadCalibration, ...]
+    corrections: tuple[UnitCorrection, ...]
 
 
 def recordings_of(stores: Stores, job_id: str) -> list[Recording]:
@@ -229,6 +235,7 @@ def analysed(
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
     outcome = procedure.analyse(recordings, params, context)
     used = context.unit.calibration_id if procedure.uses_calibration else None
+    corrections = (context.unit.correction_id(kind) for kind in procedure.uses_corrections(params))
     stored = StoredResult(
         id=new_id(),
         kind="procedure",
@@ -246,5 +253,6 @@ def analysed(
         job_id=job.id,
         seed=job.seed,
         context=job.context,
+        corrections=tuple(c for c in corrections if c is not None),
     )
-    return Analysed(outcome, stored, procedure.calibrations(outcome))
+    return Analysed(outcome, stored, procedure.calibrations(outcome), procedure.corrections(outcome))

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from bench_service.jobs.corrections import CorrectionStore
 from bench_service.jobs.job import Event, Failure, Job, JobState
 from bench_service.jobs.stored import (
     BenchStop,
@@ -26,6 +27,7 @@ from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import RawArray, Recording, RecordingInfo
 from procedures.core.unit import Unit
+from procedures.core.unit_correction import UnitCorrection
 
 
 class RecordingWriter(Protocol):
@@ -175,7 +177,7 @@ class JobStore(Protocol):
 
 
 class ResultStore(Protocol):
-    """Results, calibrations and lineage."""
+    """Results, the calibrations and corrections that come with them, and lineage."""
 
     def add(
         self,
@@ -183,9 +185,11 @@ class ResultStore(Protocol):
         calibrations: Sequence[TriadCalibration] = (),
         make_current: bool = True,
         idempotency: Idempotency | None = None,
+        corrections: Sequence[UnitCorrection] = (),
     ) -> StoredResult:
         """Store a result with its lineage, and its calibrations as the unit's current ones, in one transaction.
 
+        Corrections, at most one of a kind, are stored in the same manner; see `CorrectionStore` for their history.
         Raises `IdempotencyConflict`; a known key with the same fingerprint returns the first result.
         """
         ...
@@ -217,11 +221,11 @@ class UnitStore(Protocol):
     """Units and benches: what is declared of them."""
 
     def put_unit(self, unit: Unit) -> None:
-        """Create or replace; the calibrations of the record are not stored here (`ResultStore` has them)."""
+        """Create or replace; calibrations and corrections of the record are not stored here: `ResultStore` has them."""
         ...
 
     def unit(self, serial: str) -> Unit:
-        """With its current calibration. Raises `NotFound`."""
+        """With its current calibration and corrections. Raises `NotFound`."""
         ...
 
     def units(self) -> tuple[Unit, ...]: ...
@@ -255,3 +259,4 @@ class Stores:
     recordings: RecordingStore
     results: ResultStore
     units: UnitStore
+    corrections: CorrectionStore
