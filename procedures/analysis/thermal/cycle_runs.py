@@ -17,11 +17,10 @@ from procedures.analysis.thermal.regime import RegimeSettings, RegimeTrace, regi
 from procedures.analysis.thermal.runs import ThermalRun, thermal_run, without_lag
 from procedures.core import units
 from procedures.core.arrays import Array
-from procedures.core.converter import ConverterModel
+from procedures.core.converter import ConverterTriad
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.thermal_correction import ThermalCorrection
 
-Converter = tuple[ConverterModel, ConverterModel, ConverterModel]
 PASSES = 2
 """Fits whose correction tells what each axis would have shown at the reference, and so the force that it felt."""
 
@@ -74,7 +73,7 @@ class PreparedRun:
         return self.trace.dynamic
 
 
-def stage_one(output_m_s2: Array, converter_c: Array, models: Converter, current_ma_per_g: float) -> Array:
+def stage_one(output_m_s2: Array, converter_c: Array, models: ConverterTriad, current_ma_per_g: float) -> Array:
     """Nominal outputs (n, 3) with the converter's drift against its own temperature (n,) [°C] taken out."""
     ma_per_nominal = current_ma_per_g / units.STANDARD_GRAVITY
     columns: list[Array] = []
@@ -85,7 +84,7 @@ def stage_one(output_m_s2: Array, converter_c: Array, models: Converter, current
 
 
 def prepare(
-    series: CycleSeries, settings: CycleSettings, gravity_m_s2: float, converter: Converter | None
+    series: CycleSeries, settings: CycleSettings, gravity_m_s2: float, converter: ConverterTriad | None
 ) -> PreparedRun:
     """A run ready to be fitted, with gravity along the axis that is up as its force.
 
