@@ -71,8 +71,8 @@ class SimulatedDriver:
         """A world with that unit on the table, at its beginning or at a checkpoint."""
         from simulators.world import build  # with MuJoCo: not needed before a bench is opened
 
-        config = replace(self._config(unit, 0 if seed is None else seed), sample_rate_hz=needs.sample_rate_hz)
-        return build(config, checkpoint)
+        config = self._config(unit, 0 if seed is None else seed)
+        return build(replace(config, sample_rate_hz=needs.sample_rate_hz, thermal=needs.temperatures), checkpoint)
 
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
         """Bias and matrix of the job's launch, run-to-run changes included."""
