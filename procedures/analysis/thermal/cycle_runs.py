@@ -95,6 +95,7 @@ def prepare(
     output = series.output_m_s2
     if converter is not None:
         output = stage_one(output, board, converter, settings.current_ma_per_g)
+    trace = regimes(series.case_c, series.sample_s, settings.regime)
     cells = thermal_run(
         series.up,
         gravity_m_s2,
@@ -102,9 +103,8 @@ def prepare(
         {"output": output, "case": series.case_c, "converter": series.converter_c},
         cell_s=settings.cell_s,
         lag_s=settings.lag_s,
-        settings=settings.regime,
+        trace=trace,
     )
-    trace = regimes(series.case_c, series.sample_s, settings.regime)
     return PreparedRun(series, trace, output, case, board, cells)
 
 
