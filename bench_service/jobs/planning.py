@@ -18,6 +18,9 @@ from procedures.procedure import Context, Outcome, Parameters, Prediction, Proce
 BYTES_PER_SAMPLE = 2
 """What a stored sample is allowed to weigh (design.md, budgets); a preview says what a plan may need at most."""
 
+TEMPERATURE_CHANNELS = 7
+"""Five sensors of the unit and two readings of the chamber, beside the triads where a station wants temperatures."""
+
 CONTEXT = TypeAdapter(Context)
 
 AnyProcedure = Procedure[Parameters, Outcome]
@@ -83,16 +86,22 @@ class Planner:
             f"station {s.index} ({s.label}): {sentence}"
             for s in stations
             if s.angles is not None
-            for sentence in context.bench.violations(s.angles, s.turn)
+            for sentence in context.bench.violations(s.angles, s.turn, s.profile)
         )
         prediction = procedure.predict(parameters, context)
-        samples = sum(round(s.record_s * context.unit.sample_rate_hz) for s in stations)
-        data_bytes = samples * len(context.unit.channels) * BYTES_PER_SAMPLE
+        data_bytes = sum(_samples(s, context.unit) for s in stations) * BYTES_PER_SAMPLE
         return Plan(procedure, parameters, context, stations, prediction, data_bytes, violations)
 
     def refreshed(self, context: Context) -> Context:
         """The same bench, and the unit as it is known now: its noise, and the calibration that is current."""
         return replace(context, unit=self._stores.units.unit(context.unit.serial))
+
+
+def _samples(station: Station, unit: Unit) -> int:
+    """Samples of all channels; of a profile as long as it is expected to take."""
+    seconds = station.record_s if station.profile is None else station.profile.expected_s()
+    channels = len(unit.channels) + TEMPERATURE_CHANNELS * station.temperatures
+    return round(seconds * (station.sample_rate_hz or unit.sample_rate_hz)) * channels
 
 
 def register(stores: Stores, unit: Unit) -> None:
