@@ -72,7 +72,10 @@ class SimulatedDriver:
         from simulators.world import build  # with MuJoCo: not needed before a bench is opened
 
         config = self._config(unit, 0 if seed is None else seed)
-        return build(replace(config, sample_rate_hz=needs.sample_rate_hz, thermal=needs.temperatures), checkpoint)
+        wanted = replace(
+            config, sample_rate_hz=needs.sample_rate_hz, thermal=needs.temperatures, currents=needs.currents
+        )
+        return build(wanted, checkpoint)
 
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
         """Bias and matrix of the job's launch, run-to-run changes included."""
