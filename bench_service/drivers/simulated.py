@@ -101,8 +101,12 @@ class SimulatedDriver:
         """
         from simulators.world import build  # with MuJoCo: not needed before a bench is opened
 
-        config = self._config(unit, 0 if seed is None else seed)
-        config = replace(config, sample_rate_hz=needs.sample_rate_hz, thermal=needs.temperatures)
+        config = replace(
+            self._config(unit, 0 if seed is None else seed),
+            sample_rate_hz=needs.sample_rate_hz,
+            thermal=needs.temperatures,
+            currents=needs.currents,
+        )
         bench = build(config, checkpoint)
         if self._register is None:
             return bench

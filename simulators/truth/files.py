@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from procedures.bench.chamber import ChamberLimits
+from procedures.bench.current_source import CurrentSourceLimits
 from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
 from procedures.core import units
 from procedures.core.site import Site
@@ -100,7 +101,12 @@ def parse_unit(text: str) -> UnitTruth:
 
 def _description(table: Table) -> BenchDescription:
     axes = {"outer", "middle", "inner"}
-    check_keys("description", table, {"id", "title", "site", "accuracy", "chamber", *axes}, {"id", "site", *axes})
+    check_keys(
+        "description",
+        table,
+        {"id", "title", "site", "accuracy", "chamber", "current_source", *axes},
+        {"id", "site", *axes},
+    )
     outer, middle, inner = (_axis(f"description.{axis}", table[axis]) for axis in ("outer", "middle", "inner"))
     site = read_record(Site, "description.site", table["site"], {"latitude_deg", "gravity_m_s2"})
     accuracy = read_record(TableAccuracy, "description.accuracy", table.get("accuracy", {}), set())
@@ -109,8 +115,20 @@ def _description(table: Table) -> BenchDescription:
     if "chamber" in table:
         needed = {f.name for f in fields(ChamberLimits)}
         chamber = read_record(ChamberLimits, "description.chamber", table["chamber"], needed)
+    source = None
+    if "current_source" in table:
+        source = read_record(CurrentSourceLimits, "description.current_source", table["current_source"], {"maximum_ma"})
     return BenchDescription(
-        str(table["id"]), site, outer, middle, inner, accuracy, simulated=True, title=title, chamber=chamber
+        str(table["id"]),
+        site,
+        outer,
+        middle,
+        inner,
+        accuracy,
+        simulated=True,
+        title=title,
+        chamber=chamber,
+        current_source=source,
     )
 
 
