@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import timedelta
 from threading import Event
 from typing import Any
 
 from bench_service.jobs.driver import BenchDriver
 from bench_service.jobs.errors import ServiceError
-from bench_service.jobs.job import FINAL, Failure, Job, JobState
+from bench_service.jobs.job import BENCH_FAULTS, FINAL, Failure, Job, JobState
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
 from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.session import BenchSession, ShuttingDown
@@ -22,6 +23,16 @@ from procedures.core.limits import Verdict
 from procedures.core.recording import Recording
 from procedures.core.unit_correction import UnitCorrection
 from procedures.procedure import Outcome
+
+
+RETRY_PAUSES_S = (10.0, 30.0, 60.0, 120.0, 300.0)
+"""How long a job waits before its first, second, … retry after a fault of the bench [s]."""
+DATABASE_FAULTS = frozenset({"StorageFailure", "LeaseLost"})
+"""Kinds of failure that a restart of the database leaves in a running job."""
+DATABASE_PAUSE_S = 1.0
+"""How long such a job waits before it goes on [s]."""
+MOST_ATTEMPTS = 20
+"""A job that was queued this often is not queued again by itself for the database's sake."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +58,18 @@ class JobRunner:
         driver: BenchDriver,
         code_version: str,
         lease_held: Callable[[], bool],
+        retry_scale: float = 1.0,
     ) -> None:
-        """`lease_held`: whether this process still has the right to drive the bench; asked before every station."""
+        """`lease_held`: whether this process still has the right to drive the bench; asked before every station.
+
+        `retry_scale`: of the pauses before a retry; less than 1 where bench time is not real time.
+        """
         self._stores = stores
         self._planner = planner
         self._driver = driver
         self._code_version = code_version
         self._lease_held = lease_held
+        self._retry_scale = retry_scale
         self._session: BenchSession | None = None
         self._ending = Event()
 
@@ -122,7 +138,7 @@ class JobRunner:
         return StepOutcome()
 
     def conclude(self, job_id: str) -> StepOutcome:
-        """Analyse, store the result with what it found of the unit, and end the job with the verdict; may be repeated."""
+        """Analyse, store the result with what it found, and end the job with the verdict; may be repeated."""
         job = self._stores.jobs.get(job_id)
         if job.state in FINAL:  # a crash came after its end was noted
             return StepOutcome()
@@ -150,9 +166,29 @@ class JobRunner:
         self._stores.recordings.interrupt_open(job_id)
         if outcome.paused:
             return self._stores.jobs.put_aside(job_id, now())
+        again = self._again(job, outcome.failure)
+        if again is not None:
+            return again
         to = JobState.CANCELLED if outcome.cancelled else JobState.FAILED
         verdict = None if outcome.cancelled else Verdict.ERROR
         return self._stores.jobs.transition(job_id, to, at=now(), verdict=verdict, failure=outcome.failure)
+
+    def _again(self, job: Job, failure: Failure | None) -> Job | None:
+        """Queue a job again where its failure may be gone the next time; None where it ends.
+
+        A fault of the bench costs one of the retries that were asked for. A database that was restarted costs none:
+        like a killed process, that is not the job's affair.
+        """
+        if failure is None:
+            return None
+        if failure.kind in BENCH_FAULTS and job.retries_left > 0:
+            pauses = RETRY_PAUSES_S[: job.retries - job.retries_left + 1]
+            due = now() + timedelta(seconds=pauses[-1] * self._retry_scale)
+            return self._stores.queue.requeue(job.id, now(), due, failure, spend=True)
+        if failure.kind in DATABASE_FAULTS and job.attempt < MOST_ATTEMPTS:
+            due = now() + timedelta(seconds=DATABASE_PAUSE_S)
+            return self._stores.queue.requeue(job.id, now(), due, failure, spend=False)
+        return None
 
     def shut_down(self) -> None:
         """The service is ending: leave the running job to the next start, and the bench safe."""

@@ -6,7 +6,7 @@
 
 from bench_service.persistence.database import Database
 from bench_service.persistence.engine_database import engine_database
-from bench_service.persistence.lease import BenchLease, acquire_lease
+from bench_service.persistence.lease import BenchLease, acquire_lease, lease_holder
 from bench_service.persistence.stores import open_stores
 
-__all__ = ["BenchLease", "Database", "acquire_lease", "engine_database", "open_stores"]
+__all__ = ["BenchLease", "Database", "acquire_lease", "engine_database", "lease_holder", "open_stores"]

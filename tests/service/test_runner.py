@@ -42,6 +42,9 @@ class IdleDispatcher:
 
     def wake(self) -> None: ...
 
+    def lease_held(self) -> bool:
+        return True
+
     def shut_down(self) -> None: ...
 
 
