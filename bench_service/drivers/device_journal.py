@@ -7,6 +7,7 @@ import json
 import logging
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,8 @@ class DeviceJournal:
         self._file: int | None = None
         self._size = 0
         self._told = False
+        self._cut = b""
+        """What ends a line that found no room for all of itself."""
 
     def write(self, verb: str, arguments: Mapping[str, Any], **more: Any) -> None:
         """Append a line: when, which process, verb, arguments, and whatever else matters."""
@@ -37,7 +40,9 @@ class DeviceJournal:
             if self._file is None:
                 self._open()
             assert self._file is not None
-            os.write(self._file, line)
+            whole = self._cut + line
+            written = os.write(self._file, whole)
+            self._cut = b"" if written == len(whole) else b"\n"
         except OSError as error:
             if not self._told:
                 log.warning("the journal %s cannot be written: %s", self.path, error)
@@ -57,9 +62,13 @@ class DeviceJournal:
         self.path.replace(self._old(1))
 
     def entries(self) -> list[dict[str, Any]]:
-        """Every line that is kept, oldest first."""
-        files = [self._old(number) for number in range(KEPT, 0, -1)] + [self.path]
-        return [json.loads(line) for file in files if file.exists() for line in file.read_text().splitlines()]
+        """Every line that is kept, oldest first; without those that a full disk cut."""
+        found: list[dict[str, Any]] = []
+        for file in [*(self._old(number) for number in range(KEPT, 0, -1)), self.path]:
+            for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
+                with suppress(json.JSONDecodeError):
+                    found.append(json.loads(line))
+        return found
 
     def close(self) -> None:
         """Close the file; the next line opens it again."""

@@ -8,12 +8,12 @@ ServiceError
 ├── Misconfigured        a file that the settings name cannot be used
 ├── NotDriving           this process drives no bench
 ├── NotReady             a job could not start here now
+├── NotSafe              the bench's devices are not known to be safe
 ├── AlreadyReserved      somebody keeps this bench or unit
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
 """
-
 
 from collections.abc import Sequence
 
@@ -40,7 +40,11 @@ class IdempotencyConflict(ServiceError):
 
 
 class BenchBusy(ServiceError):
-    """Another process drives this bench."""
+    """Another process drives this bench; `passing`: its supervisor, which gives it back in a moment."""
+
+    def __init__(self, message: str, passing: bool = False) -> None:
+        super().__init__(message)
+        self.passing = passing
 
 
 class Misconfigured(ServiceError):
@@ -57,6 +61,10 @@ class NotReady(ServiceError):
     def __init__(self, reasons: Sequence[str]) -> None:
         super().__init__("; ".join(reasons))
         self.reasons = tuple(reasons)
+
+
+class NotSafe(ServiceError):
+    """The bench's devices are not known to be safe."""
 
 
 class AlreadyReserved(ServiceError):

@@ -6,6 +6,7 @@ import socket
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 HOST = socket.gethostname()
 GONE = frozenset("ZXx")
@@ -46,6 +47,31 @@ class ProcessIdentity:
 
     def __str__(self) -> str:
         return f"process {self.pid} on {self.host}"
+
+
+@dataclass(frozen=True)
+class Driving:
+    """Which process drives, or last drove, a bench from this host."""
+
+    process: ProcessIdentity
+    ended: bool = False
+    """Whether it ended in order."""
+
+    @property
+    def alive(self) -> bool:
+        return not self.ended and self.process.alive()
+
+
+class Watch(Protocol):
+    """What processes of one host tell one another about a bench."""
+
+    def driving(self) -> Driving | None:
+        """Which process drives the bench; None where none of this host ever did."""
+        ...
+
+    def supervisor(self) -> ProcessIdentity | None:
+        """The process that supervises the bench on this host, if one lives."""
+        ...
 
 
 def _started(pid: int) -> str:

@@ -1,8 +1,8 @@
 """What a client asks of queues and reservations: where a job stands, and to keep a bench or a unit for a while."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 
 from bench_service.jobs.directory import BenchDirectory
 from bench_service.jobs.errors import NotFound
@@ -15,6 +15,9 @@ from bench_service.jobs.stored import Idempotency
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter
 
+LONGEST = timedelta(days=90)
+"""How far ahead a reservation may end."""
+
 
 @dataclass(frozen=True)
 class ReservationRequest:
@@ -23,7 +26,9 @@ class ReservationRequest:
     kind: Reserved
     name: str
     holder: str
-    until: datetime
+    until: datetime | None
+    minutes: float | None
+    """Where no moment is given: how long from now."""
     note: str = ""
 
 
@@ -38,8 +43,10 @@ class Standing:
 class QueueDesk:
     """Reads the queues of all benches, and keeps reservations."""
 
-    def __init__(self, stores: Stores, benches: BenchDirectory) -> None:
+    def __init__(self, stores: Stores, benches: BenchDirectory, wake: Callable[[], None]) -> None:
+        """`wake`: called where a job may start that had to wait."""
         self._stores = stores
+        self._wake = wake
         self._benches = benches
 
     def queue(self, bench_id: str) -> BenchQueue:
@@ -55,17 +62,23 @@ class QueueDesk:
     def reserve(self, request: ReservationRequest, idempotency_key: str | None = None) -> Reservation:
         """Keep a bench or a unit. Raises `NotFound` for one that is unknown, `AlreadyReserved`, `BadParameter`."""
         at = now()
-        if request.until <= at:
-            raise BadParameter("until", request.until.isoformat(), f"a moment after now, {at.isoformat()}")
+        until = request.until or at + timedelta(minutes=request.minutes or 0.0)
+        if not at < until <= at + LONGEST:
+            allowed = f"after now, {at.isoformat()}, and at most {LONGEST.days} days later"
+            raise BadParameter("until", until.isoformat(), allowed)
         if request.kind is Reserved.BENCH:
             self._benches.description(request.name)
         else:
             self._stores.units.unit(request.name)
-        made = Reservation(
-            new_id(), request.kind, request.name, request.holder, at, request.until, request.note
-        )
+        made = Reservation(new_id(), request.kind, request.name, request.holder, at, until, request.note)
         key = None if idempotency_key is None else Idempotency(f"reservations:{idempotency_key}", fingerprint(request))
         return self._stores.reservations.add(made, key)
+
+    def give_back(self, reservation_id: str) -> Reservation:
+        """End a reservation before its time. Raises `NotFound`."""
+        kept = self._stores.reservations.end(reservation_id, now())
+        self._wake()
+        return kept
 
     def usable(self, reservation_id: str, bench: str, unit: str) -> None:
         """Refuse a job under a reservation that does not hold, or is of something else. Raises `BadParameter`."""

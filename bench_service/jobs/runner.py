@@ -2,37 +2,28 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import timedelta
 from threading import Event
 from typing import Any
 
 from bench_service.jobs.driver import BenchDriver
-from bench_service.jobs.errors import ServiceError
-from bench_service.jobs.job import BENCH_FAULTS, FINAL, Failure, Job, JobState
+from bench_service.jobs.errors import ServiceError, StorageFailure
+from bench_service.jobs.job import FINAL, Failure, Job, JobState
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
+from bench_service.jobs.processes import ProcessIdentity
 from bench_service.jobs.queue import QueueEntry
+from bench_service.jobs.retries import try_again
 from bench_service.jobs.session import BenchSession, ShuttingDown
 from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import Idempotency, StoredResult
+from bench_service.jobs.stored import BenchStop, Idempotency, StoredResult
 from bench_service.wall_clock import new_id, now
 from procedures.bench import BenchNeeds
-from procedures.bench.errors import BenchError, Stopped
+from procedures.bench.errors import BenchError, Disconnected, Stopped
 from procedures.core.errors import DomainError
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import Recording
 from procedures.core.unit_correction import UnitCorrection
 from procedures.procedure import Outcome
-
-
-RETRY_PAUSES_S = (10.0, 30.0, 60.0, 120.0, 300.0)
-"""How long a job waits before its first, second, … retry after a fault of the bench [s]."""
-DATABASE_FAULTS = frozenset({"StorageFailure", "LeaseLost"})
-"""Kinds of failure that a restart of the database leaves in a running job."""
-DATABASE_PAUSE_S = 1.0
-"""How long such a job waits before it goes on [s]."""
-MOST_ATTEMPTS = 20
-"""A job that was queued this often is not queued again by itself for the database's sake."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +90,7 @@ class JobRunner:
             jobs.station_done(job_id, index, now(), {})
             return StepOutcome()
         job = jobs.get(job_id)
-        if job.cancel_requested or job.state in FINAL or self._stores.units.bench_stop(job.bench) is not None:
+        if job.cancel_requested or job.state in FINAL or self._stop_wanted(job_id):
             return StepOutcome(cancelled=True)
         if job.pause_requested:
             return StepOutcome(paused=True)
@@ -120,9 +111,15 @@ class JobRunner:
         return StepOutcome()
 
     def make_safe(self, job_id: str) -> StepOutcome:
-        """Leave the bench safe; after a restart in which no session survived, by opening it for that alone."""
+        """Leave the bench safe; after a restart in which no session survived, without the procedure.
+
+        A device that does not answer is asked once more over a new link. Where that fails too, the job ends and the
+        bench is stopped: nothing else runs on it until a person has looked.
+        """
         session = self._session
         if session is None or session.job.id != job_id:
+            if self._driver.device_state() is not None:
+                return self._make_safe_anew(job_id, "")
             job = self._stores.jobs.get(job_id)
             try:
                 session = self._session_of(job)
@@ -131,11 +128,17 @@ class JobRunner:
         try:
             session.make_safe()
         except ExceptionGroup as group:
-            return self._not_safe(job_id, "; ".join(str(error) for error in group.exceptions))
+            why = "; ".join(str(error) for error in group.exceptions)
+            if group.split(Disconnected)[1] is not None:
+                return self._not_safe(job_id, why)
+        except Disconnected as silence:
+            why = str(silence)
+        else:
+            return StepOutcome()
         finally:
             self._session = None
             session.close()
-        return StepOutcome()
+        return self._make_safe_anew(job_id, why)
 
     def conclude(self, job_id: str) -> StepOutcome:
         """Analyse, store the result with what it found, and end the job with the verdict; may be repeated."""
@@ -166,29 +169,12 @@ class JobRunner:
         self._stores.recordings.interrupt_open(job_id)
         if outcome.paused:
             return self._stores.jobs.put_aside(job_id, now())
-        again = self._again(job, outcome.failure)
+        again = try_again(self._stores.queue, job, outcome.failure, self._retry_scale)
         if again is not None:
             return again
         to = JobState.CANCELLED if outcome.cancelled else JobState.FAILED
         verdict = None if outcome.cancelled else Verdict.ERROR
         return self._stores.jobs.transition(job_id, to, at=now(), verdict=verdict, failure=outcome.failure)
-
-    def _again(self, job: Job, failure: Failure | None) -> Job | None:
-        """Queue a job again where its failure may be gone the next time; None where it ends.
-
-        A fault of the bench costs one of the retries that were asked for. A database that was restarted costs none:
-        like a killed process, that is not the job's affair.
-        """
-        if failure is None:
-            return None
-        if failure.kind in BENCH_FAULTS and job.retries_left > 0:
-            pauses = RETRY_PAUSES_S[: job.retries - job.retries_left + 1]
-            due = now() + timedelta(seconds=pauses[-1] * self._retry_scale)
-            return self._stores.queue.requeue(job.id, now(), due, failure, spend=True)
-        if failure.kind in DATABASE_FAULTS and job.attempt < MOST_ATTEMPTS:
-            due = now() + timedelta(seconds=DATABASE_PAUSE_S)
-            return self._stores.queue.requeue(job.id, now(), due, failure, spend=False)
-        return None
 
     def shut_down(self) -> None:
         """The service is ending: leave the running job to the next start, and the bench safe."""
@@ -210,10 +196,34 @@ class JobRunner:
         if found != unit:
             self._stores.units.put_unit(found)
 
+    def _make_safe_anew(self, job_id: str, why: str) -> StepOutcome:
+        """Over the devices' own link, once the job's is given up; `why` that one did not do."""
+        try:
+            self._driver.make_safe(f"the service, {ProcessIdentity.own()}")
+        except BenchError as error:
+            return self._not_safe(job_id, f"{why}; then: {error}" if why else str(error))
+        except ExceptionGroup as group:
+            return self._not_safe(job_id, "; ".join([*([why] if why else []), *map(str, group.exceptions)]))
+        if why:
+            self._stores.jobs.note(job_id, "note", now(), {"text": f"the bench was made safe over a new link: {why}"})
+        return StepOutcome()
+
     def _not_safe(self, job_id: str, why: str) -> StepOutcome:
         text = f"the bench could not be made safe: {why}"
+        self._stores.units.stop_bench(BenchStop(self._driver.description.id, now(), f"could not be made safe: {why}"))
         self._stores.jobs.note(job_id, "note", now(), {"text": text})
         return StepOutcome(Failure("NotSafe", text))
+
+    def _stop_wanted(self, job_id: str) -> bool:
+        """Whether the job was cancelled or its bench stopped, whichever process was asked.
+
+        A database that does not answer now, because it is restarted, has nothing to say: the recording goes on.
+        """
+        try:
+            bench_stop = self._stores.units.bench_stop(self._driver.description.id)
+            return bench_stop is not None or self._stores.jobs.cancel_requested(job_id)
+        except StorageFailure:
+            return False
 
     def _session_of(self, job: Job) -> BenchSession:
         if self._session is not None and self._session.job.id == job.id:
@@ -226,7 +236,7 @@ class JobRunner:
             self._planner.procedure(job.procedure),
             bench,
             self._stores.recordings,
-            lambda: self._stores.jobs.cancel_requested(job.id),
+            lambda: self._stop_wanted(job.id),
         )
         return self._session
 

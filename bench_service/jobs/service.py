@@ -1,6 +1,7 @@
 """What the service can be asked, in one place: HTTP and command line say it in their own words."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from datetime import timedelta
 from random import SystemRandom
 
@@ -11,6 +12,7 @@ from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.planning import CONTEXT, Plan, Planner, register
 from bench_service.jobs.queue_desk import QueueDesk
 from bench_service.jobs.request import JobRequest, fingerprint
+from bench_service.jobs.safety import Safety, SafetyDesk
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import BenchStop, Idempotency, StoredResult
 from bench_service.jobs.worker import Worker
@@ -36,19 +38,21 @@ class BenchService:
         planner: Planner,
         worker: Worker | None,
         code_version: str,
+        safety: SafetyDesk,
         free_bytes: Callable[[], int | None] = lambda: None,
     ) -> None:
         """`driver`: of this process's own bench; None: it plans and queues for benches that workers drive.
 
         `free_bytes`: room on the database's disk, where that is known.
         """
+        self.safety = safety
         self.stores = stores
         self.driver = driver
         self.planner = planner
         self.code_version = code_version
         self.analyses = AnalysisDesk(stores, planner, code_version)
         self.benches = planner.benches
-        self.queues = QueueDesk(stores, planner.benches)
+        self.queues = QueueDesk(stores, planner.benches, self._wake)
         self._worker = worker
         self._free_bytes = free_bytes
 
@@ -61,6 +65,8 @@ class BenchService:
         for unit in mounted:
             register(self.stores, unit)
         self.stores.units.put_bench(self.driver.description, [unit.serial for unit in mounted])
+        if self._worker is not None:
+            self.safety.at_start(self.driver.description.id)
 
     def begin(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
         """Begin to work, beside the first answers. The bench's lease must be held.
@@ -123,25 +129,24 @@ class BenchService:
         self._wake()
         return job
 
-    def stop_bench(self, bench_id: str, reason: str) -> Job | None:
-        """Stop what the bench is doing, until it is released; the job that was running, if any.
-
-        Its bench is safe once that job is cancelled. Jobs in the queue wait.
+    def stop_bench(self, bench_id: str, reason: str) -> tuple[Job | None, Safety]:
+        """Stop what the bench is doing, wherever its worker is, until it is released; the job that was running, if
+        any, and what is known of the bench's safety then. Jobs in the queue wait.
         """
         self.benches.description(bench_id)
         self.stores.units.stop_bench(BenchStop(bench_id, now(), reason))
         running = self.running_job(bench_id)
-        if running is None:
-            return None
-        try:
-            return self.cancel(running.id)
-        except IllegalTransition:
-            return None
+        if running is not None:
+            with suppress(IllegalTransition):  # it has ended this moment
+                running = self.cancel(running.id)
+        return running, self.safety.stopping(bench_id)
 
     def release_bench(self, bench_id: str) -> None:
-        """Let a stopped bench work again; the jobs in its queue go on."""
+        """Let a stopped bench work again; the jobs in its queue go on. Raises `NotSafe` while it is not safe."""
         self.benches.description(bench_id)
-        self.stores.units.release_bench(bench_id)
+        if self.stores.units.bench_stop(bench_id) is not None:
+            self.safety.require(bench_id)
+            self.stores.units.release_bench(bench_id)
         self._wake()
 
     def set_priority(self, job_id: str, priority: int) -> Job:

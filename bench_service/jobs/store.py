@@ -250,6 +250,10 @@ class UnitStore(Protocol):
         """Note that a bench was stopped; it stays so until it is released. A second stop changes nothing."""
         ...
 
+    def confirm_safe(self, bench_id: str, at: datetime, by: str) -> None:
+        """Note that a stopped bench was seen safe; only the first time counts, and only while the stop stands."""
+        ...
+
     def release_bench(self, bench_id: str) -> None:
         """Let the bench work again; one that is not stopped stays as it is."""
         ...

@@ -33,17 +33,36 @@ class BenchLease(Protocol):
     def release(self) -> None: ...
 
 
-def acquire_lease(database_url: str, bench_id: str) -> BenchLease:
-    """Take the bench, at once or not at all. Raises `BenchBusy`, naming the holder where it is known."""
+PASSING_S = 5.0
+"""How long a process that starts waits for a supervisor that makes the bench safe at this moment [s]."""
+SUPERVISOR = "supervisor"
+
+
+def acquire_lease(database_url: str, bench_id: str, role: str = "process") -> BenchLease:
+    """Take the bench, at once or not at all; only a supervisor, which has it for a moment, is waited for.
+
+    `role`: as what others shall name the holder. Raises `BenchBusy`, naming the holder where it is known.
+    """
+    deadline = wall_clock.monotonic_s() + PASSING_S
+    while True:
+        try:
+            return _lease(database_url, bench_id, role)
+        except BenchBusy as busy:
+            if not busy.passing or role == SUPERVISOR or wall_clock.monotonic_s() > deadline:
+                raise
+        wall_clock.pause(0.02)
+
+
+def _lease(database_url: str, bench_id: str, role: str) -> BenchLease:
     with storage_errors():
         url = make_url(database_url)
         if url.get_backend_name() == "sqlite":
-            return FileLease(Path(url.database or "bench.sqlite").parent / f"bench-{bench_id}.lock", bench_id)
-        return ServerLease(url, bench_id)
+            return FileLease(Path(url.database or "bench.sqlite").parent / f"bench-{bench_id}.lock", bench_id, role)
+        return ServerLease(url, bench_id, role)
 
 
 def _written_holder(file: int) -> str:
-    """The process id in a lock file; its holder writes it a moment after it took the lock."""
+    """Role and process id in a lock file; its holder writes it a moment after it took the lock."""
     for _ in range(20):
         holder = os.pread(file, 32, 0).decode(errors="replace").strip()
         if holder:
@@ -55,10 +74,11 @@ def _written_holder(file: int) -> str:
 class FileLease:
     """A locked file, with the holder's process id in it."""
 
-    def __init__(self, path: Path, bench_id: str) -> None:
+    def __init__(self, path: Path, bench_id: str, role: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._path = path
         self._bench_id = bench_id
+        self._role = role
         self._file: int | None = self._locked()
 
     def held(self) -> bool:
@@ -96,19 +116,19 @@ class FileLease:
                 break
             except BlockingIOError:
                 if not again:
-                    holder = _written_holder(file)
+                    who = _written_holder(file)
                     os.close(file)
-                    raise BenchBusy(f"bench {self._bench_id!r} is driven by {_process(holder)}") from None
+                    raise _busy(self._bench_id, who) from None
             wall_clock.pause(0.01)  # it may only be somebody who looks whether it is taken: `lease_holder`
         os.ftruncate(file, 0)
-        os.pwrite(file, f"{os.getpid()}\n".encode(), 0)
+        os.pwrite(file, f"{self._role} {os.getpid()}\n".encode(), 0)
         return file
 
 
 class ServerLease:
     """An advisory lock of a connection of its own."""
 
-    def __init__(self, url: URL, bench_id: str) -> None:
+    def __init__(self, url: URL, bench_id: str, role: str) -> None:
         self._mutex = threading.Lock()
         self._bench_id = bench_id
         self._key = lease_key(bench_id)
@@ -118,7 +138,7 @@ class ServerLease:
             isolation_level="AUTOCOMMIT",
             connect_args={
                 "connect_timeout": 10,
-                "application_name": f"bench {bench_id} pid {os.getpid()} on {socket.gethostname()}"[:63],
+                "application_name": f"bench {bench_id} {role} pid {os.getpid()} on {socket.gethostname()}"[:63],
                 "keepalives_idle": 5,
                 "keepalives_interval": 2,
                 "keepalives_count": 3,
@@ -160,7 +180,7 @@ class ServerLease:
         if not connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": self._key}):
             who = holder(connection, self._key)
             connection.close()
-            raise BenchBusy(f"bench {self._bench_id!r} is driven by {who or 'another process'}")
+            raise _busy(self._bench_id, who)
         return connection
 
     def _drop(self) -> None:
@@ -171,13 +191,13 @@ class ServerLease:
 
 
 def lease_holder(database: Database, database_url: str, bench_id: str) -> str | None:
-    """Who drives a bench now, in a person's words; None: nobody. Takes nothing away from anybody.
+    """Who drives a bench now, in a person's words; None: nobody, or only a supervisor that makes it safe.
 
     On SQLite the lock is tried for a moment in its shared form, which a process that starts meanwhile waits out.
     """
     if database.is_postgres:
         with database.read() as session:
-            return holder(session, lease_key(bench_id))
+            return _worker(holder(session, lease_key(bench_id)))
     path = Path(make_url(database_url).database or "bench.sqlite").parent / f"bench-{bench_id}.lock"
     try:
         file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
@@ -186,15 +206,21 @@ def lease_holder(database: Database, database_url: str, bench_id: str) -> str | 
     try:
         fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
-        return _process(os.pread(file, 32, 0).decode(errors="replace").strip())
+        return _worker(os.pread(file, 32, 0).decode(errors="replace").strip() or "another process")
     else:
         return None
     finally:
         os.close(file)
 
 
-def _process(holder: str) -> str:
-    return f"process {holder}" if holder else "another process"
+def _worker(holder: str | None) -> str | None:
+    return None if holder is None or f"{SUPERVISOR} " in holder else holder
+
+
+def _busy(bench_id: str, who: str | None) -> BenchBusy:
+    """For example: bench 'sim' is driven by process 4711."""
+    named = who or "another process"
+    return BenchBusy(f"bench {bench_id!r} is driven by {named}", passing=f"{SUPERVISOR} " in named)
 
 
 def lease_key(bench_id: str) -> int:
