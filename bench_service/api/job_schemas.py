@@ -8,6 +8,7 @@ from pydantic import BaseModel, Field
 from bench_service.api.requests import Labels
 from bench_service.jobs.job import Event, Failure, Job, JobState
 from bench_service.jobs.live import LiveJob
+from bench_service.jobs.queue_desk import Standing
 from procedures.core.limits import Verdict
 
 
@@ -26,6 +27,13 @@ class Progress(BaseModel):
     label: str | None = Field(description="The station that it works on while it runs, else null")
 
 
+class PlaceView(BaseModel):
+    """A queued job's place."""
+
+    position: int = Field(description="From 1, in the order of its bench's queue")
+    ahead: int = Field(description="Jobs that go before it as things stand, the running one included")
+
+
 class JobView(BaseModel):
     """A job."""
 
@@ -40,6 +48,14 @@ class JobView(BaseModel):
     priority: int
     attempt: int = Field(description="How often it was queued: once, and again at each resume")
     pause_requested: bool = Field(description="It pauses before its next station")
+    queue: PlaceView | None = Field(description="Its place while it is queued")
+    waiting: str | None = Field(description="Why it does not run now, as a sentence")
+    resumable: bool = Field(description="Whether it can be queued again to go on where it ended")
+    retries: int = Field(description="How often a fault of the bench is answered by trying again")
+    retries_left: int
+    not_before: datetime | None = Field(description="It is not tried before this moment")
+    reservation: str | None = Field(description="The reservation under which it runs")
+    queued_at: datetime | None = Field(description="When it came into its bench's queue")
     deadline_at: datetime | None = Field(description="No station begins later")
     labels: Labels
     requested_parameters: dict[str, Any]
@@ -56,8 +72,9 @@ class JobView(BaseModel):
     page: str = Field(description="Path of the page for an eye")
 
     @classmethod
-    def of(cls, job: Job, live: LiveJob | None = None) -> "JobView":
-        """`live`: what its bench says of it while it runs."""
+    def of(cls, job: Job, standing: Standing | None = None, live: LiveJob | None = None) -> "JobView":
+        """As HTTP says it; `standing` where it was asked for, `live` what its bench says of it while it runs."""
+        place = None if standing is None else standing.place
         stations = len(job.stations)
         open_state = job.state in (JobState.QUEUED, JobState.RUNNING, JobState.PAUSED)
         fraction = 1.0 if job.state is JobState.SUCCEEDED else job.stations_done / stations if stations else 0.0
@@ -75,6 +92,9 @@ class JobView(BaseModel):
                 bench_time_s=None if live is None else live.bench_time_s,
                 label=None if live is None else live.label,
             ),
+            queue=None if place is None else PlaceView(position=place.position, ahead=place.ahead),
+            waiting=None if standing is None else standing.waiting,
+            resumable=job.resumable,
             error=job.failure,
             result=job.result_id,
             page=f"/jobs/{job.id}",

@@ -156,9 +156,20 @@ class SimulatedDriver:
     def _truth_of(self, serial: str) -> UnitTruth:
         if serial == self._unit.serial:
             return self._unit
-        found = RANDOM_UNIT.match(serial)
-        if found is None:
+        drawn = _drawn_truth(serial)
+        if drawn is None:
             raise NotMounted(
                 f"the simulated bench has no unit {serial!r}; it has {self._unit.serial} and RANDOM-<number>"
             )
-        return replace(random_unit_truth(int(found.group(1))), serial=serial)
+        return drawn
+
+
+def drawn_unit(serial: str) -> Unit | None:
+    """A unit that every simulated bench has by drawing it from its serial, as declared; None for another serial."""
+    truth = _drawn_truth(serial)
+    return None if truth is None else declared_unit(truth)
+
+
+def _drawn_truth(serial: str) -> UnitTruth | None:
+    found = RANDOM_UNIT.match(serial)
+    return None if found is None else replace(random_unit_truth(int(found.group(1))), serial=serial)

@@ -13,6 +13,7 @@ from bench_service.jobs.live_tap import LiveTap
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
 from bench_service.jobs.processes import ProcessIdentity
 from bench_service.jobs.queue import QueueEntry
+from bench_service.jobs.retries import try_again
 from bench_service.jobs.session import BenchSession, ShuttingDown
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import BenchStop, Idempotency, StoredResult
@@ -51,10 +52,12 @@ class JobRunner:
         code_version: str,
         lease_held: Callable[[], bool],
         live: LiveBoard | None = None,
+        retry_scale: float = 1.0,
     ) -> None:
         """`lease_held`: whether this process still has the right to drive the bench; asked before every station.
 
         `live`: where it is said what the bench does; None: nowhere.
+        `retry_scale`: of the pauses before a retry; less than 1 where bench time is not real time.
         """
         self._stores = stores
         self._planner = planner
@@ -62,6 +65,7 @@ class JobRunner:
         self._code_version = code_version
         self._lease_held = lease_held
         self._live = live
+        self._retry_scale = retry_scale
         self._session: BenchSession | None = None
         self._ending = Event()
 
@@ -142,7 +146,7 @@ class JobRunner:
         return self._make_safe_anew(job_id, why)
 
     def conclude(self, job_id: str) -> StepOutcome:
-        """Analyse, store the result with what it found of the unit, and end the job; may be repeated."""
+        """Analyse, store the result with what it found, and end the job with the verdict; may be repeated."""
         job = self._stores.jobs.get(job_id)
         if job.state in FINAL:  # a crash came after its end was noted
             return StepOutcome()
@@ -170,6 +174,9 @@ class JobRunner:
         self._stores.recordings.interrupt_open(job_id)
         if outcome.paused:
             return self._stores.jobs.put_aside(job_id, now())
+        again = try_again(self._stores.queue, job, outcome.failure, self._retry_scale)
+        if again is not None:
+            return again
         to = JobState.CANCELLED if outcome.cancelled else JobState.FAILED
         verdict = None if outcome.cancelled else Verdict.ERROR
         return self._stores.jobs.transition(job_id, to, at=now(), verdict=verdict, failure=outcome.failure)

@@ -241,7 +241,13 @@ class UnitStore(Protocol):
 
     def units(self) -> tuple[Unit, ...]: ...
 
-    def put_bench(self, bench: BenchDescription) -> None: ...
+    def put_bench(self, bench: BenchDescription, mounted: Sequence[str] = ()) -> None:
+        """Register a bench with the serials of the units that it can test."""
+        ...
+
+    def mounted(self, bench_id: str) -> tuple[str, ...]:
+        """The serials of the units that a bench can test. Raises `NotFound`."""
+        ...
 
     def bench(self, bench_id: str) -> BenchDescription:
         """Raises `NotFound`."""

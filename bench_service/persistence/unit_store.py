@@ -1,6 +1,7 @@
 """Units and benches in SQL: what is declared of them. Calibrations and corrections are the result
 store's: only joined here."""
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
@@ -56,17 +57,23 @@ class SqlUnitStore:
             rows = session.execute(_UNITS.order_by(UnitRow.serial)).all()
         return tuple(_unit(*row) for row in rows)
 
-    def put_bench(self, bench: BenchDescription) -> None:
-        document = BENCH.dump_python(bench, mode="json")
+    def put_bench(self, bench: BenchDescription, mounted: Sequence[str] = ()) -> None:
+        document = {**BENCH.dump_python(bench, mode="json"), "mounted": list(mounted)}
         with self._database.write() as session:
             session.merge(BenchRow(id=bench.id, document=document, updated_at=wall_clock.now()))
 
     def bench(self, bench_id: str) -> BenchDescription:
+        return BENCH.validate_python(self._bench(bench_id))
+
+    def mounted(self, bench_id: str) -> tuple[str, ...]:
+        return tuple(self._bench(bench_id).get("mounted", ()))
+
+    def _bench(self, bench_id: str) -> dict[str, Any]:
         with self._database.read() as session:
             row = session.get(BenchRow, bench_id)
         if row is None:
             raise NotFound("bench", bench_id)
-        return BENCH.validate_python(row.document)
+        return row.document
 
     def benches(self) -> tuple[BenchDescription, ...]:
         with self._database.read() as session:
