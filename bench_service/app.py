@@ -9,7 +9,19 @@ from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
-from bench_service.api import analyses, benches, errors, event_stream, health, jobs, procedures, recordings, units
+from bench_service.api import (
+    analyses,
+    audit,
+    benches,
+    errors,
+    event_stream,
+    health,
+    jobs,
+    procedures,
+    recordings,
+    request_id,
+    units,
+)
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs.code_version import code_version
 from bench_service.jobs.event_hub import EventHub
@@ -18,12 +30,14 @@ from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
+from bench_service.jobs.told_runner import ToldRunner
+from bench_service.jobs.tracing import traces_to
 from bench_service.jobs.worker import JobEngine, Worker
 from bench_service.pages import figures, routes
 from bench_service.persistence import acquire_lease, engine_database, open_stores
 from bench_service.settings import Settings
 
-ROUTERS = (procedures, jobs, recordings, analyses, units, benches, health)
+ROUTERS = (procedures, jobs, recordings, analyses, units, benches, audit, health)
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> BenchService:
@@ -38,6 +52,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     closing.callback(database.dispose)
     planner = Planner(stores, driver)
     code = code_version()
+    traces = traces_to(settings.traces_url, settings.bench_id, code)
+    closing.callback(traces.close)
     worker: Worker | None = None
     board = LiveBoard(stores.live)
     if drive:
@@ -47,9 +63,9 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
         heartbeat = Heartbeat(board, stores.live)
         heartbeat.begin()
         closing.callback(heartbeat.end)
-        runner = JobRunner(stores, planner, driver, code, lease.held, board)
+        runner = ToldRunner(stores, planner, driver, code, lease.held, board, traces)
         worker = Worker(runner, partial(_engine, settings, stores))
-    service = BenchService(stores, driver, planner, worker, code, board)
+    service = BenchService(stores, driver, planner, worker, code, board, traces)
     closing.callback(service.stop)
     service.register()
     return service
@@ -88,6 +104,9 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         app.include_router(module.router)
     app.include_router(routes.router)
     errors.install(app)
+    app.add_middleware(audit.Audited, trail=service.stores.audit)
+    app.add_middleware(request_id.RequestId)
+    service.traces.instrument(app)
     _declare_problem(app)
     return app
 

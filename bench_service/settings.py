@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -29,6 +30,14 @@ class Settings(BaseModel):
     """Simulated seconds per real second; None: as fast as the machine allows."""
     poll_s: float = Field(0.1, gt=0, le=10)
     """How often the job engine looks for queued work."""
+    log: Literal["text", "json"] = "text"
+    """How lines of the log look."""
+    log_level: Literal["debug", "info", "warning", "error"] | None = None
+    """From which level on; None: info for a service, warning for a command that works in this process."""
+    log_access: bool = False
+    """Whether every request is a line of the log."""
+    traces_url: str | None = Field(None, pattern=r"^https?://\S+$")
+    """Where traces go (OTLP over HTTP, protobuf); None: nowhere, unless OTEL_EXPORTER_OTLP_ENDPOINT names a place."""
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported."""
 
@@ -39,6 +48,9 @@ class Settings(BaseModel):
         if unknown:
             raise BadSettings(f"{unknown[0]} is no setting; there are {', '.join(cls.variables())}")
         given = {name: environ[key] for name in cls.model_fields if (key := _variable(name)) in environ}
+        collector = environ.get("OTEL_EXPORTER_OTLP_ENDPOINT")
+        if collector and "traces_url" not in given:
+            given["traces_url"] = collector.rstrip("/") + "/v1/traces"
         try:
             return cls.model_validate(given)
         except ValidationError as error:

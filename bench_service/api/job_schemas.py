@@ -42,6 +42,7 @@ class JobView(BaseModel):
     pause_requested: bool = Field(description="It pauses before its next station")
     deadline_at: datetime | None = Field(description="No station begins later")
     labels: Labels
+    requested_by: str = Field(description="Who asked for it, as far as the client said")
     requested_parameters: dict[str, Any]
     parameters: dict[str, Any]
     simulated: bool

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import StreamingResponse
 
 from bench_service.api import event_stream
-from bench_service.api.dependencies import After, Hub, IdempotencyKey, Limit, Service
+from bench_service.api.dependencies import After, Hub, IdempotencyKey, Limit, RequestedBy, Service
 from bench_service.api.errors import made, problems
 from bench_service.api.job_schemas import JobPage, JobView
 from bench_service.api.requests import JobSubmission, Reanalysis
@@ -41,7 +41,13 @@ OF_A_JOB = ("read_job", "cancel", "pause", "resume", "events", "read_result", "r
         ),
     },
 )
-def submit(body: JobSubmission, service: Service, response: Response, key: IdempotencyKey = None) -> JobView:
+def submit(
+    body: JobSubmission,
+    service: Service,
+    response: Response,
+    key: IdempotencyKey = None,
+    requested_by: RequestedBy = None,
+) -> JobView:
     """Queue a job. The same `Idempotency-Key` with the same body gives the job that the first one made."""
     job = service.submit(
         JobRequest(
@@ -55,6 +61,7 @@ def submit(body: JobSubmission, service: Service, response: Response, key: Idemp
             body.deadline_at,
         ),
         key,
+        requested_by or "",
     )
     response.headers["Location"] = f"/api/v1/jobs/{job.id}"
     return JobView.of(job)

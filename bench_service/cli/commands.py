@@ -58,7 +58,7 @@ def serve(
 
     settings = _with(context.obj, host=host, port=port)
     check_port(settings)
-    with ready(settings) as server:
+    with ready(settings, level="info") as server:
         console.print(f"bench {settings.bench_id} at http://{settings.host}:{settings.port}")
         server.run()
 

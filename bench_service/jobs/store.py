@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from bench_service.jobs.audit import AuditTrail
 from bench_service.jobs.job import Event, Failure, Job, JobState
 from bench_service.jobs.live import LiveStore
 from bench_service.jobs.stored import (
@@ -265,3 +266,4 @@ class Stores:
     results: ResultStore
     units: UnitStore
     live: LiveStore
+    audit: AuditTrail

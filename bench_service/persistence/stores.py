@@ -1,6 +1,7 @@
 """Putting the stores together: one database, all stores. Must not know who uses them."""
 
 from bench_service.jobs.store import Stores
+from bench_service.persistence.audit_store import SqlAuditTrail
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.job_store import SqlJobStore
 from bench_service.persistence.live_store import SqlLiveStore
@@ -29,4 +30,5 @@ def stores_of(database: Database) -> Stores:
         results=SqlResultStore(database),
         units=SqlUnitStore(database),
         live=SqlLiveStore(database),
+        audit=SqlAuditTrail(database),
     )
