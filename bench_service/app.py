@@ -17,6 +17,7 @@ from bench_service.api import (
     event_stream,
     health,
     jobs,
+    metrics,
     procedures,
     recordings,
     request_id,
@@ -37,7 +38,7 @@ from bench_service.pages import figures, routes
 from bench_service.persistence import acquire_lease, engine_database, open_stores
 from bench_service.settings import Settings
 
-ROUTERS = (procedures, jobs, recordings, analyses, units, benches, audit, health)
+ROUTERS = (procedures, jobs, recordings, analyses, units, benches, audit, health, metrics)
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> BenchService:
@@ -104,6 +105,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         app.include_router(module.router)
     app.include_router(routes.router)
     errors.install(app)
+    metrics.install(app, service)
     app.add_middleware(audit.Audited, trail=service.stores.audit)
     app.add_middleware(request_id.RequestId)
     service.traces.instrument(app)

@@ -1,7 +1,6 @@
-"""Is it alive, is it ready, and the counts that a monitor reads."""
+"""Is it alive, is it ready."""
 
-from fastapi import APIRouter, Response
-from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Gauge, generate_latest
+from fastapi import APIRouter
 from pydantic import BaseModel
 
 from bench_service.api.dependencies import Service
@@ -28,19 +27,3 @@ def readyz(service: Service) -> Health:
     """The database answers and the bench's worker runs; waits for it after a start."""
     service.ready()
     return Health(code_version=service.code_version)
-
-
-@router.get(
-    "/metrics",
-    response_class=Response,
-    responses={**problems(), 200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
-)
-def metrics(service: Service) -> Response:
-    """Jobs by state and whether the bench is busy, in Prometheus text format."""
-    registry = CollectorRegistry()
-    jobs = Gauge("bench_jobs", "Jobs by state", ["state"], registry=registry)
-    for state, count in service.stores.jobs.counts().items():
-        jobs.labels(state.value).set(count)
-    busy = Gauge("bench_busy", "1 while a job drives the bench", ["bench"], registry=registry)
-    busy.labels(service.driver.description.id).set(service.running_job() is not None)
-    return Response(generate_latest(registry), media_type=CONTENT_TYPE_LATEST)

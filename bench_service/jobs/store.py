@@ -23,6 +23,7 @@ from bench_service.jobs.stored import (
     StoredRecording,
     StoredResult,
 )
+from bench_service.jobs.tallies import TallyStore
 from procedures.bench import BenchDescription
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
@@ -267,3 +268,4 @@ class Stores:
     units: UnitStore
     live: LiveStore
     audit: AuditTrail
+    tallies: TallyStore

@@ -15,7 +15,6 @@ from uuid import UUID
 
 from bench_service.jobs.job import Job
 
-
 TIMEOUT_S = 2.0
 """How long a collector may take for an answer, also at the end of the service [s]."""
 Found = dict[str, str | int | float | bool]

@@ -8,6 +8,7 @@ from bench_service.persistence.live_store import SqlLiveStore
 from bench_service.persistence.migration import upgrade_to_head
 from bench_service.persistence.recording_store import SqlRecordingStore
 from bench_service.persistence.result_store import SqlResultStore
+from bench_service.persistence.tally_store import SqlTallyStore
 from bench_service.persistence.unit_store import SqlUnitStore
 
 
@@ -31,4 +32,5 @@ def stores_of(database: Database) -> Stores:
         units=SqlUnitStore(database),
         live=SqlLiveStore(database),
         audit=SqlAuditTrail(database),
+        tallies=SqlTallyStore(database),
     )

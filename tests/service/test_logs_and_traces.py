@@ -85,7 +85,7 @@ def process(folder: Path, port: int, **environment: str) -> Generator[tuple[Clie
             running.wait(30)
 
 
-def attributes(span) -> dict:  # noqa: ANN001
+def attributes(span) -> dict:
     return {a.key: a.value.string_value or a.value.int_value for a in span.attributes}
 
 
@@ -100,7 +100,7 @@ def test_every_line_is_json_about_its_job_and_every_job_one_trace(tmp_path: Path
     assert all({"at", "level", "logger", "message", "bench"} <= set(line) for line in lines)
     about = [line for line in lines if line.get("job") == job["id"]]
     messages = [line["message"] for line in about]
-    assert [line for line in about if line["message"].endswith("queued")][0]["request"]
+    assert next(line for line in about if line["message"].endswith("queued"))["request"]
     assert "started, attempt 1, 12 stations" in messages
     assert [line["step"] for line in about if line["message"].endswith("recorded")] == [
         f"station {k}" for k in range(12)
