@@ -11,13 +11,16 @@ from threadpoolctl import threadpool_limits
 
 from bench_service.api import (
     analyses,
+    audit,
     benches,
     errors,
     event_stream,
     health,
     jobs,
+    metrics,
     procedures,
     recordings,
+    request_id,
     reservations,
     units,
 )
@@ -36,13 +39,15 @@ from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.safety import SafetyDesk
 from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
+from bench_service.jobs.told_runner import ToldRunner
+from bench_service.jobs.tracing import traces_to
 from bench_service.jobs.worker import Worker
 from bench_service.pages import figures, routes
 from bench_service.persistence import BenchLease, acquire_lease, engine_database, lease_holder, open_stores
 from bench_service.persistence.host_files import HostFiles
 from bench_service.settings import Settings
 
-ROUTERS = (procedures, jobs, recordings, analyses, units, benches, reservations, health)
+ROUTERS = (procedures, jobs, recordings, analyses, units, benches, reservations, audit, health, metrics)
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> BenchService:
@@ -59,6 +64,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     holder = partial(lease_holder, database, settings.database_url)
     planner = Planner(stores, BenchDirectory(stores.units, driver, settings.bench_id, drawn_unit, holder))
     code = code_version()
+    traces = traces_to(settings.traces_url, settings.bench_id, code)
+    closing.callback(traces.close)
     worker: Worker | None = None
     board = LiveBoard(stores.live)
     if driver is not None:
@@ -71,10 +78,10 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
         heartbeat = Heartbeat(board, stores.live)
         heartbeat.begin()
         closing.callback(heartbeat.end)
-        runner = JobRunner(stores, planner, driver, code, lease.held, board, settings.retry_scale)
+        runner = ToldRunner(stores, planner, driver, code, lease.held, board, settings.retry_scale, traces)
         worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease))
     safety = SafetyDesk(stores, partial(_devices, settings), partial(HostFiles, settings.devices_in()))
-    service = BenchService(stores, driver, planner, worker, code, safety, board, database.free_bytes)
+    service = BenchService(stores, driver, planner, worker, code, safety, board, database.free_bytes, traces)
     closing.callback(service.stop)
     service.register()
     return service
@@ -132,6 +139,10 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         app.include_router(module.router)
     app.include_router(routes.router)
     errors.install(app)
+    metrics.install(app, service)
+    app.add_middleware(audit.Audited, trail=service.stores.audit)
+    app.add_middleware(request_id.RequestId)
+    service.traces.instrument(app)
     _declare_problem(app)
     return app
 

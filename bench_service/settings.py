@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Literal
 from urllib.parse import urlsplit
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -40,6 +41,14 @@ class Settings(BaseModel):
     """Whether `bench serve` drives its bench; false: an API alone, for benches that workers drive."""
     retry_scale: float = Field(1.0, gt=0, le=1)
     """Of the pauses before a retry after a fault of the bench (10 s, 30 s, 60 s, …)."""
+    log: Literal["text", "json"] = "text"
+    """How lines of the log look."""
+    log_level: Literal["debug", "info", "warning", "error"] | None = None
+    """From which level on; None: info for a service, warning for a command that works in this process."""
+    log_access: bool = False
+    """Whether every request is a line of the log."""
+    traces_url: str | None = Field(None, pattern=r"^https?://\S+$")
+    """Where traces go (OTLP over HTTP, protobuf); None: nowhere, unless OTEL_EXPORTER_OTLP_ENDPOINT names a place."""
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported."""
 
@@ -59,6 +68,9 @@ class Settings(BaseModel):
         if unknown:
             raise BadSettings(f"{unknown[0]} is no setting; there are {', '.join(cls.variables())}")
         given = {name: environ[key] for name in cls.model_fields if (key := _variable(name)) in environ}
+        collector = environ.get("OTEL_EXPORTER_OTLP_ENDPOINT")
+        if collector and "traces_url" not in given:
+            given["traces_url"] = collector.rstrip("/") + "/v1/traces"
         try:
             return cls.model_validate(given)
         except ValidationError as error:

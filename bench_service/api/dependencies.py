@@ -1,5 +1,6 @@
 """What every route is given, and what several of them say in the same words."""
 
+import re
 from typing import Annotated
 
 from fastapi import Depends, Header, Query, Request
@@ -25,6 +26,19 @@ IdempotencyKey = Annotated[
         min_length=1,
         max_length=200,
         description="A create that is repeated with the same key and body gives what the first one made",
+    ),
+]
+REQUESTED_BY = "X-Requested-By"
+WHO_LENGTH = 200
+NO_CONTROL_CHARACTERS = re.compile(r"^[^\x00-\x1f\x7f]+$")
+RequestedBy = Annotated[
+    str | None,
+    Header(
+        alias=REQUESTED_BY,
+        min_length=1,
+        max_length=WHO_LENGTH,
+        pattern=NO_CONTROL_CHARACTERS.pattern,
+        description="Who asks, for the job and the audit trail; without it, the trail has the client's address",
     ),
 ]
 After = Annotated[str | None, Query(max_length=100, description="Cursor: `next` of the page before")]

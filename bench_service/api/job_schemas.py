@@ -58,6 +58,7 @@ class JobView(BaseModel):
     queued_at: datetime | None = Field(description="When it came into its bench's queue")
     deadline_at: datetime | None = Field(description="No station begins later")
     labels: Labels
+    requested_by: str = Field(description="Who asked for it, as far as the client said")
     requested_parameters: dict[str, Any]
     parameters: dict[str, Any]
     simulated: bool

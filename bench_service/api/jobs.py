@@ -7,7 +7,7 @@ from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import StreamingResponse
 
 from bench_service.api import event_stream
-from bench_service.api.dependencies import After, Hub, IdempotencyKey, Limit, Service
+from bench_service.api.dependencies import After, Hub, IdempotencyKey, Limit, RequestedBy, Service
 from bench_service.api.errors import made, problems
 from bench_service.api.job_schemas import JobPage, JobView
 from bench_service.api.requests import JobChange, JobSubmission, Reanalysis
@@ -53,7 +53,13 @@ OF_A_JOB = (
         ),
     },
 )
-def submit(body: JobSubmission, service: Service, response: Response, key: IdempotencyKey = None) -> JobView:
+def submit(
+    body: JobSubmission,
+    service: Service,
+    response: Response,
+    key: IdempotencyKey = None,
+    requested_by: RequestedBy = None,
+) -> JobView:
     """Queue a job. The same `Idempotency-Key` with the same body gives the job that the first one made."""
     job = service.submit(
         JobRequest(
@@ -69,6 +75,7 @@ def submit(body: JobSubmission, service: Service, response: Response, key: Idemp
             body.reservation,
         ),
         key,
+        requested_by or "",
     )
     response.headers["Location"] = f"/api/v1/jobs/{job.id}"
     return _view(service, job)
@@ -120,7 +127,7 @@ def pause(job_id: str, service: Service) -> JobView:
 
 @router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409))
 def resume(job_id: str, service: Service) -> JobView:
-    """Queue a paused, interrupted or failed job again, where that can help; it goes on with the stations that remain."""
+    """Queue a paused, interrupted or failed job again, where that helps; it goes on with the stations that remain."""
     return _view(service, service.resume(job_id))
 
 

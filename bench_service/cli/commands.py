@@ -61,11 +61,11 @@ def serve(
     settings = _with(context.obj, host=host, port=port)
     check_port(settings)
     if no_worker or not settings.drive:
-        with ready(settings, drive=False) as server:
+        with ready(settings, drive=False, level="info") as server:
             console.print(f"API without a bench of its own at http://{settings.host}:{settings.port}")
             server.run()
         return
-    with ready(settings) as server, accompanied(settings, lambda: server.started):
+    with ready(settings, level="info") as server, accompanied(settings, lambda: server.started):
         console.print(f"bench {settings.bench_id} at http://{settings.host}:{settings.port}")
         server.run()
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import uvicorn
 
 from bench_service.app import create_app, open_service
+from bench_service.cli.logs import set_up
 from bench_service.cli.refusal import Refused
 from bench_service.settings import Settings
 from bench_service.wall_clock import pause
@@ -19,11 +20,15 @@ GRACE_S = 3
 
 
 @contextmanager
-def ready(settings: Settings, drive: bool = True, socket_file: Path | None = None) -> Generator[uvicorn.Server]:
+def ready(
+    settings: Settings, drive: bool = True, socket_file: Path | None = None, level: str = "warning"
+) -> Generator[uvicorn.Server]:
     """A server around an open service, ready to run; the service is closed at the end, or when the server shuts down.
 
+    `level`: from which on lines are logged, where the settings do not say.
     Raises what `open_service` raises: before any thread or signal handler is there.
     """
+    set_up(settings, level)
     with ExitStack() as closing:
         service = open_service(settings, closing, drive)
         config = uvicorn.Config(
@@ -31,7 +36,8 @@ def ready(settings: Settings, drive: bool = True, socket_file: Path | None = Non
             settings.host,
             settings.port,
             uds=None if socket_file is None else str(socket_file),
-            log_level="warning",
+            log_config=None,
+            access_log=settings.log_access,
             timeout_graceful_shutdown=GRACE_S,
         )
         yield uvicorn.Server(config)

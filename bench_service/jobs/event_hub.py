@@ -109,11 +109,11 @@ class Listener:
 class _Watch:
     """A job that somebody listens to."""
 
-    def __init__(self, job: Job, sequence: int, state: JobState) -> None:
+    def __init__(self, job: Job, sequence: int, state: JobState, recent: int) -> None:
         self.job_id, self.bench = job.id, job.bench
         self.sequence = sequence
         self.state = state
-        self.recent: deque[tuple[int, bytes]] = deque(maxlen=RECENT)
+        self.recent: deque[tuple[int, bytes]] = deque(maxlen=recent)
         self.listeners: set[Listener] = set()
         self.woken = asyncio.Event()
         self.loop = asyncio.get_running_loop()
@@ -125,13 +125,14 @@ class _Watch:
 class EventHub:
     """Everybody of this process who listens to a job."""
 
-    def __init__(self, jobs: JobStore, board: LiveBoard, frames: Frames, lag: int = LAG) -> None:
+    def __init__(self, jobs: JobStore, board: LiveBoard, frames: Frames, lag: int = LAG, recent: int = RECENT) -> None:
         self.dropped = 0
         """How many listeners were dropped so far."""
         self._jobs = jobs
         self._board = board
         self._frames = frames
         self._lag = lag
+        self._recent = recent
         self._watches: dict[str, _Watch] = {}
         jobs.on_event(self.wake)
 
@@ -179,7 +180,7 @@ class EventHub:
             job, (sequence, state) = await asyncio.to_thread(
                 lambda: (self._jobs.get(job_id), self._jobs.last_event(job_id))
             )
-            watch = self._watches.setdefault(job_id, _Watch(job, sequence, state))
+            watch = self._watches.setdefault(job_id, _Watch(job, sequence, state, self._recent))
         listener = Listener(watch, after, self._lag)
         watch.listeners.add(listener)
         if watch.task is None:

@@ -1,7 +1,9 @@
 """What the service can be asked, in one place: HTTP and command line say it in their own words."""
 
+import logging
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from datetime import timedelta
 from random import SystemRandom
 
@@ -10,16 +12,19 @@ from bench_service.jobs.driver import BenchDriver, TrueTriad
 from bench_service.jobs.errors import IllegalTransition, NotFound, NotReady
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.live import LiveBoard
+from bench_service.jobs.log_context import about
 from bench_service.jobs.planning import CONTEXT, Plan, Planner, register
 from bench_service.jobs.queue_desk import QueueDesk
 from bench_service.jobs.request import JobRequest, fingerprint
 from bench_service.jobs.safety import Safety, SafetyDesk
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import BenchStop, Idempotency, StoredResult
+from bench_service.jobs.tracing import Traces
 from bench_service.jobs.worker import Worker
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter
 
+log = logging.getLogger(__name__)
 SEEDS = SystemRandom()
 CRASHED_IMPORT = timedelta(hours=1)
 """An import that is not sealed after this long will never be: its process is gone."""
@@ -42,12 +47,14 @@ class BenchService:
         safety: SafetyDesk,
         live: LiveBoard | None = None,
         free_bytes: Callable[[], int | None] = lambda: None,
+        traces: Traces | None = None,
     ) -> None:
         """`driver`: of this process's own bench; None: it plans and queues for benches that workers drive.
 
         `free_bytes`: room on the database's disk, where that is known.
         """
         self.safety = safety
+        self.traces = traces or Traces()
         self.live = live or LiveBoard(stores.live)
         self.stores = stores
         self.driver = driver
@@ -102,7 +109,7 @@ class BenchService:
         if self._worker is not None:
             self._worker.shut_down()
 
-    def submit(self, request: JobRequest, idempotency_key: str | None = None) -> Job:
+    def submit(self, request: JobRequest, idempotency_key: str | None = None, requested_by: str = "") -> Job:
         """Plan, store and queue a job. Raises what `Planner.plan` raises, `BadParameter` for an axis limit."""
         plan = self.planner.plan(request.procedure, request.unit, request.parameters, request.bench)
         if plan.violations:
@@ -112,10 +119,12 @@ class BenchService:
         if request.reservation is not None:
             self.queues.usable(request.reservation, plan.context.bench.id, request.unit)
         register(self.stores, plan.context.unit)
-        job = self._new_job(request, plan)
+        job = replace(self._new_job(request, plan), requested_by=requested_by)
         key = None if idempotency_key is None else Idempotency(f"jobs:{idempotency_key}", fingerprint(request))
         stored = self.stores.jobs.add(job, key)
         self._wake()
+        with about(job=stored.id):
+            log.info("%s on %s queued", stored.procedure, stored.unit)
         return stored
 
     def cancel(self, job_id: str) -> Job:

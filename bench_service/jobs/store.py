@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from bench_service.jobs.audit import AuditTrail
 from bench_service.jobs.corrections import CorrectionStore
 from bench_service.jobs.job import Event, Failure, Job, JobState
 from bench_service.jobs.live import LiveStore
@@ -25,6 +26,7 @@ from bench_service.jobs.stored import (
     StoredRecording,
     StoredResult,
 )
+from bench_service.jobs.tallies import TallyStore
 from procedures.bench import BenchDescription
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
@@ -284,3 +286,5 @@ class Stores:
     units: UnitStore
     corrections: CorrectionStore
     live: LiveStore
+    audit: AuditTrail
+    tallies: TallyStore

@@ -84,6 +84,10 @@ def _explanation(job: Job) -> str:
         return "It is being cancelled: the bench is not free before it is safe."
     if job.state is JobState.RUNNING and job.pause_requested:
         return "It pauses before its next station."
+    if job.state is JobState.RUNNING:
+        return "It drives the bench."
+    if job.state is JobState.QUEUED:
+        return "It waits for the bench. Nothing of it moves."
     return ""
 
 
@@ -114,7 +118,10 @@ def home(request: Request) -> HTMLResponse:
 def job_page(job_id: str, request: Request) -> HTMLResponse:
     """A job: progress, stations, recordings, and its result once there is one."""
     service = _service(request)
+    last_event, _ = service.stores.jobs.last_event(job_id)  # before the job: what comes later reloads the page
     job = service.stores.jobs.get(job_id)
+    live = service.live.of_job(job)
+    stations = max(1, len(job.stations))
     result = service.stores.results.get(job.result_id) if job.result_id else None
     return _page(
         request,
@@ -124,6 +131,9 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
         verbs=(("resume", "Resume"),) if job.state is JobState.FAILED and job.resumable else _VERBS.get(job.state, ()),
         explanation=_explanation(job),
         standing=service.queues.standing([job])[job.id],
+        last_event=last_event,
+        live=live,
+        fraction=job.stations_done / stations if live is None else live.fraction,
         recordings=service.stores.recordings.of_job(job_id),
         result=result,
         sections=_sections(service.analyses.report(result)) if result else [],

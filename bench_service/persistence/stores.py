@@ -1,6 +1,7 @@
 """Putting the stores together: one database, all stores. Must not know who uses them."""
 
 from bench_service.jobs.store import Stores
+from bench_service.persistence.audit_store import SqlAuditTrail
 from bench_service.persistence.correction_store import SqlCorrectionStore
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.job_store import SqlJobStore
@@ -10,6 +11,7 @@ from bench_service.persistence.queue_store import SqlQueueStore
 from bench_service.persistence.recording_store import SqlRecordingStore
 from bench_service.persistence.reservation_store import SqlReservationStore
 from bench_service.persistence.result_store import SqlResultStore
+from bench_service.persistence.tally_store import SqlTallyStore
 from bench_service.persistence.unit_store import SqlUnitStore
 
 
@@ -35,4 +37,6 @@ def stores_of(database: Database) -> Stores:
         units=SqlUnitStore(database),
         corrections=SqlCorrectionStore(database),
         live=SqlLiveStore(database),
+        audit=SqlAuditTrail(database),
+        tallies=SqlTallyStore(database),
     )

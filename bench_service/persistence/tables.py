@@ -101,6 +101,7 @@ class JobRow(Table):
         Index("ix_jobs_procedure_id", "procedure", "id"),
         Index("ix_jobs_unit_id", "unit", "id"),
         Index("ix_jobs_bench_state", "bench", "state"),
+        Index("ix_jobs_finished_at_id", "finished_at", "id"),
     )
 
     id: Mapped[str] = mapped_column(Id, primary_key=True)
@@ -154,6 +155,7 @@ class RecordingRow(Table):
     __table_args__ = (
         Index("ix_recordings_job_id_id", "job_id", "id"),
         Index("ix_recordings_unit_id", "unit", "id"),
+        Index("ix_recordings_state_stored_bytes", "state", "stored_bytes"),
         Index(
             "uq_recordings_complete_station",
             "job_id",

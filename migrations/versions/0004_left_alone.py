@@ -33,6 +33,8 @@ def _jobs() -> None:
     op.add_column("jobs", sa.Column("prompt", DOCUMENT, nullable=True))
     op.execute("UPDATE jobs SET queued_at = created_at")
     op.create_index("ix_jobs_bench_state", "jobs", ["bench", "state"])
+    op.create_index("ix_jobs_finished_at_id", "jobs", ["finished_at", "id"])
+    op.create_index("ix_recordings_state_stored_bytes", "recordings", ["state", "stored_bytes"])
 
 
 def _benches() -> None:
@@ -156,6 +158,8 @@ def downgrade() -> None:
         op.drop_table(table)
     for column in ("safe_by", "safe_at"):
         op.drop_column("bench_stops", column)
+    op.drop_index("ix_recordings_state_stored_bytes", "recordings")
+    op.drop_index("ix_jobs_finished_at_id", "jobs")
     op.drop_index("ix_jobs_bench_state", "jobs")
     for column in ("prompt", "requested_by", "reservation", "retries_left", "retries", "not_before", "queued_at"):
         op.drop_column("jobs", column)

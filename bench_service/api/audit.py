@@ -1,0 +1,136 @@
+"""The audit trail: every request that may change something and reached a route, with its outcome."""
+
+import json
+from datetime import datetime
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request
+from pydantic import BaseModel, Field
+from starlette.concurrency import run_in_threadpool
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from bench_service.api.dependencies import NO_CONTROL_CHARACTERS, REQUESTED_BY, WHO_LENGTH, After, Limit, Service
+from bench_service.api.errors import FieldError, problems, respond
+from bench_service.jobs.audit import AuditEntry, AuditTrail, record
+from bench_service.jobs.log_context import request_id
+
+router = APIRouter(prefix="/api/v1/audit", tags=["audit"])
+
+READING = ("GET", "HEAD", "OPTIONS")
+BODY_BYTES = 8192
+"""A JSON body up to this size is part of the entry; of a longer one, and of files, only the size."""
+
+
+class AuditView(BaseModel):
+    """Who asked what, and what became of it."""
+
+    id: str
+    at: datetime
+    who: str = Field(description=f"`{REQUESTED_BY}`, or the address that it was asked from")
+    action: str = Field(description="The operation, as this document names it")
+    target: str = Field(description="Path of what it was done to, or of what it made")
+    outcome: str = Field(description="Status code of the answer, or a word where it was no request")
+    detail: dict[str, Any]
+
+    @classmethod
+    def of(cls, entry: AuditEntry) -> "AuditView":
+        return cls(**vars(entry))
+
+
+class AuditPage(BaseModel):
+    """Entries, newest first."""
+
+    items: list[AuditView]
+    next: str | None = Field(description="Cursor: pass it as `after` for the next page")
+
+
+@router.get("", responses=problems())
+def list_audit(
+    service: Service,
+    who: Annotated[str | None, Query(max_length=WHO_LENGTH)] = None,
+    target: Annotated[str | None, Query(max_length=200, description="A path, or a part of it such as an id")] = None,
+    after: After = None,
+    limit: Limit = 50,
+) -> AuditPage:
+    """Who asked what, newest first."""
+    page = service.stores.audit.list(who=who, target=target, after=after, limit=limit)
+    return AuditPage(items=[AuditView.of(entry) for entry in page.items], next=page.next)
+
+
+class Audited:
+    """Pure ASGI. The order is: the act, its entry, the answer. See `bench_service.jobs.audit`."""
+
+    def __init__(self, app: ASGIApp, trail: AuditTrail) -> None:
+        self._app = app
+        self._trail = trail
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http" or scope["method"] in READING:
+            await self._app(scope, receive, send)
+            return
+        request = Request(scope)
+        who = request.headers.get(REQUESTED_BY)
+        if who is not None and not (0 < len(who) <= WHO_LENGTH and NO_CONTROL_CHARACTERS.match(who)):
+            field = FieldError(field=REQUESTED_BY, message=f"1 … {WHO_LENGTH} characters, no control characters")
+            await respond(request, 422, f"{field.field}: {field.message}", "Invalid", [field])(scope, receive, send)
+            return
+        act = _Act(request, who or (request.client.host if request.client else "local"))
+
+        async def receive_and_note() -> Message:
+            message = await receive()
+            act.body(message)
+            return message
+
+        async def note_and_send(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                await self._note(act, message["status"], dict(message.get("headers", ())))
+            await send(message)
+
+        try:
+            await self._app(scope, receive_and_note, note_and_send)
+        except Exception:
+            await self._note(act, 500, {})
+            raise
+
+    async def _note(self, act: "_Act", status: int, headers: dict[bytes, bytes]) -> None:
+        route = act.request.scope.get("route")
+        if act.noted or route is None or status == 405:
+            return
+        act.noted = True
+        target = headers.get(b"location", b"").decode() or act.request.url.path
+        await run_in_threadpool(record, self._trail, act.who, route.name, target, str(status), **act.detail())
+
+
+class _Act:
+    """What a request says until its outcome is known."""
+
+    def __init__(self, request: Request, who: str) -> None:
+        self.request = request
+        self.who = who
+        self.noted = False
+        self._is_json = request.headers.get("content-type", "").startswith("application/json")
+        self._body = b""
+        self._bytes = 0
+
+    def body(self, message: Message) -> None:
+        """A piece of the body passes."""
+        piece: bytes = message.get("body", b"")
+        self._bytes += len(piece)
+        if self._is_json and self._bytes <= BODY_BYTES:
+            self._body += piece
+
+    def detail(self) -> dict[str, Any]:
+        """What matters of the request; never the contents of files."""
+        found: dict[str, Any] = {"request": request_id(), "path": self.request.url.path}
+        if self.request.url.query:
+            found["query"] = self.request.url.query[:500]
+        if self._is_json and 0 < self._bytes <= BODY_BYTES:
+            try:
+                body = json.loads(self._body, parse_constant=str)
+                json.dumps(body, allow_nan=False)  # what no database takes, 1e999 or a thousand brackets, is left out
+                found["body"] = body
+            except (ValueError, RecursionError):
+                found["bytes"] = self._bytes
+        elif self._bytes:
+            found["bytes"] = self._bytes
+        return found

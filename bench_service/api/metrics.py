@@ -1,0 +1,162 @@
+"""The numbers that a monitor reads, in Prometheus text format.
+
+Jobs, benches and recordings come from the database and are the same in every process; requests and listeners are this
+process's own.
+"""
+
+from collections.abc import Iterator
+
+from fastapi import APIRouter, FastAPI, Request, Response
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Histogram, generate_latest
+from prometheus_client.core import (
+    CounterMetricFamily,
+    GaugeMetricFamily,
+    HistogramMetricFamily,
+    Metric,
+)
+from prometheus_client.registry import Collector
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from bench_service.api.dependencies import Hub, Service
+from bench_service.api.errors import problems
+from bench_service.jobs.event_hub import EventHub
+from bench_service.jobs.live import BenchLive
+from bench_service.jobs.service import BenchService
+from bench_service.jobs.tallies import DURATION_S, Spread, Tallies
+from bench_service.wall_clock import monotonic_s, now
+
+router = APIRouter(tags=["health"])
+
+BENCH_STATES = ("idle", "busy", "stopped", "offline")
+
+
+@router.get(
+    "/metrics",
+    response_class=Response,
+    responses={**problems(), 200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
+)
+def metrics(request: Request, service: Service, hub: Hub) -> Response:
+    """Jobs, stations, recordings, benches, listeners and requests, in Prometheus text format."""
+    tallies: Tallies = request.app.state.tallies
+    tallies.update()
+    registry = CollectorRegistry()
+    registry.register(Snapshot(service, tallies, hub))
+    requests: CollectorRegistry = request.app.state.request_metrics
+    return Response(generate_latest(registry) + generate_latest(requests), media_type=CONTENT_TYPE_LATEST)
+
+
+class Snapshot(Collector):
+    """Everything that is known at one scrape."""
+
+    def __init__(self, service: BenchService, tallies: Tallies, hub: EventHub) -> None:
+        self._service = service
+        self._tallies = tallies
+        self._hub = hub
+
+    def collect(self) -> Iterator[Metric]:
+        """One family after the other."""
+        yield from self._jobs()
+        yield from self._benches()
+        yield GaugeMetricFamily("bench_listeners", "Who listens to events of jobs here", self._hub.listeners)
+        dropped = "Listeners that were too slow and let go here"
+        yield CounterMetricFamily("bench_listeners_dropped", dropped, self._hub.dropped)
+        free = self._tallies.store.free_bytes()
+        if free is not None:
+            yield GaugeMetricFamily("bench_free_disk_bytes", "Room on the disk of the database's file", free)
+
+    def _jobs(self) -> Iterator[Metric]:
+        tallies = self._tallies
+        states = GaugeMetricFamily("bench_jobs", "Jobs by state", labels=["state"])
+        for state, count in self._service.stores.jobs.counts().items():
+            states.add_metric([state.value], count)
+        yield states
+        labels = ["procedure", "state", "verdict"]
+        finished = CounterMetricFamily("bench_jobs_finished", "Jobs that have ended", labels=labels)
+        for key, count in sorted(tallies.finished.items()):
+            finished.add_metric(key, count)
+        yield finished
+        took = HistogramMetricFamily("bench_job_duration_seconds", "From start to end", labels=["procedure"])
+        for procedure, spread in sorted(tallies.durations.items()):
+            took.add_metric([procedure], _buckets(spread), spread.sum_s)
+        yield took
+        waited = HistogramMetricFamily("bench_job_wait_seconds", "From submission to start, of jobs that have ended")
+        waited.add_metric([], _buckets(tallies.waits), tallies.waits.sum_s)
+        yield waited
+        yield CounterMetricFamily("bench_stations_done", "Stations recorded", tallies.stations)
+        yield GaugeMetricFamily("bench_recordings_bytes", "Stored bytes of all recordings", tallies.recorded_bytes)
+
+    def _benches(self) -> Iterator[Metric]:
+        units, at = self._service.stores.units, now()
+        busy = GaugeMetricFamily("bench_busy", "1 while a job drives the bench", labels=["bench"])
+        state = GaugeMetricFamily("bench_state", "1 for the state that the bench is in", labels=["bench", "state"])
+        seen = GaugeMetricFamily("bench_driver_seen_seconds", "Since the driver gave a sign", labels=["bench"])
+        for bench in units.benches():
+            live = self._service.live.of_bench(bench.id)
+            found = _state(live, units.bench_stop(bench.id) is not None)
+            busy.add_metric([bench.id], live is not None and live.there(at) and live.job is not None)
+            for name in BENCH_STATES:
+                state.add_metric([bench.id, name], name == found)
+            if live is not None:
+                seen.add_metric([bench.id], live.seen_s(at))
+        yield from (busy, state, seen)
+
+
+def _state(live: BenchLive | None, stopped: bool) -> str:
+    if stopped:
+        return "stopped"
+    if live is None or not live.there(now()):
+        return "offline"
+    return "idle" if live.job is None else "busy"
+
+
+def _buckets(spread: Spread) -> list[tuple[str, float]]:
+    """Cumulative counts up to each bound, as the format wants them."""
+    total, found = 0, list[tuple[str, float]]()
+    for bound, count in zip([*map(str, DURATION_S), "+Inf"], spread.counts, strict=True):
+        total += count
+        found.append((bound, total))
+    return found
+
+
+def install(app: FastAPI, service: BenchService) -> None:
+    """Give an application its counts, and measure its requests."""
+    registry = CollectorRegistry()
+    app.state.tallies = Tallies(service.stores.tallies)
+    app.state.request_metrics = registry
+    app.add_middleware(Measured, registry=registry)
+
+
+class Measured:
+    """Pure ASGI: requests by route and status, and the time until each answer began."""
+
+    def __init__(self, app: ASGIApp, registry: CollectorRegistry) -> None:
+        self._app = app
+        labels = ["method", "route", "status"]
+        self._requests = Counter("bench_http_requests", "Requests answered here", labels, registry=registry)
+        self._latency = Histogram(
+            "bench_http_latency_seconds", "Until the answer began", ["method", "route"], registry=registry
+        )
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        begun_s = monotonic_s()
+
+        async def count_and_send(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                self._count(scope, message["status"], monotonic_s() - begun_s)
+            await send(message)
+
+        try:
+            await self._app(scope, receive, count_and_send)
+        except Exception:
+            self._count(scope, 500, monotonic_s() - begun_s)
+            raise
+
+    def _count(self, scope: Scope, status: int, seconds: float) -> None:
+        route = scope.get("route")
+        path = "none" if route is None else route.path
+        method = scope["method"] if route is not None else "any"  # a client may invent methods, not series
+        self._requests.labels(method, path, str(status)).inc()
+        self._latency.labels(method, path).observe(seconds)

@@ -1,0 +1,77 @@
+"""Where lines go and how they look: one handler for ours, the HTTP server's and the job engine's.
+
+`BENCH_LOG=json` writes one JSON object a line with what it is about as fields; without it, text for a person.
+"""
+
+import logging
+import sys
+from datetime import UTC, datetime
+
+from bench_service.jobs.log_context import AddSubjects
+from bench_service.settings import Settings
+
+FIELDS = "{asctime} {levelname} {name} {message}"
+OWN_HANDLERS = ("uvicorn", "uvicorn.error", "uvicorn.access", "dbos")
+"""Loggers that bring a handler of their own, unless they find one."""
+
+
+class Lines(logging.Formatter):
+    """One line for a person; a traceback follows on its own lines."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        about: dict[str, str] = getattr(record, "subjects", {})
+        found = " ".join(f"{name}={value}" for name, value in about.items())
+        text = f"{_moment(record)} {record.levelname:7} {record.name}: {record.getMessage()}"
+        if found:
+            text += f" [{found}]"
+        return text if record.exc_info is None else f"{text}\n{self.formatException(record.exc_info)}"
+
+
+def set_up(settings: Settings, level: str) -> None:
+    """Write lines of at least this level to standard error; the setting `log_level` counts more, where given."""
+    handler = logging.StreamHandler(sys.stderr)
+    handler.addFilter(AddSubjects(bench=settings.bench_id))
+    handler.setFormatter(_json_lines() if settings.log == "json" else Lines())
+    wanted = (settings.log_level or level).upper()
+    root = logging.getLogger()
+    for old in root.handlers[:]:
+        if isinstance(old, logging.StreamHandler) and any(isinstance(f, AddSubjects) for f in old.filters):
+            root.removeHandler(old)
+    root.addHandler(handler)
+    root.setLevel(logging.WARNING)
+    logging.getLogger("bench_service").setLevel(wanted)
+    logging.getLogger("procedures").setLevel(wanted)
+    for name in OWN_HANDLERS:
+        logger = logging.getLogger(name)
+        logger.handlers = [handler]
+        logger.propagate = False
+    logging.getLogger("uvicorn").setLevel(logging.WARNING)
+    logging.getLogger("uvicorn.access").setLevel(logging.INFO if settings.log_access else logging.WARNING)
+    logging.getLogger("uvicorn.error").setLevel("INFO" if wanted == "DEBUG" else logging.WARNING)
+
+
+def _json_lines() -> logging.Formatter:
+    from pythonjsonlogger.json import JsonFormatter
+
+    class JsonLines(JsonFormatter):
+        """What a line is about as fields of their own, beside time, level, logger and message."""
+
+        def process_log_record(self, log_data: dict[str, object]) -> dict[str, object]:
+            about = log_data.pop("subjects", None)
+            return {**log_data, **(about if isinstance(about, dict) else {})}
+
+        def formatTime(self, record: logging.LogRecord, datefmt: str | None = None) -> str:  # noqa: N802  inherited
+            return _moment(record)
+
+    renamed = {"asctime": "at", "levelname": "level", "name": "logger"}
+    return JsonLines(FIELDS, style="{", rename_fields=renamed, reserved_attrs=_reserved(), json_ensure_ascii=False)
+
+
+def _reserved() -> list[str]:
+    """Attributes of every record that are no news; `subjects` is not among them."""
+    return [*vars(logging.makeLogRecord({})), "asctime", "message", "color_message", "taskName"]
+
+
+def _moment(record: logging.LogRecord) -> str:
+    at = datetime.fromtimestamp(record.created, UTC)
+    return at.isoformat(timespec="milliseconds").replace("+00:00", "Z")

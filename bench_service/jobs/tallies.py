@@ -1,0 +1,118 @@
+"""What a monitor counts of jobs: read from the database, because workers without HTTP make most of it.
+
+Every API process gives the same numbers, also after a restart, so scrape one of them or take the maximum. A scrape
+reads only jobs that have ended since the one before: those of the last `OVERLAP` again, because a commit on another
+machine may come later than its time says. A job that failed, was resumed and ended again counts as both until the
+process restarts, then as the last.
+"""
+
+from bisect import bisect_left
+from collections import Counter
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from threading import Lock
+from typing import Protocol
+
+from bench_service.wall_clock import monotonic_s
+
+OVERLAP = timedelta(seconds=60)
+PAGE = 5000
+RECORDINGS_S = 30.0
+"""How old the sum over all recordings may be [s]: it walks an index."""
+DURATION_S = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5)
+"""Upper ends of the buckets of durations and waits [s]; a last one has no end."""
+
+
+@dataclass(frozen=True)
+class Ending:
+    """A job that has ended."""
+
+    job_id: str
+    procedure: str
+    state: str
+    verdict: str
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime
+    stations_done: int
+
+
+class TallyStore(Protocol):
+    """PORT of memory: what is counted."""
+
+    def endings(self, since: datetime | None, after: str, limit: int) -> tuple[Ending, ...]:
+        """Jobs that ended at `since` with a greater id than `after`, or later; in that order."""
+        ...
+
+    def stations_of_open_jobs(self) -> int:
+        """Stations done of jobs that have not ended."""
+        ...
+
+    def recorded_bytes(self) -> int:
+        """Stored bytes of all recordings that are listed."""
+        ...
+
+    def free_bytes(self) -> int | None:
+        """Room on the disk of the database's file; None where it is another machine's."""
+        ...
+
+
+@dataclass
+class Spread:
+    """How often something took how long."""
+
+    counts: list[int] = field(default_factory=lambda: [0] * (len(DURATION_S) + 1))
+    sum_s: float = 0.0
+
+    def add(self, seconds: float) -> None:
+        """One more."""
+        self.counts[bisect_left(DURATION_S, seconds)] += 1
+        self.sum_s += seconds
+
+
+class Tallies:
+    """The counts of this process, brought up to date at each scrape."""
+
+    def __init__(self, store: TallyStore) -> None:
+        self.finished: Counter[tuple[str, str, str]] = Counter()
+        """(procedure, state, verdict) -> jobs."""
+        self.durations: dict[str, Spread] = {}
+        """Procedure -> from start to end."""
+        self.waits = Spread()
+        """From submission to start."""
+        self.stations = 0
+        self.recorded_bytes = 0
+        self.store = store
+        self._ended_stations = 0
+        self._recent: dict[tuple[str, datetime], None] = {}
+        self._newest: datetime | None = None
+        self._recorded_at_s: float | None = None
+        self._lock = Lock()
+
+    def update(self) -> None:
+        """Count what is new. Raises `StorageFailure`."""
+        with self._lock:
+            since, after = None if self._newest is None else self._newest - OVERLAP, ""
+            while page := self.store.endings(since, after, PAGE):
+                for ending in page:
+                    self._count(ending)
+                since, after = page[-1].finished_at, page[-1].job_id
+            if self._newest is not None:
+                self._recent = {k: None for k in self._recent if k[1] >= self._newest - OVERLAP}
+            self.stations = self._ended_stations + self.store.stations_of_open_jobs()
+            if self._recorded_at_s is None or monotonic_s() - self._recorded_at_s > RECORDINGS_S:
+                self.recorded_bytes = self.store.recorded_bytes()
+                self._recorded_at_s = monotonic_s()
+
+    def _count(self, ending: Ending) -> None:
+        key = (ending.job_id, ending.finished_at)
+        if key in self._recent:
+            return
+        self._recent[key] = None
+        self._newest = ending.finished_at if self._newest is None else max(self._newest, ending.finished_at)
+        self.finished[ending.procedure, ending.state, ending.verdict] += 1
+        self._ended_stations += ending.stations_done
+        if ending.started_at is not None:
+            duration_s = (ending.finished_at - ending.started_at).total_seconds()
+            self.durations.setdefault(ending.procedure, Spread()).add(max(0.0, duration_s))
+            self.waits.add(max(0.0, (ending.started_at - ending.created_at).total_seconds()))

@@ -1,0 +1,133 @@
+"""The hub of listeners over a real database: order, no gap, no double, and the slow one let go alone."""
+
+import asyncio
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from bench_service.api.event_stream import FRAMES
+from bench_service.jobs.errors import NotFound
+from bench_service.jobs.event_hub import WATCH_S, EventHub
+from bench_service.jobs.job import Job, JobState
+from bench_service.jobs.live import LiveBoard
+from bench_service.jobs.store import Stores
+from bench_service.persistence import open_stores
+from bench_service.wall_clock import monotonic_s, now
+
+LAG, RECENT = 20, 30
+
+
+@pytest.fixture
+def elsewhere(database_url: str) -> Iterator[Stores]:
+    """The same database from a process that our hub knows nothing of."""
+    stores, database = open_stores(database_url)
+    yield stores
+    database.dispose()
+
+
+def ids(frames: list[bytes]) -> list[int]:
+    return [int(frame.split(b"\n")[0].removeprefix(b"id: ")) for frame in frames]
+
+
+async def note(stores: Stores, job: Job, count: int = 1) -> None:
+    for number in range(count):
+        await asyncio.to_thread(stores.jobs.note, job.id, "note", now(), {"number": number})
+
+
+def test_who_does_not_read_is_let_go_alone_and_comes_back_without_a_gap(
+    stores: Stores, new_job: Callable[..., Job]
+) -> None:
+    """Here, not over HTTP: a socket's buffers would hide for megabytes who reads and who does not."""
+    job = stores.jobs.add(new_job())
+
+    async def scene() -> None:
+        hub = EventHub(stores.jobs, LiveBoard(stores.live), FRAMES, LAG, RECENT)
+        slow, quick = hub.follow(job.id, 0), hub.follow(job.id, 0)
+        heard = [await anext(quick)]
+        assert await anext(slow) == heard[0]
+        for _ in range(LAG + 20):
+            await note(stores, job)
+            heard.append(await anext(quick))
+        assert ids(heard) == list(range(1, LAG + 22))
+        assert (hub.dropped, hub.listeners) == (1, 1)
+        assert [frame async for frame in slow] == [FRAMES.dropped]
+        again = hub.follow(job.id, 1)
+        assert [await anext(again) for _ in range(LAG + 20)] == heard[1:]
+        await quick.aclose()
+        await again.aclose()
+        assert hub.listeners == 0
+
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize("after", [0, 7, RECENT + 50, RECENT + 101, 2**31])
+def test_a_newcomer_hears_all_that_came_after_and_then_what_comes(
+    stores: Stores, new_job: Callable[..., Job], after: int
+) -> None:
+    job = stores.jobs.add(new_job())
+
+    async def scene() -> None:
+        hub = EventHub(stores.jobs, LiveBoard(stores.live), FRAMES, LAG, RECENT)
+        await note(stores, job, 50)
+        first = hub.follow(job.id, 50)
+        await anext(first)
+        following = asyncio.create_task(anext(first))  # the job is watched from here on
+        await note(stores, job, RECENT + 50)
+        await following
+        late = hub.follow(job.id, after)
+        heard = [await anext(late) for _ in range(max(0, RECENT + 101 - after))]
+        stores.jobs.request_cancel(job.id, now())
+        heard += [frame async for frame in late]
+        assert ids(heard) == list(range(after + 1, RECENT + 103))
+        await first.aclose()
+
+    asyncio.run(scene())
+
+
+def test_events_of_this_process_come_at_once_and_of_another_one_soon(
+    stores: Stores, elsewhere: Stores, new_job: Callable[..., Job]
+) -> None:
+    job = stores.jobs.add(new_job())
+
+    async def scene() -> tuple[list[float], list[float]]:
+        hub = EventHub(stores.jobs, LiveBoard(stores.live), FRAMES, LAG, RECENT)
+        listener = hub.follow(job.id, 0)
+        await anext(listener)
+        took: tuple[list[float], list[float]] = ([], [])
+        for _ in range(12):
+            for into, made in zip(took, (stores, elsewhere), strict=True):
+                waiting = asyncio.create_task(anext(listener))
+                await note(made, job)
+                begun = monotonic_s()
+                await waiting
+                into.append(monotonic_s() - begun)
+        await listener.aclose()
+        return took
+
+    here, there = (sorted(times) for times in asyncio.run(scene()))
+    assert here[5] < WATCH_S / 2  # a wake-up: the median is far from the time between two looks
+    assert there[5] < 2 * WATCH_S
+
+
+def test_a_stream_ends_with_the_job_and_goes_on_after_a_resume(stores: Stores, new_job: Callable[..., Job]) -> None:
+    job = stores.jobs.add(new_job())
+
+    async def all_of(hub: EventHub, after: int) -> list[int]:
+        return ids([frame async for frame in hub.follow(job.id, after)])
+
+    async def scene() -> None:
+        hub = EventHub(stores.jobs, LiveBoard(stores.live), FRAMES, LAG, RECENT)
+        with pytest.raises(NotFound):
+            await hub.require("none")
+        stores.jobs.transition(job.id, JobState.INTERRUPTED, at=now())
+        assert await all_of(hub, 0) == [1, 2]
+        assert await all_of(hub, 2) == []
+        stores.jobs.resume(job.id, now())
+        rest = asyncio.create_task(all_of(hub, 0))
+        await note(stores, job)
+        await asyncio.to_thread(stores.jobs.request_cancel, job.id, now())
+        assert await rest == [1, 2, 3, 4, 5]
+        assert await all_of(hub, 4) == [5]
+        assert hub.listeners == 0
+
+    asyncio.run(scene())
