@@ -9,11 +9,14 @@ from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
-from bench_service.api import analyses, benches, errors, health, jobs, procedures, recordings, units
+from bench_service.api import analyses, benches, errors, health, jobs, procedures, recordings, reservations, units
 from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
-from bench_service.drivers.simulated import SimulatedDriver
+from bench_service.drivers.registered import RegisteredDevices
+from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
 from bench_service.jobs.code_version import code_version
+from bench_service.jobs.devices import BenchDevices
+from bench_service.jobs.directory import BenchDirectory
 from bench_service.jobs.dispatcher import Dispatcher, JobEngine
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
@@ -22,38 +25,46 @@ from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
 from bench_service.jobs.worker import Worker
 from bench_service.pages import figures, routes
-from bench_service.persistence import BenchLease, acquire_lease, engine_database, open_stores
+from bench_service.persistence import BenchLease, acquire_lease, engine_database, lease_holder, open_stores
 from bench_service.persistence.host_files import HostFiles
 from bench_service.settings import Settings
 
-ROUTERS = (procedures, jobs, recordings, analyses, units, benches, health)
+ROUTERS = (procedures, jobs, recordings, analyses, units, benches, reservations, health)
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> BenchService:
     """A service that is ready to begin; `closing` undoes everything in reverse order.
 
-    With `drive` it holds the bench's lease and runs jobs; without, it reads and analyses beside a process that does.
+    With `drive` it holds the bench's lease and runs jobs; without, it plans, queues, reads and analyses for benches
+    that other processes drive.
     Raises `BenchBusy`, `StorageFailure`, `NotMounted`.
     """
     threadpool_limits(1)  # our matrices have at most 72 rows: BLAS threads would only spin against the bench's own
-    driver = _driver(settings)
     stores, database = open_stores(settings.database_url)
     closing.callback(database.dispose)
-    files = HostFiles(settings.devices_in(), settings.bench_id)
-    planner = Planner(stores, driver)
+    driver = _driver(settings) if drive else None
+    holder = partial(lease_holder, database, settings.database_url)
+    planner = Planner(stores, BenchDirectory(stores.units, driver, settings.bench_id, drawn_unit, holder))
     code = code_version()
     worker: Worker | None = None
-    if drive:
+    if driver is not None:
         lease = acquire_lease(settings.database_url, settings.bench_id)
         closing.callback(lease.release)
+        files = HostFiles(settings.devices_in(), settings.bench_id)
         files.begin_driving()
         closing.callback(files.end_driving)
-        runner = JobRunner(stores, planner, driver, code, lease.held)
+        runner = JobRunner(stores, planner, driver, code, lease.held, settings.retry_scale)
         worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease))
-    service = BenchService(stores, driver, planner, worker, code, SafetyDesk(stores, driver, files))
+    safety = SafetyDesk(stores, partial(_devices, settings), partial(HostFiles, settings.devices_in()))
+    service = BenchService(stores, driver, planner, worker, code, safety, database.free_bytes)
     closing.callback(service.stop)
     service.register()
     return service
+
+
+def _devices(settings: Settings, bench_id: str) -> BenchDevices:
+    """What a bench's devices remember on this host, whoever drives them."""
+    return RegisteredDevices(DeviceRegister(settings.devices_in(), bench_id))
 
 
 def _driver(settings: Settings) -> SimulatedDriver:

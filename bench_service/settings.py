@@ -36,6 +36,10 @@ class Settings(BaseModel):
     """For exercises: faults put into a simulated bench's devices (see `bench_service.drivers.device_faults`)."""
     poll_s: float = Field(0.1, gt=0, le=10)
     """How often a worker looks for jobs that other processes queued; its own it sees at once."""
+    drive: bool = True
+    """Whether `bench serve` drives its bench; false: an API alone, for benches that workers drive."""
+    retry_scale: float = Field(1.0, gt=0, le=1)
+    """Of the pauses before a retry after a fault of the bench (10 s, 30 s, 60 s, …)."""
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported."""
 

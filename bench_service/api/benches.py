@@ -9,7 +9,6 @@ from bench_service.api.dependencies import Service
 from bench_service.api.errors import problems
 from bench_service.api.requests import StopRequest
 from bench_service.jobs.devices import DeviceState
-from bench_service.jobs.errors import NotFound
 from bench_service.jobs.safety import Safety
 from bench_service.jobs.service import BenchService
 from procedures.bench import BenchDescription
@@ -79,6 +78,31 @@ class BenchView(BaseModel):
     job: str | None = Field(description="The job that drives it")
     units: list[str] = Field(description="Units that it can test")
     safety: SafetyView
+    driven_by: str | None = Field(description="Who drives it now: a worker's process; null: nobody, its jobs wait")
+    queued: int = Field(description="How many jobs wait in its queue")
+
+
+class QueueEntryView(BaseModel):
+    """A job in a queue, and why it waits."""
+
+    job: str
+    position: int = Field(description="From 1, in the order of the queue")
+    ahead: int = Field(description="Jobs that go before it as things stand, the running one included")
+    waiting: str = Field(description="Why it does not run yet")
+    priority: int
+    unit: str
+    queued_at: datetime
+    not_before: datetime | None = Field(description="It is not tried before this moment")
+    reservation: str | None
+
+
+class QueueView(BaseModel):
+    """A bench's queue, in the order in which its jobs start."""
+
+    bench: str
+    running: str | None = Field(description="The job that drives the bench")
+    driven_by: str | None
+    entries: list[QueueEntryView]
 
 
 class Stopping(BaseModel):
@@ -90,32 +114,58 @@ class Stopping(BaseModel):
     note: str = "This is a software stop. The emergency stop is a hardware circuit beside the table."
 
 
-def _view(service: BenchService) -> BenchView:
-    running = service.running_job()
-    stop = service.stores.units.bench_stop(service.driver.description.id)
+def _view(service: BenchService, bench_id: str) -> BenchView:
+    description = service.benches.description(bench_id)
+    running = service.running_job(bench_id)
+    stop = service.stores.units.bench_stop(bench_id)
     return BenchView(
-        id=service.driver.description.id,
-        description=service.driver.description,
+        id=bench_id,
+        description=description,
         state="stopped" if stop else "idle" if running is None else "busy",
         stopped=None if stop is None else f"{stop.at.isoformat()}: {stop.reason}",
         job=None if running is None else running.id,
-        units=[unit.serial for unit in service.driver.mounted()],
-        safety=SafetyView.of(service.safety.known(service.driver.description.id)),
+        units=[unit.serial for unit in service.benches.mounted(bench_id)],
+        safety=SafetyView.of(service.safety.known(bench_id)),
+        driven_by=service.benches.holder(bench_id),
+        queued=service.stores.queue.lengths().get(bench_id, 0),
     )
 
 
 @router.get("")
 def list_benches(service: Service) -> list[BenchView]:
-    """Every bench of this service: one so far."""
-    return [_view(service)]
+    """Every bench that a worker of this database has registered."""
+    return [_view(service, bench_id) for bench_id in service.benches.ids()]
 
 
 @router.get("/{bench_id}", responses=problems(404))
 def read_bench(bench_id: str, service: Service) -> BenchView:
     """Live state, limits, declared accuracy, and the job that drives it."""
-    if bench_id != service.driver.description.id:
-        raise NotFound("bench", bench_id)
-    return _view(service)
+    return _view(service, bench_id)
+
+
+@router.get("/{bench_id}/queue", responses=problems(404))
+def read_queue(bench_id: str, service: Service) -> QueueView:
+    """The jobs that wait for a bench, in the order in which they start, and why each of them waits."""
+    queue = service.queues.queue(bench_id)
+    holder = service.benches.holder(bench_id)
+    entries: list[QueueEntryView] = []
+    for entry in queue.entries:
+        place = queue.place(entry.job, holder is not None)
+        assert place is not None  # it is one of the queue's own
+        entries.append(
+            QueueEntryView(
+                job=entry.job,
+                position=place.position,
+                ahead=place.ahead,
+                waiting=place.waiting,
+                priority=entry.priority,
+                unit=entry.unit,
+                queued_at=entry.queued_at,
+                not_before=entry.not_before,
+                reservation=entry.reservation,
+            )
+        )
+    return QueueView(bench=queue.bench, running=queue.running, driven_by=holder, entries=entries)
 
 
 @router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 507))
@@ -132,4 +182,4 @@ def stop(bench_id: str, service: Service, body: StopRequest | None = None) -> St
 def release(bench_id: str, service: Service) -> BenchView:
     """Let a stopped bench work again, once it is known to be safe: the jobs that wait in its queue go on."""
     service.release_bench(bench_id)
-    return _view(service)
+    return _view(service, bench_id)

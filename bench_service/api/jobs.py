@@ -10,9 +10,9 @@ from starlette.concurrency import run_in_threadpool
 from bench_service.api.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.errors import made, problems
 from bench_service.api.job_schemas import EventView, JobPage, JobView
-from bench_service.api.requests import JobSubmission, Reanalysis
+from bench_service.api.requests import JobChange, JobSubmission, Reanalysis
 from bench_service.api.schemas import ResultPage, ResultView, Truth
-from bench_service.jobs.job import FINAL, JobState
+from bench_service.jobs.job import FINAL, Job, JobState
 from bench_service.jobs.request import JobRequest
 from bench_service.jobs.service import BenchService
 from bench_service.wall_clock import pause_async
@@ -31,7 +31,17 @@ EVENT_STREAM: dict[int | str, dict[str, object]] = {
 }
 
 
-OF_A_JOB = ("read_job", "cancel", "pause", "resume", "events", "read_result", "read_truth", "analyse_again")
+OF_A_JOB = (
+    "read_job",
+    "change_job",
+    "cancel",
+    "pause",
+    "resume",
+    "events",
+    "read_result",
+    "read_truth",
+    "analyse_again",
+)
 """What can be asked of a job once there is one."""
 
 
@@ -44,6 +54,7 @@ OF_A_JOB = ("read_job", "cancel", "pause", "resume", "events", "read_result", "r
             202,
             "job_id",
             "read_job",
+            "change_job",
             "cancel",
             "pause",
             "resume",
@@ -66,11 +77,17 @@ def submit(body: JobSubmission, service: Service, response: Response, key: Idemp
             body.labels,
             body.seed,
             body.deadline_at,
+            body.retries,
+            body.reservation,
         ),
         key,
     )
     response.headers["Location"] = f"/api/v1/jobs/{job.id}"
-    return JobView.of(job)
+    return _view(service, job)
+
+
+def _view(service: BenchService, job: Job) -> JobView:
+    return JobView.of(job, service.queues.standing([job])[job.id])
 
 
 @router.get("", responses=problems())
@@ -84,31 +101,38 @@ def list_jobs(
 ) -> JobPage:
     """Jobs, newest first."""
     page = service.stores.jobs.list(state=state, procedure=procedure, unit=unit, after=after, limit=limit)
-    return JobPage(items=[JobView.of(job) for job in page.items], next=page.next)
+    standing = service.queues.standing(page.items)
+    return JobPage(items=[JobView.of(job, standing[job.id]) for job in page.items], next=page.next)
 
 
 @router.get("/{job_id}", responses=problems(404))
 def read_job(job_id: str, service: Service) -> JobView:
-    """One job."""
-    return JobView.of(service.stores.jobs.get(job_id))
+    """One job: everything that is known of it, its place in the queue and why it waits."""
+    return _view(service, service.stores.jobs.get(job_id))
+
+
+@router.patch("/{job_id}", responses=problems(404, 409, 507))
+def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
+    """Change the priority of a queued job, and with it its place in the queue."""
+    return _view(service, service.set_priority(job_id, body.priority))
 
 
 @router.post("/{job_id}/cancel", status_code=202, responses=problems(404, 409))
 def cancel(job_id: str, service: Service) -> JobView:
     """End a job: a queued one at once, a running one as soon as its bench is safe. Its recordings are kept."""
-    return JobView.of(service.cancel(job_id))
+    return _view(service, service.cancel(job_id))
 
 
 @router.post("/{job_id}/pause", status_code=202, responses=problems(404, 409))
 def pause(job_id: str, service: Service) -> JobView:
     """Put a job aside: a queued one at once, a running one before its next station. The bench is then safe and free."""
-    return JobView.of(service.pause(job_id))
+    return _view(service, service.pause(job_id))
 
 
 @router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409))
 def resume(job_id: str, service: Service) -> JobView:
-    """Queue a paused or interrupted job again; it goes on with the stations that remain."""
-    return JobView.of(service.resume(job_id))
+    """Queue a paused, interrupted or failed job again, where that can help; it goes on with the stations that remain."""
+    return _view(service, service.resume(job_id))
 
 
 @router.get("/{job_id}/events", response_class=StreamingResponse, responses={**problems(404), **EVENT_STREAM})

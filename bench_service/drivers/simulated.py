@@ -17,6 +17,7 @@ from procedures.bench import Bench, BenchDescription, BenchNeeds
 from procedures.bench.errors import BenchError
 from procedures.core.unit import Unit
 from simulators.truth import (
+    BenchTruth,
     UnitTruth,
     declared_unit,
     default_bench,
@@ -44,6 +45,12 @@ def _loaded(path: Path, load: Callable[[Path], T]) -> T:
         raise Misconfigured(f"{path}: {error}") from error
 
 
+def _shipped_as(bench_id: str) -> BenchTruth:
+    """The shipped bench under another id; the unit on each of them is the same."""
+    shipped = default_bench()
+    return replace(shipped, description=replace(shipped.description, id=bench_id))
+
+
 class SimulatedDriver:
     """A bench whose table, unit and supply live in this process; its data are marked as simulated."""
 
@@ -59,7 +66,7 @@ class SimulatedDriver:
         """`register`: where the devices' state outlives this process; without one, nobody else can make them safe.
 
         Raises `Misconfigured` for a truth file that cannot be used, `NotMounted` for one of another bench."""
-        self._bench = default_bench() if bench_truth is None else _loaded(bench_truth, load_bench)
+        self._bench = _shipped_as(bench_id) if bench_truth is None else _loaded(bench_truth, load_bench)
         self._unit = default_unit() if unit_truth is None else _loaded(unit_truth, load_unit)
         self._real_time_factor = real_time_factor
         self._register = register
@@ -89,7 +96,8 @@ class SimulatedDriver:
         """A world with that unit on the table, at its beginning or at a checkpoint. Raises `DeviceBusy`."""
         from simulators.world import build  # with MuJoCo: not needed before a bench is opened
 
-        config = replace(self._config(unit, 0 if seed is None else seed), sample_rate_hz=needs.sample_rate_hz)
+        config = self._config(unit, 0 if seed is None else seed)
+        config = replace(config, sample_rate_hz=needs.sample_rate_hz, thermal=needs.temperatures)
         bench = build(config, checkpoint)
         if self._register is None:
             return bench
@@ -139,9 +147,20 @@ class SimulatedDriver:
     def _truth_of(self, serial: str) -> UnitTruth:
         if serial == self._unit.serial:
             return self._unit
-        found = RANDOM_UNIT.match(serial)
-        if found is None:
+        drawn = _drawn_truth(serial)
+        if drawn is None:
             raise NotMounted(
                 f"the simulated bench has no unit {serial!r}; it has {self._unit.serial} and RANDOM-<number>"
             )
-        return replace(random_unit_truth(int(found.group(1))), serial=serial)
+        return drawn
+
+
+def drawn_unit(serial: str) -> Unit | None:
+    """A unit that every simulated bench has by drawing it from its serial, as declared; None for another serial."""
+    truth = _drawn_truth(serial)
+    return None if truth is None else declared_unit(truth)
+
+
+def _drawn_truth(serial: str) -> UnitTruth | None:
+    found = RANDOM_UNIT.match(serial)
+    return None if found is None else replace(random_unit_truth(int(found.group(1))), serial=serial)

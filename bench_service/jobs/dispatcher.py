@@ -87,6 +87,10 @@ class Dispatcher:
         """Look at the queue now."""
         self._wake.set()
 
+    def lease_held(self) -> bool:
+        """Whether this process has the right to drive the bench now."""
+        return self._lease.held()
+
     def shut_down(self) -> None:
         """Claim nothing any more. The running job is the engine's to end."""
         self._ending.set()

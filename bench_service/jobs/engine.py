@@ -151,7 +151,10 @@ class Engine:
         except Exception as error:  # a defect, or books that cannot be kept: the job must still end, and the bench safe
             log.exception("job %s failed inside the service", job_id)
             self._make_safe(job_id)
-            unexpected = StepOutcome(Failure("InternalError", f"{type(error).__name__}: {error}"))
+            if isinstance(error, ServiceError):
+                unexpected = StepOutcome(Failure(type(error).__name__, str(error)))
+            else:
+                unexpected = StepOutcome(Failure("InternalError", f"{type(error).__name__}: {error}"))
             outcome = unexpected if self._last.good else self._last
         if not outcome.good:
             self._end(job_id, outcome)

@@ -7,12 +7,15 @@ ServiceError
 ├── BenchBusy            another process drives this bench
 ├── Misconfigured        a file that the settings name cannot be used
 ├── NotDriving           this process drives no bench
+├── NotReady             a job could not start here now
 ├── NotSafe              the bench's devices are not known to be safe
 ├── AlreadyReserved      somebody keeps this bench or unit
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
 """
+
+from collections.abc import Sequence
 
 
 class ServiceError(Exception):
@@ -50,6 +53,14 @@ class Misconfigured(ServiceError):
 
 class NotDriving(ServiceError):
     """This process drives no bench: it only reads."""
+
+
+class NotReady(ServiceError):
+    """A job could not start here now."""
+
+    def __init__(self, reasons: Sequence[str]) -> None:
+        super().__init__("; ".join(reasons))
+        self.reasons = tuple(reasons)
 
 
 class NotSafe(ServiceError):

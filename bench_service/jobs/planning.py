@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from bench_service.jobs.driver import BenchDriver
+from bench_service.jobs.directory import BenchDirectory
 from bench_service.jobs.errors import NotFound, NotMounted
 from bench_service.jobs.store import Stores
 from procedures import catalog
@@ -37,11 +37,11 @@ class Plan:
 
 
 class Planner:
-    """Knows the catalogue and the one bench of this process."""
+    """Knows the catalogue and the benches."""
 
-    def __init__(self, stores: Stores, driver: BenchDriver) -> None:
+    def __init__(self, stores: Stores, benches: BenchDirectory) -> None:
+        self.benches = benches
         self._stores = stores
-        self._driver = driver
 
     @cached_property
     def catalog(self) -> Mapping[str, AnyProcedure]:
@@ -56,18 +56,14 @@ class Planner:
 
     def context(self, unit: str, bench: str | None = None) -> Context:
         """What is known now. Raises `NotFound` for an unknown bench, `NotMounted` for a unit it does not have."""
-        description = self._driver.description
-        if bench is not None and bench != description.id:
-            raise NotFound("bench", bench)
-        return Context(self.unit(unit), description)
+        description = self.benches.description(self.benches.default() if bench is None else bench)
+        return Context(self.unit(unit, description.id), description)
 
-    def unit(self, serial: str) -> Unit:
-        """A unit that is mounted on the bench, with its current calibration. Raises `NotMounted`."""
-        mounted = {unit.serial: unit for unit in self._driver.mounted(serial)}
+    def unit(self, serial: str, bench: str) -> Unit:
+        """A unit that is mounted on a bench, with its current calibration. Raises `NotMounted`, `NotFound`."""
+        mounted = {unit.serial: unit for unit in self.benches.mounted(bench, serial)}
         if serial not in mounted:
-            raise NotMounted(
-                f"bench {self._driver.description.id!r} has no unit {serial!r}; it has {', '.join(mounted)}"
-            )
+            raise NotMounted(f"bench {bench!r} has no unit {serial!r}; it has {', '.join(mounted)}")
         try:
             return self._stores.units.unit(serial)
         except NotFound:

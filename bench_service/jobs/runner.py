@@ -11,6 +11,7 @@ from bench_service.jobs.job import FINAL, Failure, Job, JobState
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
 from bench_service.jobs.processes import ProcessIdentity
 from bench_service.jobs.queue import QueueEntry
+from bench_service.jobs.retries import try_again
 from bench_service.jobs.session import BenchSession, ShuttingDown
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import BenchStop, Idempotency, StoredResult
@@ -18,8 +19,10 @@ from bench_service.wall_clock import new_id, now
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, Disconnected, Stopped
 from procedures.core.errors import DomainError
+from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import Recording
+from procedures.core.unit_correction import UnitCorrection
 from procedures.procedure import Outcome
 
 
@@ -46,13 +49,18 @@ class JobRunner:
         driver: BenchDriver,
         code_version: str,
         lease_held: Callable[[], bool],
+        retry_scale: float = 1.0,
     ) -> None:
-        """`lease_held`: whether this process still has the right to drive the bench; asked before every station."""
+        """`lease_held`: whether this process still has the right to drive the bench; asked before every station.
+
+        `retry_scale`: of the pauses before a retry; less than 1 where bench time is not real time.
+        """
         self._stores = stores
         self._planner = planner
         self._driver = driver
         self._code_version = code_version
         self._lease_held = lease_held
+        self._retry_scale = retry_scale
         self._session: BenchSession | None = None
         self._ending = Event()
 
@@ -133,7 +141,7 @@ class JobRunner:
         return self._make_safe_anew(job_id, why)
 
     def conclude(self, job_id: str) -> StepOutcome:
-        """Analyse, store the result with its calibrations, and end the job with the verdict; may be repeated."""
+        """Analyse, store the result with what it found, and end the job with the verdict; may be repeated."""
         job = self._stores.jobs.get(job_id)
         if job.state in FINAL:  # a crash came after its end was noted
             return StepOutcome()
@@ -142,7 +150,10 @@ class JobRunner:
             recordings = recordings_of(self._stores, job_id)
             result = analysed(job, procedure, job.parameters, recordings, self._code_version)
             stored = self._stores.results.add(
-                result.stored, result.calibrations, idempotency=Idempotency(f"job:{job_id}", job_id)
+                result.stored,
+                result.calibrations,
+                idempotency=Idempotency(f"job:{job_id}", job_id),
+                corrections=result.corrections,
             )
             self._remember(procedure, result.outcome, stored)
         except (DomainError, ServiceError) as error:
@@ -158,6 +169,9 @@ class JobRunner:
         self._stores.recordings.interrupt_open(job_id)
         if outcome.paused:
             return self._stores.jobs.put_aside(job_id, now())
+        again = try_again(self._stores.queue, job, outcome.failure, self._retry_scale)
+        if again is not None:
+            return again
         to = JobState.CANCELLED if outcome.cancelled else JobState.FAILED
         verdict = None if outcome.cancelled else Verdict.ERROR
         return self._stores.jobs.transition(job_id, to, at=now(), verdict=verdict, failure=outcome.failure)
@@ -229,11 +243,12 @@ class JobRunner:
 
 @dataclass(frozen=True)
 class Analysed:
-    """A result ready to be stored, with the calibrations that it gives."""
+    """A result ready to be stored, with the calibrations and corrections that it gives."""
 
     outcome: Outcome
     stored: StoredResult
-    calibrations: tuple[Any, ...]
+    calibrations: tuple[TriadCalibration, ...]
+    corrections: tuple[UnitCorrection, ...]
 
 
 def recordings_of(stores: Stores, job_id: str) -> list[Recording]:
@@ -253,6 +268,7 @@ def analysed(
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
     outcome = procedure.analyse(recordings, params, context)
     used = context.unit.calibration_id if procedure.uses_calibration else None
+    corrections = (context.unit.correction_id(kind) for kind in procedure.uses_corrections(params))
     stored = StoredResult(
         id=new_id(),
         kind="procedure",
@@ -270,5 +286,6 @@ def analysed(
         job_id=job.id,
         seed=job.seed,
         context=job.context,
+        corrections=tuple(c for c in corrections if c is not None),
     )
-    return Analysed(outcome, stored, procedure.calibrations(outcome))
+    return Analysed(outcome, stored, procedure.calibrations(outcome), procedure.corrections(outcome))

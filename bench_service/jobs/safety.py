@@ -1,6 +1,7 @@
 """What is known of a bench's safety, and who sees to it: asked by HTTP, pages, and a service that starts."""
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from bench_service.jobs.devices import BenchDevices, DeviceState
@@ -36,9 +37,10 @@ class Safety:
 
 
 class SafetyDesk:
-    """Asks one bench's devices, and the processes around them, on this host; of other hosts, the database."""
+    """Asks a bench's devices, and the processes around them, on this host; of other hosts, the database."""
 
-    def __init__(self, stores: Stores, devices: BenchDevices, watch: Watch) -> None:
+    def __init__(self, stores: Stores, devices: Callable[[str], BenchDevices], watch: Callable[[str], Watch]) -> None:
+        """`devices` and `watch`: of a bench, by its id."""
         self._stores = stores
         self._devices = devices
         self._watch = watch
@@ -46,10 +48,11 @@ class SafetyDesk:
 
     def known(self, bench_id: str) -> Safety:
         """What is known now. Raises `StorageFailure`."""
-        state = self._devices.device_state()
-        driving = self._watch.driving()
+        state = self._devices(bench_id).device_state()
+        watch = self._watch(bench_id)
+        driving = watch.driving()
         worker = driving.process if driving is not None and driving.alive else None
-        supervisor = self._watch.supervisor()
+        supervisor = watch.supervisor()
         if state is None:
             safe, explanation = _elsewhere(bench_id, self._stores.units.bench_stop(bench_id))
         else:
@@ -85,7 +88,7 @@ class SafetyDesk:
 
         Where that fails the bench is stopped: the service answers, but nothing moves until a person has looked.
         """
-        state = self._devices.device_state()
+        state = self._devices(bench_id).device_state()
         if state is None:  # the first start on this host: from now on the devices are known here
             failure = self._try(bench_id)
             if failure is not None:
@@ -113,7 +116,7 @@ class SafetyDesk:
     def _try(self, bench_id: str) -> str | None:
         """Make the devices safe over their own link; why not, in a sentence."""
         try:
-            self._devices.make_safe(self._by)
+            self._devices(bench_id).make_safe(self._by)
         except DeviceBusy as busy:
             return str(busy)
         except BenchError as error:

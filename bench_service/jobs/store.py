@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from bench_service.jobs.corrections import CorrectionStore
 from bench_service.jobs.job import Event, Failure, Job, JobState
 from bench_service.jobs.queue import QueueStore
 from bench_service.jobs.reservation import ReservationStore
@@ -28,6 +29,7 @@ from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import RawArray, Recording, RecordingInfo
 from procedures.core.unit import Unit
+from procedures.core.unit_correction import UnitCorrection
 
 
 class RecordingWriter(Protocol):
@@ -177,7 +179,7 @@ class JobStore(Protocol):
 
 
 class ResultStore(Protocol):
-    """Results, calibrations and lineage."""
+    """Results, the calibrations and corrections that come with them, and lineage."""
 
     def add(
         self,
@@ -185,9 +187,11 @@ class ResultStore(Protocol):
         calibrations: Sequence[TriadCalibration] = (),
         make_current: bool = True,
         idempotency: Idempotency | None = None,
+        corrections: Sequence[UnitCorrection] = (),
     ) -> StoredResult:
         """Store a result with its lineage, and its calibrations as the unit's current ones, in one transaction.
 
+        Corrections, at most one of a kind, are stored in the same manner; see `CorrectionStore` for their history.
         Raises `IdempotencyConflict`; a known key with the same fingerprint returns the first result.
         """
         ...
@@ -219,16 +223,22 @@ class UnitStore(Protocol):
     """Units and benches: what is declared of them."""
 
     def put_unit(self, unit: Unit) -> None:
-        """Create or replace; the calibrations of the record are not stored here (`ResultStore` has them)."""
+        """Create or replace; calibrations and corrections of the record are not stored here: `ResultStore` has them."""
         ...
 
     def unit(self, serial: str) -> Unit:
-        """With its current calibration. Raises `NotFound`."""
+        """With its current calibration and corrections. Raises `NotFound`."""
         ...
 
     def units(self) -> tuple[Unit, ...]: ...
 
-    def put_bench(self, bench: BenchDescription) -> None: ...
+    def put_bench(self, bench: BenchDescription, mounted: Sequence[str] = ()) -> None:
+        """Register a bench with the serials of the units that it can test."""
+        ...
+
+    def mounted(self, bench_id: str) -> tuple[str, ...]:
+        """The serials of the units that a bench can test. Raises `NotFound`."""
+        ...
 
     def bench(self, bench_id: str) -> BenchDescription:
         """Raises `NotFound`."""
@@ -263,3 +273,4 @@ class Stores:
     recordings: RecordingStore
     results: ResultStore
     units: UnitStore
+    corrections: CorrectionStore

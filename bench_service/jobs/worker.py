@@ -24,6 +24,8 @@ class JobDispatcher(Protocol):
 
     def wake(self) -> None: ...
 
+    def lease_held(self) -> bool: ...
+
     def shut_down(self) -> None: ...
 
 
@@ -56,6 +58,16 @@ class Worker:
         if self._engine is None:
             raise NotDriving(f"the job engine did not start: {self._failure}")
         return self._engine
+
+    def troubles(self) -> list[str]:
+        """Why a job could not start on this bench now; waits for the engine after a start."""
+        try:
+            self.require_engine()
+        except NotDriving as reason:
+            return [str(reason)]
+        if self._dispatcher is not None and not self._dispatcher.lease_held():
+            return ["the bench's lease is lost: another process may drive it"]
+        return []
 
     def wake(self) -> None:
         """There may be something to do: a job was queued, a bench released."""

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from bench_service.persistence.database import Database
 from bench_service.persistence.engine_database import engine_database
-from bench_service.persistence.lease import BenchLease, acquire_lease
+from bench_service.persistence.lease import BenchLease, acquire_lease, lease_holder
 
 if TYPE_CHECKING:
     from bench_service.jobs.store import Stores
 
-__all__ = ["BenchLease", "Database", "acquire_lease", "engine_database", "open_stores"]
+__all__ = ["BenchLease", "Database", "acquire_lease", "engine_database", "lease_holder", "open_stores"]
 
 
 def open_stores(database_url: str) -> "tuple[Stores, Database]":

@@ -7,6 +7,7 @@ Writers begin with ``BEGIN IMMEDIATE``, so two processes queue for the lock inst
 
 import hashlib
 import json
+import shutil
 import sqlite3
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -65,6 +66,11 @@ class Database:
         if self.is_postgres:
             key = int.from_bytes(hashlib.sha256(what.encode()).digest()[:8], "big", signed=True)
             session.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": key})
+
+    def free_bytes(self) -> int | None:
+        """Room on the disk of an SQLite file; None where the database is elsewhere."""
+        file = self.engine.url.database
+        return None if self.is_postgres or not file else shutil.disk_usage(Path(file).parent).free
 
     @property
     def is_postgres(self) -> bool:

@@ -1,6 +1,7 @@
 """Putting the stores together: one database, all stores. Must not know who uses them."""
 
 from bench_service.jobs.store import Stores
+from bench_service.persistence.correction_store import SqlCorrectionStore
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.job_store import SqlJobStore
 from bench_service.persistence.migration import upgrade_to_head
@@ -31,4 +32,5 @@ def stores_of(database: Database) -> Stores:
         recordings=SqlRecordingStore(database),
         results=SqlResultStore(database),
         units=SqlUnitStore(database),
+        corrections=SqlCorrectionStore(database),
     )

@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from bench_service.drivers.simulated import SimulatedDriver
+from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
+from bench_service.jobs.directory import BenchDirectory
 from bench_service.jobs.dispatcher import Unfinished
 from bench_service.jobs.errors import NotDriving
 from bench_service.jobs.job import Job, JobState
@@ -42,6 +43,9 @@ class IdleDispatcher:
     def begin(self) -> None: ...
 
     def wake(self) -> None: ...
+
+    def lease_held(self) -> bool:
+        return True
 
     def shut_down(self) -> None: ...
 
@@ -83,10 +87,12 @@ def stores(sqlite_url: str) -> Generator[Stores]:
 
 def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], bool]) -> tuple[JobRunner, Job]:
     """A runner, and a job of its that has begun."""
-    planner = Planner(stores, driver)
+    planner = Planner(stores, BenchDirectory(stores.units, driver, "sim", drawn_unit, lambda _: "this process"))
     runner = JobRunner(stores, planner, driver, "test", lease_held)
     worker = Worker(runner, lambda _: IdleEngine(), lambda *_: IdleDispatcher())
-    service = BenchService(stores, driver, planner, worker, "test", SafetyDesk(stores, driver, NoWatch()))
+    service = BenchService(
+        stores, driver, planner, worker, "test", SafetyDesk(stores, lambda _: driver, lambda _: NoWatch())
+    )
     service.register()
     service.begin()
     job = service.submit(JobRequest("calibration_12_orientations", "SIM-0001", parameters=FAST, seed=1))
@@ -132,13 +138,15 @@ def test_a_bench_is_made_safe_after_a_restart_in_which_nothing_was_driven(stores
 
 def test_an_engine_that_does_not_start_is_told_to_whoever_needs_it(stores: Stores) -> None:
     driver = SimulatedDriver("sim")
-    planner = Planner(stores, driver)
+    planner = Planner(stores, BenchDirectory(stores.units, driver, "sim", drawn_unit, lambda _: "this process"))
 
     def fail(_: JobRunner) -> IdleEngine:
         raise OSError("no books")
 
     worker = Worker(JobRunner(stores, planner, driver, "test", lambda: True), fail, lambda *_: IdleDispatcher())
-    service = BenchService(stores, driver, planner, worker, "test", SafetyDesk(stores, driver, NoWatch()))
+    service = BenchService(
+        stores, driver, planner, worker, "test", SafetyDesk(stores, lambda _: driver, lambda _: NoWatch())
+    )
     service.register()
     service.begin()
     with pytest.raises(NotDriving, match="did not start: no books"):

@@ -9,6 +9,7 @@ import pytest
 
 from bench_service.cli.client import connect
 from bench_service.drivers.device_register import DeviceRegister
+from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs import safety
 from bench_service.jobs.processes import ProcessIdentity
 from bench_service.persistence import open_stores
@@ -21,13 +22,16 @@ STOP, RELEASE, BENCH = ("/api/v1/benches/sim/stop", "/api/v1/benches/sim/release
 
 
 @pytest.fixture
-def url(tmp_path: Path, request: pytest.FixtureRequest) -> str:
+def url(tmp_path: Path) -> str:
     return f"sqlite:///{tmp_path / 'bench.sqlite'}"
 
 
 @pytest.fixture
 def reader(url: str) -> Generator[httpx.Client]:
     """A service that drives nothing, on the bench's host."""
+    stores, database = open_stores(url)
+    stores.units.put_bench(SimulatedDriver("sim").description)
+    database.dispose()
     with connect(Settings(database_url=url), None, drive=False) as http:
         yield http
 
