@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from pydantic import ValidationError
 from rich.console import Console
 
 from bench_service.cli.client import call, connect, sentence
@@ -78,7 +79,7 @@ def worker(
     """Run the jobs of a bench, without HTTP, until SIGTERM or SIGINT. Its running job is left for the next start."""
     from bench_service.cli.working import work
 
-    settings = Settings.model_validate({**context.obj.model_dump(), "bench_id": bench or context.obj.bench_id})
+    settings = _of_bench(context.obj, bench)
     work(settings, lambda line: print(line, flush=True))
 
 
@@ -91,7 +92,7 @@ def supervise(
     """Watch a bench on its own host, and make it safe where the process that drives it is gone or hangs."""
     from bench_service.cli.supervising import supervise as watch_over
 
-    settings = Settings.model_validate({**context.obj.model_dump(), "bench_id": bench or context.obj.bench_id})
+    settings = _of_bench(context.obj, bench)
     watch_over(settings, companion, lambda line: print(line, flush=True))
 
 
@@ -248,6 +249,14 @@ def jobs(
 
 def _with(settings: Settings, **given: Any) -> Settings:
     return settings.model_copy(update={name: value for name, value in given.items() if value is not None})
+
+
+def _of_bench(settings: Settings, bench: str | None) -> Settings:
+    """The settings of another bench. Raises `Refused` for a name that no bench can have."""
+    try:
+        return Settings.model_validate({**settings.model_dump(), "bench_id": bench or settings.bench_id})
+    except ValidationError as error:
+        raise Refused(f"--bench {bench}: {error.errors()[0]['msg']}") from error
 
 
 def _parameter(text: str) -> tuple[str, Any]:

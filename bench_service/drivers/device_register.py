@@ -9,7 +9,7 @@ import fcntl
 import json
 import os
 import zlib
-from dataclasses import asdict, replace
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from threading import Lock
@@ -102,7 +102,7 @@ class DeviceLink:
 
 def _written(state: DeviceState) -> bytes:
     """A record: CRC-32, then the state as JSON, padded."""
-    document = asdict(state)
+    document = dict(vars(state))
     document["at"] = None if state.at is None else state.at.isoformat()
     body = json.dumps(document).encode()
     if len(body) > RECORD_BYTES - 16:

@@ -32,7 +32,8 @@ class BenchProcess:
         self.log = folder / "service.log"
         self.register = DeviceRegister(folder, "sim")
         self.files = HostFiles(folder, "sim")
-        self.client = httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=30)
+        fresh = httpx.Limits(max_keepalive_connections=0)  # the server ends an idle one just when it is used again
+        self.client = httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=30, limits=fresh)
 
     def start(self, command: str = "serve") -> None:
         with self.log.open("ab") as log:
