@@ -28,6 +28,8 @@ from simulators.turntable.kinematics import at_rest, attitude
 from simulators.turntable.profile import move_ticks
 
 CHECKPOINT_VERSION = 3
+WARM_SLICE_S = 60.0
+"""Slices and blocks of a world with a chamber: a thermal run is half a day, at few samples a second."""
 
 
 @dataclass(frozen=True)
@@ -88,10 +90,11 @@ def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> S
 
     Raises `DeviceFault` where a chamber is wanted and the bench has none.
     """
-    clock = SimClock(config.rate_hz, config.real_time_factor, config.wait)
+    slice_s = WARM_SLICE_S if config.thermal and config.real_time_factor is None else None
+    clock = SimClock(config.rate_hz, config.real_time_factor, config.wait, slice_s)
     table = SimTurntable(config.bench, config.seed, clock)
     supply = SimSupply()
-    imu = SimImu(config.unit, config.seed, clock, supply.launch, config.thermal)
+    imu = SimImu(config.unit, config.seed, clock, supply.launch, config.thermal, slice_s)
     chamber = _chamber(config, clock) if config.thermal else None
     door = (lambda _is_open: None) if chamber is None else chamber.set_door
     operator = SimOperator(config.bench.operator, config.seed, clock, supply.is_on, door, table.place)

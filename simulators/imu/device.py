@@ -42,10 +42,20 @@ class SimImu:
     """A unit that counts from power-up to power-down, whether or not anybody reads it."""
 
     def __init__(
-        self, truth: UnitTruth, seed: int, clock: SimClock, launch: Callable[[], int], thermal: bool = False
+        self,
+        truth: UnitTruth,
+        seed: int,
+        clock: SimClock,
+        launch: Callable[[], int],
+        thermal: bool = False,
+        block_s: float | None = None,
     ) -> None:
-        """`launch` says which power-up this is, 0 while the unit is off; `thermal`: it will be told its climate."""
+        """`launch` says which power-up this is, 0 while the unit is off; `thermal`: it will be told its climate.
+
+        `block_s`: length of a recording's blocks instead of `BLOCK_S`.
+        """
         self.truth = truth
+        self._block_s = block_s
         self._thermal = thermal
         self._seed = seed
         self._clock = clock
@@ -122,7 +132,7 @@ class SimImu:
         self._tapes.append(tape)
         try:
             while samples > 0:
-                block = min(samples, max(1, int(BLOCK_S * self.rate_hz)))
+                block = min(samples, max(1, int((BLOCK_S if self._block_s is None else self._block_s) * self.rate_hz)))
                 if tape.held < block:
                     self._need_power(tape)
                     await self._clock.pass_ticks(block - tape.held)
