@@ -31,6 +31,8 @@ from simulators.turntable.kinematics import at_rest, attitude
 from simulators.turntable.profile import move_ticks
 
 CHECKPOINT_VERSION = 3
+WARM_SLICE_S = 60.0
+"""Slices and blocks of a world with a chamber: a thermal run is half a day, at few samples a second."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,11 @@ class WorldConfig:
     def rate_hz(self) -> float:
         """Samples per second, also the clock's ticks."""
         return self.unit.sample_rate_hz if self.sample_rate_hz is None else self.sample_rate_hz
+
+    @property
+    def slice_s(self) -> float | None:
+        """Longest slice of time and longest block [s]; None: the clock's own."""
+        return WARM_SLICE_S if self.thermal and self.real_time_factor is None else None
 
 
 @dataclass
@@ -95,7 +102,7 @@ def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> S
 
     Raises `DeviceFault` where a chamber is wanted and the bench has none.
     """
-    clock = SimClock(config.rate_hz, config.real_time_factor, config.wait)
+    clock = SimClock(config.rate_hz, config.real_time_factor, config.wait, config.slice_s)
     table = SimTurntable(config.bench, config.seed, clock)
     supply = SimSupply()
     chamber = _chamber(config, clock) if config.thermal else None
@@ -135,7 +142,7 @@ def _unit(
     config: WorldConfig, clock: SimClock, table: SimTurntable, supply: SimSupply, chamber: SimChamber | None
 ) -> SimImu:
     """A whole unit on the table."""
-    imu = SimImu(config.unit, config.seed, clock, supply.launch, config.thermal)
+    imu = SimImu(config.unit, config.seed, clock, supply.launch, config.thermal, config.slice_s)
     if chamber is None:
         supply.connect(imu.power_up, imu.power_down)
         clock.connect(lambda ticks: imu.feel(table.advance(ticks)))

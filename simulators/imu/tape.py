@@ -37,9 +37,9 @@ class Tape:
 class Tapes:
     """The recordings of one data link that are being made."""
 
-    def __init__(self, clock: SimClock, launch: Callable[[], int]) -> None:
-        """`launch` says which power-up this is, 0 while the unit is off."""
-        self._clock, self._launch = clock, launch
+    def __init__(self, clock: SimClock, launch: Callable[[], int], block_s: float | None = None) -> None:
+        """`launch` says which power-up this is, 0 while the unit is off; `block_s`: of blocks instead of `BLOCK_S`."""
+        self._clock, self._launch, self._block_s = clock, launch, block_s
         self.running: list[Tape] = []
 
     def stop(self) -> None:
@@ -58,9 +58,10 @@ class Tapes:
             raise DeviceFault("samples were lost: time passed between the recording's beginning and its first reading")
         tape = Tape(columns)
         self.running.append(tape)
+        longest = max(1, int((BLOCK_S if self._block_s is None else self._block_s) * self._clock.rate_hz))
         try:
             while samples > 0:
-                block = min(samples, max(1, int(BLOCK_S * self._clock.rate_hz)))
+                block = min(samples, longest)
                 if tape.held < block:
                     self.need_power(tape)
                     await self._clock.pass_ticks(block - tape.held)

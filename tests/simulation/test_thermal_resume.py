@@ -67,8 +67,7 @@ def test_after_a_checkpoint_between_runs_the_rest_is_the_same_bytes(undisturbed:
 def test_how_time_is_cut_does_not_change_the_bytes(
     undisturbed: list[bytes], length: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("simulators.clock.SLICE_S", length / 100.0)
-    monkeypatch.setattr("simulators.imu.device.BLOCK_S", 3.33)
+    monkeypatch.setattr("simulators.world.WARM_SLICE_S", length / 100.0)
     [first] = [asyncio.run(thermal_run(build(CONFIG), *RUNS[0])).tobytes()]
     assert first == undisturbed[0]
 

@@ -172,9 +172,8 @@ def test_power_heats_the_unit_and_off_it_cools() -> None:
         return found
 
     warm, cool = asyncio.run(on_and_off())
-    # 12 + 1 + 1.5 + 3·4 W go through 8 W/K to air at 22 °C, 4 W of a gyro through 1.2 W/K to the case.
-    # Time constants are
-    # at most 5.7 kJ/K over 8 W/K and what the parts lag, below 900 s: of 7 K 0.02 are left, and 0.01 °C of noise.
+    # 12 + 1 + 1.5 + 3·4 W go through 8 W/K to air at 22 °C, 4 W of a gyro through 1.2 W/K to the case. Time constants
+    # are at most 5.7 kJ/K over 8 W/K and what the parts lag, below 900 s: of 7 K 0.02 are left, and 0.01 °C of noise.
     assert warm[2] == pytest.approx(22.0 + 26.5 / 8.0, abs=0.02)
     np.testing.assert_allclose(warm[5:], 22.0 + 26.5 / 8.0 + 4.0 / 1.2, atol=0.02)
     np.testing.assert_allclose(cool[2:], 22.0, atol=0.02)

@@ -79,7 +79,7 @@ def test_a_moving_table_has_no_checkpoint() -> None:
 def test_how_time_is_cut_does_not_change_the_bytes(length: int, record, monkeypatch) -> None:
     [whole] = record(build(CONFIG), [Station(0, "", None, None, 7.0, 25.0)])
     monkeypatch.setattr("simulators.clock.SLICE_S", length / 100.0)
-    monkeypatch.setattr("simulators.imu.device.BLOCK_S", 3.33)
+    monkeypatch.setattr("simulators.imu.tape.BLOCK_S", 3.33)
     [cut] = record(build(CONFIG), [Station(0, "", None, None, 7.0, 25.0)])
     assert cut.tobytes() == whole.tobytes()
 
