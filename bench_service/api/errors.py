@@ -13,12 +13,15 @@ from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from bench_service.jobs.errors import (
+    AlreadyReserved,
     BenchBusy,
     IdempotencyConflict,
     IllegalTransition,
     NotDriving,
     NotFound,
     NotMounted,
+    NotReady,
+    NotSafe,
     ServiceError,
     StorageFailure,
     StorageFull,
@@ -31,8 +34,11 @@ STATUS: dict[type[Exception], int] = {
     IllegalTransition: 409,
     IdempotencyConflict: 409,
     BenchBusy: 409,
+    AlreadyReserved: 409,
     NotDriving: 503,
+    NotReady: 503,
     NotMounted: 422,
+    NotSafe: 409,
     DomainError: 422,
     BenchError: 502,
     StorageFull: 507,
@@ -120,6 +126,8 @@ def _on_known(request: Request, error: Exception) -> Response:
     fields: list[FieldError] = []
     if isinstance(error, BadParameter):
         fields = [FieldError(field=error.field, message=error.allowed, value=_jsonable(error.value))]
+    if isinstance(error, NotReady):
+        fields = [FieldError(field="service", message=reason) for reason in error.reasons]
     lost = list(error.lost) if isinstance(error, Undetermined) else []
     return respond(request, status_of(error), str(error), type(error).__name__, fields, lost)
 

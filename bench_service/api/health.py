@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Gauge, generate_latest
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 from bench_service.api.dependencies import Service
 from bench_service.api.errors import problems
@@ -15,6 +15,7 @@ class Health(BaseModel):
 
     status: str = "ok"
     code_version: str
+    notes: list[str] = Field(default_factory=list[str], description="What a person should know: a stopped bench")
 
 
 @router.get("/healthz")
@@ -25,9 +26,11 @@ def healthz(service: Service) -> Health:
 
 @router.get("/readyz", responses=problems())
 def readyz(service: Service) -> Health:
-    """The database answers and the bench's worker runs; waits for it after a start."""
-    service.ready()
-    return Health(code_version=service.code_version)
+    """A job could start here: the database answers, its disk has room, the engine runs, the lease is held.
+
+    Waits for the engine after a start. 503 names every reason. A stopped bench refuses by a person's will: a note.
+    """
+    return Health(code_version=service.code_version, notes=list(service.ready()))
 
 
 @router.get(
@@ -42,5 +45,6 @@ def metrics(service: Service) -> Response:
     for state, count in service.stores.jobs.counts().items():
         jobs.labels(state.value).set(count)
     busy = Gauge("bench_busy", "1 while a job drives the bench", ["bench"], registry=registry)
-    busy.labels(service.driver.description.id).set(service.running_job() is not None)
+    for bench in service.benches.ids():
+        busy.labels(bench).set(service.running_job(bench) is not None)
     return Response(generate_latest(registry), media_type=CONTENT_TYPE_LATEST)

@@ -32,6 +32,8 @@ class JobSubmission(PreviewRequest):
     priority: int = Field(10, ge=1, le=1000, description="Smaller runs first")
     labels: Labels = Field(default_factory=Labels, max_length=50)
     seed: int | None = Field(None, ge=0, lt=2**48, description="Of a simulated bench: same seed, same bytes")
+    retries: int = Field(0, ge=0, le=5, description="How often a fault of the bench is answered by trying again")
+    reservation: str | None = Field(None, max_length=100, description="The reservation under which it runs")
     deadline_at: AwareDatetime | None = Field(None, description="No station begins later; the job then fails")
 
 
@@ -48,6 +50,12 @@ class Reanalysis(Request):
     """Other parameters for a job's recordings; those left out stay as they were requested."""
 
     parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+
+
+class JobChange(Request):
+    """What can be changed of a job while it is queued."""
+
+    priority: int = Field(ge=1, le=1000, description="Smaller runs first")
 
 
 class StopRequest(Request):

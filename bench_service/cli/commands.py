@@ -52,15 +52,47 @@ def serve(
     context: typer.Context,
     host: Annotated[str | None, typer.Option(help="Address to listen on")] = None,
     port: Annotated[int | None, typer.Option(help="Port to listen on")] = None,
+    no_worker: Annotated[bool, typer.Option("--no-worker", help="Drive no bench: workers of the database do")] = False,
 ) -> None:
     """Serve the API and the pages, and run jobs on the bench, until interrupted."""
     from bench_service.cli.serving import check_port, ready
+    from bench_service.cli.supervising import accompanied
 
     settings = _with(context.obj, host=host, port=port)
     check_port(settings)
-    with ready(settings) as server:
+    if no_worker or not settings.drive:
+        with ready(settings, drive=False) as server:
+            console.print(f"API without a bench of its own at http://{settings.host}:{settings.port}")
+            server.run()
+        return
+    with ready(settings) as server, accompanied(settings, lambda: server.started):
         console.print(f"bench {settings.bench_id} at http://{settings.host}:{settings.port}")
         server.run()
+
+
+@app.command()
+def worker(
+    context: typer.Context,
+    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
+) -> None:
+    """Run the jobs of a bench, without HTTP, until SIGTERM or SIGINT. Its running job is left for the next start."""
+    from bench_service.cli.working import work
+
+    settings = Settings.model_validate({**context.obj.model_dump(), "bench_id": bench or context.obj.bench_id})
+    work(settings, lambda line: print(line, flush=True))
+
+
+@app.command()
+def supervise(
+    context: typer.Context,
+    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
+    companion: Annotated[bool, typer.Option(help="End with the process that drives the bench")] = False,
+) -> None:
+    """Watch a bench on its own host, and make it safe where the process that drives it is gone or hangs."""
+    from bench_service.cli.supervising import supervise as watch_over
+
+    settings = Settings.model_validate({**context.obj.model_dump(), "bench_id": bench or context.obj.bench_id})
+    watch_over(settings, companion, lambda line: print(line, flush=True))
 
 
 @app.command()
@@ -74,11 +106,16 @@ def demo(
     """Start the service, calibrate and verify the simulated unit through it, show what came out, keep serving."""
     from bench_service.cli.demo import demonstrate
     from bench_service.cli.serving import check_port, serving
+    from bench_service.cli.supervising import accompanied
 
     settings = _with(context.obj, port=port)
     check_port(settings)
     address = f"http://{settings.host}:{settings.port}"
-    with serving(settings), connect(settings, address, drive=False) as client:
+    with (
+        serving(settings),
+        accompanied(settings, lambda: True),
+        connect(settings, address, drive=False) as client,
+    ):
         console.print(f"bench {settings.bench_id} at {address}")
         code = demonstrate(client, unit, seed, console)
         if not once:

@@ -6,12 +6,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from bench_service.drivers.device_faults import DeviceFaults, FaultPlan
+from bench_service.drivers.device_register import DeviceRegister
+from bench_service.drivers.registered import RegisteredBench, RegisteredDevices
+from bench_service.jobs.devices import DeviceState
 from bench_service.jobs.driver import TrueTriad
 from bench_service.jobs.errors import Misconfigured, NotMounted
 from bench_service.wall_clock import pause_async
 from procedures.bench import Bench, BenchDescription, BenchNeeds
+from procedures.bench.errors import BenchError
 from procedures.core.unit import Unit
 from simulators.truth import (
+    BenchTruth,
     UnitTruth,
     declared_unit,
     default_bench,
@@ -39,8 +45,14 @@ def _loaded(path: Path, load: Callable[[Path], T]) -> T:
         raise Misconfigured(f"{path}: {error}") from error
 
 
+def _shipped_as(bench_id: str) -> BenchTruth:
+    """The shipped bench under another id; the unit on each of them is the same."""
+    shipped = default_bench()
+    return replace(shipped, description=replace(shipped.description, id=bench_id))
+
+
 class SimulatedDriver:
-    """A bench whose table, unit and supply live in this process; its data are marked as simulated."""
+    """A bench whose table, unit, supply and chamber live in this process; its data are marked as simulated."""
 
     def __init__(
         self,
@@ -48,11 +60,19 @@ class SimulatedDriver:
         unit_truth: Path | None = None,
         bench_truth: Path | None = None,
         real_time_factor: float | None = None,
+        register: DeviceRegister | None = None,
+        faults: FaultPlan | None = None,
     ) -> None:
-        """Raises `Misconfigured` for a truth file that cannot be used, `NotMounted` for one of another bench."""
-        self._bench = default_bench() if bench_truth is None else _loaded(bench_truth, load_bench)
+        """Without a truth file a bench of any id is the shipped one under that id: a laboratory may have several.
+
+        `register`: where the devices' state outlives this process; without one, nobody else can make them safe.
+        Raises `Misconfigured` for a truth file that cannot be used, `NotMounted` for one of another bench.
+        """
+        self._bench = _shipped_as(bench_id) if bench_truth is None else _loaded(bench_truth, load_bench)
         self._unit = default_unit() if unit_truth is None else _loaded(unit_truth, load_unit)
         self._real_time_factor = real_time_factor
+        self._register = register
+        self._faults = faults
         if bench_id != self._bench.description.id:
             raise NotMounted(f"the truth file is of bench {self._bench.description.id!r}, not {bench_id!r}")
 
@@ -67,15 +87,47 @@ class SimulatedDriver:
             units.append(self._truth_of(serial))
         return tuple(declared_unit(unit) for unit in units)
 
-    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None, needs: BenchNeeds) -> Bench:
-        """A world with that unit on the table, at its beginning or at a checkpoint."""
+    def open(
+        self,
+        unit: str,
+        seed: int | None,
+        checkpoint: dict[str, Any] | None,
+        needs: BenchNeeds,
+        job: str | None = None,
+    ) -> Bench:
+        """A world with that unit on the table, at its beginning or at a checkpoint; with its chamber where needed.
+
+        Raises `NotMounted`, `DeviceBusy`, `DeviceFault` where the job reads temperatures and the bench has no chamber.
+        """
         from simulators.world import build  # with MuJoCo: not needed before a bench is opened
 
-        config = self._config(unit, 0 if seed is None else seed)
-        return build(replace(config, sample_rate_hz=needs.sample_rate_hz, thermal=needs.temperatures), checkpoint)
+        config = replace(
+            self._config(unit, 0 if seed is None else seed),
+            sample_rate_hz=needs.sample_rate_hz,
+            thermal=needs.temperatures,
+            currents=needs.currents,
+        )
+        bench = build(config, checkpoint)
+        if self._register is None:
+            return bench
+        link = self._register.open(job=job)
+        chamber = self.description.chamber
+        link.note("bench.opened", {"unit": unit}, chamber_ambient_c=None if chamber is None else chamber.ambient_c)
+        faults = None if self._faults is None else DeviceFaults(self._faults, f"{job} {link.openings}")
+        return RegisteredBench(bench, link, faults)
+
+    def device_state(self) -> DeviceState | None:
+        """What the register holds; None without one."""
+        return None if self._register is None else RegisteredDevices(self._register).device_state()
+
+    def make_safe(self, by: str) -> DeviceState:
+        """Over the register, without a world. Raises `DeviceBusy`, and `BenchError` without a register."""
+        if self._register is None:
+            raise BenchError("this bench keeps no register of its devices: only the job that drives it can stop them")
+        return RegisteredDevices(self._register).make_safe(by)
 
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
-        """Bias and matrix of the job's launch, run-to-run changes included."""
+        """Bias and matrix of the job's launch at the unit's reference temperature, run-to-run changes included."""
         from simulators.world import launch_truth
 
         found = launch_truth(self._config(unit, seed))
@@ -104,9 +156,20 @@ class SimulatedDriver:
     def _truth_of(self, serial: str) -> UnitTruth:
         if serial == self._unit.serial:
             return self._unit
-        found = RANDOM_UNIT.match(serial)
-        if found is None:
+        drawn = _drawn_truth(serial)
+        if drawn is None:
             raise NotMounted(
                 f"the simulated bench has no unit {serial!r}; it has {self._unit.serial} and RANDOM-<number>"
             )
-        return replace(random_unit_truth(int(found.group(1))), serial=serial)
+        return drawn
+
+
+def drawn_unit(serial: str) -> Unit | None:
+    """A unit that every simulated bench has by drawing it from its serial, as declared; None for another serial."""
+    truth = _drawn_truth(serial)
+    return None if truth is None else declared_unit(truth)
+
+
+def _drawn_truth(serial: str) -> UnitTruth | None:
+    found = RANDOM_UNIT.match(serial)
+    return None if found is None else replace(random_unit_truth(int(found.group(1))), serial=serial)

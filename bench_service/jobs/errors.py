@@ -7,10 +7,15 @@ ServiceError
 ├── BenchBusy            another process drives this bench
 ├── Misconfigured        a file that the settings name cannot be used
 ├── NotDriving           this process drives no bench
+├── NotReady             a job could not start here now
+├── NotSafe              the bench's devices are not known to be safe
+├── AlreadyReserved      somebody keeps this bench or unit
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
 """
+
+from collections.abc import Sequence
 
 
 class ServiceError(Exception):
@@ -35,7 +40,11 @@ class IdempotencyConflict(ServiceError):
 
 
 class BenchBusy(ServiceError):
-    """Another process drives this bench."""
+    """Another process drives this bench; `passing`: its supervisor, which gives it back in a moment."""
+
+    def __init__(self, message: str, passing: bool = False) -> None:
+        super().__init__(message)
+        self.passing = passing
 
 
 class Misconfigured(ServiceError):
@@ -44,6 +53,22 @@ class Misconfigured(ServiceError):
 
 class NotDriving(ServiceError):
     """This process drives no bench: it only reads."""
+
+
+class NotReady(ServiceError):
+    """A job could not start here now."""
+
+    def __init__(self, reasons: Sequence[str]) -> None:
+        super().__init__("; ".join(reasons))
+        self.reasons = tuple(reasons)
+
+
+class NotSafe(ServiceError):
+    """The bench's devices are not known to be safe."""
+
+
+class AlreadyReserved(ServiceError):
+    """Somebody keeps this bench or unit."""
 
 
 class NotMounted(ServiceError):

@@ -7,10 +7,11 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from bench_service.jobs.driver import BenchDriver
+from bench_service.jobs.directory import BenchDirectory
 from bench_service.jobs.errors import NotFound, NotMounted
 from bench_service.jobs.store import Stores
 from procedures import catalog
+from procedures.bench import BenchDescription
 from procedures.core.recording import Station
 from procedures.core.unit import Unit
 from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
@@ -40,11 +41,11 @@ class Plan:
 
 
 class Planner:
-    """Knows the catalogue and the one bench of this process."""
+    """Knows the catalogue and the benches."""
 
-    def __init__(self, stores: Stores, driver: BenchDriver) -> None:
+    def __init__(self, stores: Stores, benches: BenchDirectory) -> None:
+        self.benches = benches
         self._stores = stores
-        self._driver = driver
 
     @cached_property
     def catalog(self) -> Mapping[str, AnyProcedure]:
@@ -59,18 +60,14 @@ class Planner:
 
     def context(self, unit: str, bench: str | None = None) -> Context:
         """What is known now. Raises `NotFound` for an unknown bench, `NotMounted` for a unit it does not have."""
-        description = self._driver.description
-        if bench is not None and bench != description.id:
-            raise NotFound("bench", bench)
-        return Context(self.unit(unit), description)
+        description = self.benches.description(self.benches.default() if bench is None else bench)
+        return Context(self.unit(unit, description.id), description)
 
-    def unit(self, serial: str) -> Unit:
-        """A unit that is mounted on the bench, with its current calibration. Raises `NotMounted`."""
-        mounted = {unit.serial: unit for unit in self._driver.mounted(serial)}
+    def unit(self, serial: str, bench: str) -> Unit:
+        """A unit that is mounted on a bench, with its current calibration. Raises `NotMounted`, `NotFound`."""
+        mounted = {unit.serial: unit for unit in self.benches.mounted(bench, serial)}
         if serial not in mounted:
-            raise NotMounted(
-                f"bench {self._driver.description.id!r} has no unit {serial!r}; it has {', '.join(mounted)}"
-            )
+            raise NotMounted(f"bench {bench!r} has no unit {serial!r}; it has {', '.join(mounted)}")
         try:
             return self._stores.units.unit(serial)
         except NotFound:
@@ -83,10 +80,7 @@ class Planner:
         parameters = procedure.resolve(procedure.params.model_validate(requested), context)
         stations = procedure.schedule(parameters)
         violations = tuple(
-            f"station {s.index} ({s.label}): {sentence}"
-            for s in stations
-            if s.angles is not None
-            for sentence in context.bench.violations(s.angles, s.turn, s.profile)
+            f"station {s.index} ({s.label}): {sentence}" for s in stations for sentence in _violations(s, context.bench)
         )
         prediction = procedure.predict(parameters, context)
         data_bytes = sum(_samples(s, context.unit) for s in stations) * BYTES_PER_SAMPLE
@@ -97,8 +91,17 @@ class Planner:
         return replace(context, unit=self._stores.units.unit(context.unit.serial))
 
 
+def _violations(station: Station, bench: BenchDescription) -> tuple[str, ...]:
+    """Limits of the bench that a station passes."""
+    if station.current_ma is not None:
+        return bench.current_violations(station.current_ma, station.profile)
+    return () if station.angles is None else bench.violations(station.angles, station.turn, station.profile)
+
+
 def _samples(station: Station, unit: Unit) -> int:
     """Samples of all channels; of a profile as long as it is expected to take."""
+    if station.current_ma is not None:  # a converter alone: three channels and its own sensor, after it has soaked
+        return round(station.record_s * (station.sample_rate_hz or unit.sample_rate_hz)) * 4
     seconds = station.record_s if station.profile is None else station.profile.expected_s()
     channels = len(unit.channels) + TEMPERATURE_CHANNELS * station.temperatures
     return round(seconds * (station.sample_rate_hz or unit.sample_rate_hz)) * channels

@@ -20,6 +20,10 @@ class JobRequest:
     seed: int | None = None
     deadline_at: datetime | None = None
     """No station begins later."""
+    retries: int = 0
+    """How often a fault of the bench is answered by trying again."""
+    reservation: str | None = None
+    """The reservation under which it runs."""
 
 
 def fingerprint(request: object) -> str:

@@ -6,24 +6,26 @@ from threading import Event
 from typing import Any
 
 from bench_service.jobs.driver import BenchDriver
-from bench_service.jobs.errors import IllegalTransition, ServiceError
+from bench_service.jobs.errors import ServiceError, StorageFailure
 from bench_service.jobs.job import FINAL, Failure, Job, JobState
+from bench_service.jobs.live import LiveBoard
+from bench_service.jobs.live_tap import LiveTap
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
+from bench_service.jobs.processes import ProcessIdentity
+from bench_service.jobs.queue import QueueEntry
+from bench_service.jobs.retries import try_again
 from bench_service.jobs.session import BenchSession, ShuttingDown
 from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import Idempotency, StoredResult
+from bench_service.jobs.stored import BenchStop, Idempotency, StoredResult
 from bench_service.wall_clock import new_id, now
 from procedures.bench import BenchNeeds
-from procedures.bench.errors import BenchError, Stopped
+from procedures.bench.errors import BenchError, Disconnected, Stopped
 from procedures.core.errors import DomainError
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import Recording
 from procedures.core.unit_correction import UnitCorrection
 from procedures.procedure import Outcome
-
-RELEASE_CHECK_S = 0.2
-"""How often a waiting job asks whether its bench was released [s]."""
 
 
 @dataclass(frozen=True)
@@ -49,45 +51,37 @@ class JobRunner:
         driver: BenchDriver,
         code_version: str,
         lease_held: Callable[[], bool],
+        live: LiveBoard | None = None,
+        retry_scale: float = 1.0,
     ) -> None:
-        """`lease_held`: whether this process still has the right to drive the bench; asked before every station."""
+        """`lease_held`: whether this process still has the right to drive the bench; asked before every station.
+
+        `live`: where it is said what the bench does; None: nowhere.
+        `retry_scale`: of the pauses before a retry; less than 1 where bench time is not real time.
+        """
         self._stores = stores
         self._planner = planner
         self._driver = driver
         self._code_version = code_version
         self._lease_held = lease_held
+        self._live = live
+        self._retry_scale = retry_scale
         self._session: BenchSession | None = None
         self._ending = Event()
 
-    def wait_for_release(self, job_id: str) -> None:
-        """While a person's stop stands, the job waits in its queue. Raises `ShuttingDown` when the service ends."""
-        jobs, told = self._stores.jobs, False
-        while True:
-            stop = self._stores.units.bench_stop(self._driver.description.id)
-            if stop is None or jobs.get(job_id).state is not JobState.QUEUED:
-                return
-            if not told:
-                jobs.note(job_id, "note", now(), {"text": f"bench {stop.bench} is stopped: {stop.reason}"})
-                told = True
-            if self._ending.wait(RELEASE_CHECK_S):
-                raise ShuttingDown
+    def claim(self, entry: QueueEntry) -> Job | None:
+        """Begin a queued job, with what is known of its unit now; None where it cannot begin any more."""
+        job = self._stores.jobs.get(entry.job)
+        context = self._planner.refreshed(CONTEXT.validate_python(job.context))
+        return self._stores.queue.claim(entry, CONTEXT.dump_python(context, mode="json"), now())
 
-    def prepare(self, job_id: str, attempt: int) -> int:
-        """Note what is known of the unit now, and start. How many stations there are; 0 stations, nothing moves.
+    def stations(self, job_id: str, attempt: int) -> int:
+        """How many stations a claimed job has; 0 stations, nothing moves.
 
         -1 where there is nothing to do: the job has ended, is put aside, or was queued again since.
         """
-        jobs = self._stores.jobs
-        job = jobs.get(job_id)
-        if job.state not in (JobState.QUEUED, JobState.RUNNING) or job.attempt != attempt:
-            return -1
-        context = self._planner.refreshed(CONTEXT.validate_python(job.context))
-        job = jobs.set_context(job_id, CONTEXT.dump_python(context, mode="json"))
-        try:
-            jobs.transition(job_id, JobState.RUNNING, at=now())
-        except IllegalTransition:  # it was cancelled or put aside this moment
-            return -1
-        return len(job.stations)
+        job = self._stores.jobs.get(job_id)
+        return len(job.stations) if job.state is JobState.RUNNING and job.attempt == attempt else -1
 
     def acquire(self, job_id: str, index: int) -> StepOutcome:
         """Record one station. Where its recording exists already, a crash came between storing and noting it.
@@ -101,7 +95,7 @@ class JobRunner:
             jobs.station_done(job_id, index, now(), {})
             return StepOutcome()
         job = jobs.get(job_id)
-        if job.cancel_requested or job.state in FINAL:
+        if job.cancel_requested or job.state in FINAL or self._stop_wanted(job_id):
             return StepOutcome(cancelled=True)
         if job.pause_requested:
             return StepOutcome(paused=True)
@@ -122,23 +116,40 @@ class JobRunner:
         return StepOutcome()
 
     def make_safe(self, job_id: str) -> StepOutcome:
-        """Leave the bench safe; after a restart in which no session survived, by opening it for that alone."""
-        try:
-            session = self._session_of(self._stores.jobs.get(job_id))
-        except (BenchError, ServiceError) as error:
-            return self._not_safe(job_id, str(error))
+        """Leave the bench safe; after a restart in which no session survived, without the procedure.
+
+        A device that does not answer is asked once more over a new link. Where that fails too, the job ends and the
+        bench is stopped: nothing else runs on it until a person has looked.
+        """
+        session = self._session
+        if session is None or session.job.id != job_id:
+            if self._driver.device_state() is not None:
+                return self._make_safe_anew(job_id, "")
+            job = self._stores.jobs.get(job_id)
+            try:
+                session = self._session_of(job)
+            except (BenchError, ServiceError) as error:
+                return self._not_safe(job_id, str(error))
         try:
             session.make_safe()
         except ExceptionGroup as group:
-            return self._not_safe(job_id, "; ".join(str(error) for error in group.exceptions))
+            why = "; ".join(str(error) for error in group.exceptions)
+            if group.split(Disconnected)[1] is not None:
+                return self._not_safe(job_id, why)
+        except Disconnected as silence:
+            why = str(silence)
+        else:
+            return StepOutcome()
         finally:
             self._session = None
             session.close()
-        return StepOutcome()
+        return self._make_safe_anew(job_id, why)
 
     def conclude(self, job_id: str) -> StepOutcome:
-        """Analyse, store the result with its calibrations and corrections, and end the job with the verdict."""
+        """Analyse, store the result with what it found, and end the job with the verdict; may be repeated."""
         job = self._stores.jobs.get(job_id)
+        if job.state in FINAL:  # a crash came after its end was noted
+            return StepOutcome()
         procedure = self._planner.procedure(job.procedure)
         try:
             recordings = recordings_of(self._stores, job_id)
@@ -163,6 +174,9 @@ class JobRunner:
         self._stores.recordings.interrupt_open(job_id)
         if outcome.paused:
             return self._stores.jobs.put_aside(job_id, now())
+        again = try_again(self._stores.queue, job, outcome.failure, self._retry_scale)
+        if again is not None:
+            return again
         to = JobState.CANCELLED if outcome.cancelled else JobState.FAILED
         verdict = None if outcome.cancelled else Verdict.ERROR
         return self._stores.jobs.transition(job_id, to, at=now(), verdict=verdict, failure=outcome.failure)
@@ -187,23 +201,48 @@ class JobRunner:
         if found != unit:
             self._stores.units.put_unit(found)
 
+    def _make_safe_anew(self, job_id: str, why: str) -> StepOutcome:
+        """Over the devices' own link, once the job's is given up; `why` that one did not do."""
+        try:
+            self._driver.make_safe(f"the service, {ProcessIdentity.own()}")
+        except BenchError as error:
+            return self._not_safe(job_id, f"{why}; then: {error}" if why else str(error))
+        except ExceptionGroup as group:
+            return self._not_safe(job_id, "; ".join([*([why] if why else []), *map(str, group.exceptions)]))
+        if why:
+            self._stores.jobs.note(job_id, "note", now(), {"text": f"the bench was made safe over a new link: {why}"})
+        return StepOutcome()
+
     def _not_safe(self, job_id: str, why: str) -> StepOutcome:
         text = f"the bench could not be made safe: {why}"
+        self._stores.units.stop_bench(BenchStop(self._driver.description.id, now(), f"could not be made safe: {why}"))
         self._stores.jobs.note(job_id, "note", now(), {"text": text})
         return StepOutcome(Failure("NotSafe", text))
+
+    def _stop_wanted(self, job_id: str) -> bool:
+        """Whether the job was cancelled or its bench stopped, whichever process was asked.
+
+        A database that does not answer now, because it is restarted, has nothing to say: the recording goes on.
+        """
+        try:
+            bench_stop = self._stores.units.bench_stop(self._driver.description.id)
+            return bench_stop is not None or self._stores.jobs.cancel_requested(job_id)
+        except StorageFailure:
+            return False
 
     def _session_of(self, job: Job) -> BenchSession:
         if self._session is not None and self._session.job.id == job.id:
             return self._session
         self._stores.recordings.interrupt_open(job.id)
         checkpoint = self._stores.recordings.checkpoint(job.id)
-        bench = self._driver.open(job.unit, job.seed, checkpoint, BenchNeeds.of(job.stations))
+        bench = self._driver.open(job.unit, job.seed, checkpoint, BenchNeeds.of(job.stations), job.id)
         self._session = BenchSession(
             job,
             self._planner.procedure(job.procedure),
             bench,
             self._stores.recordings,
-            lambda: self._stores.jobs.cancel_requested(job.id),
+            lambda: self._stop_wanted(job.id),
+            None if self._live is None else LiveTap(job, bench, self._live),
         )
         return self._session
 

@@ -1,15 +1,19 @@
 """What the service can be asked, in one place: HTTP and command line say it in their own words."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from datetime import timedelta
 from random import SystemRandom
 
 from bench_service.jobs.analyses import AnalysisDesk
 from bench_service.jobs.driver import BenchDriver, TrueTriad
-from bench_service.jobs.errors import IllegalTransition, NotDriving, NotFound
+from bench_service.jobs.errors import IllegalTransition, NotFound, NotReady
 from bench_service.jobs.job import Job, JobState
+from bench_service.jobs.live import LiveBoard
 from bench_service.jobs.planning import CONTEXT, Plan, Planner, register
+from bench_service.jobs.queue_desk import QueueDesk
 from bench_service.jobs.request import JobRequest, fingerprint
+from bench_service.jobs.safety import Safety, SafetyDesk
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import BenchStop, Idempotency, StoredResult
 from bench_service.jobs.worker import Worker
@@ -21,30 +25,51 @@ CRASHED_IMPORT = timedelta(hours=1)
 """An import that is not sealed after this long will never be: its process is gone."""
 
 
+LEAST_FREE_BYTES = 200_000_000
+"""With less room on the database's disk the service says that it is not ready: an hour of samples is about 17 MB."""
+
+
 class BenchService:
     """The machine room's front desk. Every verb is complete when it returns."""
 
     def __init__(
         self,
         stores: Stores,
-        driver: BenchDriver,
+        driver: BenchDriver | None,
         planner: Planner,
         worker: Worker | None,
         code_version: str,
+        safety: SafetyDesk,
+        live: LiveBoard | None = None,
+        free_bytes: Callable[[], int | None] = lambda: None,
     ) -> None:
+        """`driver`: of this process's own bench; None: it plans and queues for benches that workers drive.
+
+        `free_bytes`: room on the database's disk, where that is known.
+        """
+        self.safety = safety
+        self.live = live or LiveBoard(stores.live)
         self.stores = stores
         self.driver = driver
         self.planner = planner
         self.code_version = code_version
         self.analyses = AnalysisDesk(stores, planner, code_version)
+        self.benches = planner.benches
+        self.queues = QueueDesk(stores, planner.benches, self._wake)
         self._worker = worker
+        self._free_bytes = free_bytes
 
     def register(self) -> None:
         """Remember the bench and its units, and forget what crashed imports left."""
-        self.stores.units.put_bench(self.driver.description)
         self.stores.recordings.discard_open_imports(now() - CRASHED_IMPORT)
-        for unit in self.driver.mounted():
+        if self.driver is None:
+            return
+        mounted = self.driver.mounted()
+        for unit in mounted:
             register(self.stores, unit)
+        self.stores.units.put_bench(self.driver.description, [unit.serial for unit in mounted])
+        if self._worker is not None:
+            self.safety.at_start(self.driver.description.id)
 
     def begin(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
         """Begin to work, beside the first answers. The bench's lease must be held.
@@ -54,11 +79,23 @@ class BenchService:
         if self._worker is not None:
             self._worker.begin([lambda: (self.planner.catalog, self.analyses.methods), *warm_up])
 
-    def ready(self) -> None:
-        """Return once requests can be served in full. Raises `StorageFailure`, `NotDriving`."""
+    def ready(self) -> tuple[str, ...]:
+        """Return once a job could start, with what a person should know all the same.
+
+        A stopped bench is such a note: it refuses by a person's will, and the service works. Raises `NotReady` with
+        every reason, `StorageFailure` where the database does not answer.
+        """
         self.stores.jobs.counts()
+        reasons: list[str] = []
+        free = self._free_bytes()
+        if free is not None and free < LEAST_FREE_BYTES:
+            reasons.append(f"the disk is nearly full: {free} bytes are free, {LEAST_FREE_BYTES} are needed")
         if self._worker is not None:
-            self._worker.require_engine()
+            reasons += self._worker.troubles()
+        if reasons:
+            raise NotReady(reasons)
+        stops = (self.stores.units.bench_stop(bench) for bench in self.benches.ids())
+        return tuple(f"bench {stop.bench} is stopped: {stop.reason}" for stop in stops if stop is not None)
 
     def stop(self) -> None:
         """End the service: the running job is left for the next start, the bench made safe."""
@@ -72,13 +109,13 @@ class BenchService:
             raise BadParameter("stations", plan.violations[0], "beyond an axis limit of the bench")
         if request.seed is not None and not plan.context.bench.simulated:
             raise BadParameter("seed", request.seed, "only a simulated bench has one")
-        if self._worker is None:
-            raise NotDriving("this process does not drive a bench; ask the service that does")
+        if request.reservation is not None:
+            self.queues.usable(request.reservation, plan.context.bench.id, request.unit)
         register(self.stores, plan.context.unit)
         job = self._new_job(request, plan)
         key = None if idempotency_key is None else Idempotency(f"jobs:{idempotency_key}", fingerprint(request))
         stored = self.stores.jobs.add(job, key)
-        self._worker.require_engine().enqueue(stored)
+        self._wake()
         return stored
 
     def cancel(self, job_id: str) -> Job:
@@ -90,40 +127,42 @@ class BenchService:
         return self.stores.jobs.request_pause(job_id, now())
 
     def resume(self, job_id: str) -> Job:
-        """Go on with a paused or interrupted job, with the stations that remain. Raises `IllegalTransition`."""
-        if self._worker is None:
-            raise NotDriving("this process does not drive a bench; ask the service that does")
-        engine = self._worker.require_engine()
+        """Go on with a job that can be resumed, with the stations that remain. Raises `IllegalTransition`."""
         job = self.stores.jobs.resume(job_id, now())
-        if job.state is JobState.QUEUED:
-            engine.enqueue(job)
+        self._wake()
         return job
 
-    def stop_bench(self, bench_id: str, reason: str) -> Job | None:
-        """Stop what the bench is doing, until it is released; the job that was running, if any.
-
-        Its bench is safe once that job is cancelled. Jobs in the queue wait.
+    def stop_bench(self, bench_id: str, reason: str) -> tuple[Job | None, Safety]:
+        """Stop what the bench is doing, wherever its worker is, until it is released; the job that was running, if
+        any, and what is known of the bench's safety then. Jobs in the queue wait.
         """
-        if bench_id != self.driver.description.id:
-            raise NotFound("bench", bench_id)
+        self.benches.description(bench_id)
         self.stores.units.stop_bench(BenchStop(bench_id, now(), reason))
-        running = self.running_job()
-        if running is None:
-            return None
-        try:
-            return self.cancel(running.id)
-        except IllegalTransition:
-            return None
+        running = self.running_job(bench_id)
+        if running is not None:
+            with suppress(IllegalTransition):  # it has ended this moment
+                running = self.cancel(running.id)
+        return running, self.safety.stopping(bench_id)
 
     def release_bench(self, bench_id: str) -> None:
-        """Let a stopped bench work again; the jobs in its queue go on."""
-        if bench_id != self.driver.description.id:
-            raise NotFound("bench", bench_id)
-        self.stores.units.release_bench(bench_id)
+        """Let a stopped bench work again; the jobs in its queue go on. Raises `NotSafe` while it is not safe."""
+        self.benches.description(bench_id)
+        if self.stores.units.bench_stop(bench_id) is not None:
+            self.safety.require(bench_id)
+            self.stores.units.release_bench(bench_id)
+        self._wake()
 
-    def running_job(self) -> Job | None:
-        """The job that drives the bench now."""
-        return None if self._worker is None else self._worker.running_job()
+    def set_priority(self, job_id: str, priority: int) -> Job:
+        """Change the place of a queued job. Raises `IllegalTransition` where it is not queued."""
+        return self.stores.queue.set_priority(job_id, priority, now())
+
+    def running_job(self, bench_id: str) -> Job | None:
+        """The job that drives a bench now."""
+        return self.stores.queue.running(bench_id)
+
+    def _wake(self) -> None:
+        if self._worker is not None:
+            self._worker.wake()
 
     def result_of(self, job_id: str) -> StoredResult:
         """The result that gave the job its verdict. Raises `NotFound` where there is none (yet)."""
@@ -137,10 +176,12 @@ class BenchService:
         job = self.stores.jobs.get(job_id)
         if not job.simulated or job.seed is None:
             raise NotFound("truth of job", job_id, "nobody knows it on a real bench")
+        if self.driver is None or self.driver.description.id != job.bench:
+            raise NotFound("truth of job", job_id, f"the process that drives bench {job.bench} knows it")
         return self.driver.truth(job.unit, job.seed)
 
     def _new_job(self, request: JobRequest, plan: Plan) -> Job:
-        bench = plan.context.bench
+        bench, created_at = plan.context.bench, now()
         seed = request.seed if request.seed is not None else SEEDS.getrandbits(48)
         return Job(
             id=new_id(),
@@ -149,7 +190,8 @@ class BenchService:
             unit=request.unit,
             bench=bench.id,
             state=JobState.QUEUED,
-            created_at=now(),
+            created_at=created_at,
+            queued_at=created_at,
             requested_parameters=request.parameters,
             parameters=plan.parameters.model_dump(mode="json"),
             context=CONTEXT.dump_python(plan.context, mode="json"),
@@ -161,4 +203,7 @@ class BenchService:
             priority=request.priority,
             labels=request.labels,
             deadline_at=request.deadline_at,
+            retries=request.retries,
+            retries_left=request.retries,
+            reservation=request.reservation,
         )

@@ -1,6 +1,7 @@
 """A bench while a job drives it: one thread with its own event loop, and the way to safety out of everything."""
 
 import asyncio
+import logging
 import threading
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import Future
@@ -8,16 +9,26 @@ from contextlib import aclosing
 from typing import Any, TypeVar
 
 from bench_service.jobs.job import Job
+from bench_service.jobs.live import PUBLISH_S
+from bench_service.jobs.live_tap import LiveTap
+from bench_service.jobs.observed import ObservedBench
 from bench_service.jobs.store import RecordingStore
 from bench_service.jobs.stored import NewRecording
+from bench_service.jobs.watchdog import Patience, Watchdog
+from bench_service.wall_clock import monotonic_s
 from procedures.bench import Bench
-from procedures.bench.errors import BenchError, Stopped
+from procedures.bench.errors import BenchError, Disconnected, Stopped
 from procedures.bench.imu import Stream
 from procedures.core.recording import RecordingInfo, Station
 from procedures.procedure import Outcome, Parameters, Procedure
 
 T = TypeVar("T")
+log = logging.getLogger(__name__)
 
+PATIENCE = Patience()
+"""For how long a device may say nothing."""
+UNWIND_S = 2.0
+"""How long a procedure may take to leave a verb that was cancelled [s, real time]."""
 STOP_CHECK_S = 0.2
 """How long a move, a settle or a recording may go on before a stop that was asked for is seen [s, real time]."""
 
@@ -39,23 +50,31 @@ class BenchSession:
         bench: Bench,
         recordings: RecordingStore,
         stop_wanted: Callable[[], bool],
+        tap: LiveTap | None = None,
     ) -> None:
         self.job = job
         self._procedure = procedure
-        self._bench = bench
+        self._watchdog = Watchdog(bench.clock, bench.description.simulated, PATIENCE)
+        self._bench = ObservedBench(bench, self._watchdog)
         self._recordings = recordings
         self._stop_wanted = stop_wanted
         self._streams: AsyncIterator[Stream] | None = None
         self._next = -1
         self._shutting_down = threading.Event()
+        self._lost: str | None = None
+        """Why the thread that drives the bench does not come back, if it does not."""
         self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(
-            target=self._loop.run_forever, name=f"bench {bench.description.id}", daemon=True
-        )
+        self._thread = threading.Thread(target=self._drive, name=f"bench {bench.description.id}", daemon=True)
         self._thread.start()
+        self._tap = tap
+        self._telling: asyncio.TimerHandle | None = None
+        self._told: asyncio.Task[None] | None = None
 
     def record(self, index: int) -> RecordingInfo:
-        """Record one station and store it. Raises `BenchError`, `StorageFull`, `StorageFailure`, `ShuttingDown`."""
+        """Record one station and store it. Raises `BenchError`, `StorageFull`, `StorageFailure`, `ShuttingDown`.
+
+        A device that does not answer is `Disconnected`, whatever its driver does about it.
+        """
         return self._wait(asyncio.run_coroutine_threadsafe(self._record(index), self._loop))
 
     def shut_down(self) -> None:
@@ -63,33 +82,65 @@ class BenchSession:
         self._shutting_down.set()
 
     def make_safe(self) -> None:
-        """Close the procedure, then stop the table and switch the unit off. Raises an `ExceptionGroup` of failures."""
-        asyncio.run_coroutine_threadsafe(self._make_safe(), self._loop).result()
+        """Close the procedure, then stop the table and switch the unit off. Raises an `ExceptionGroup` of failures,
+        and `Disconnected` where a device does not answer.
+        """
+        if self._lost is not None:
+            raise Disconnected(self._lost)
+        self._wait(asyncio.run_coroutine_threadsafe(self._make_safe(), self._loop), stoppable=False)
 
     def close(self) -> None:
-        """End the thread. The bench must be safe by now."""
+        """End the thread, and give the devices' links back: whatever is still asked of them after is refused.
+
+        A thread that does not come back is left alone; it holds nothing that anybody needs.
+        """
+        if self._tap is not None and self._lost is None:
+            asyncio.run_coroutine_threadsafe(self._stop_telling(self._tap), self._loop).result()
+        self._bench.close()
         self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
+        if self._lost is None:
+            self._thread.join()
+
+    def _drive(self) -> None:
+        """The bench's thread, to its end: also of one that was lost and came back after all."""
+        self._loop.run_forever()
+        left = asyncio.all_tasks(self._loop)
+        for task in left:
+            task.cancel()
+        if left:
+            self._loop.run_until_complete(asyncio.wait(left))
+        self._loop.run_until_complete(self._loop.shutdown_asyncgens())
         self._loop.close()
 
-    def _wait(self, future: "Future[T]") -> T:
+    def _wait(self, future: "Future[T]", stoppable: bool = True) -> T:
+        looked_s = monotonic_s()
         while True:
             try:
                 return future.result(timeout=STOP_CHECK_S)
             except TimeoutError:
-                if future.done():
-                    raise
-                if self._shutting_down.is_set():
-                    self._cancel(future)
-                    raise ShuttingDown from None
-                if self._stop_wanted():
-                    self._cancel(future)
-                    raise Stopped("stopped by an operator") from None
+                if future.done():  # this moment, or its own error was one
+                    return future.result()
+            now_s = monotonic_s()
+            silence = self._watchdog.silence(now_s - looked_s, 2 * STOP_CHECK_S)
+            looked_s = now_s
+            if silence is not None:
+                self._cancel(future, silence)
+                raise Disconnected(silence)
+            if stoppable and self._shutting_down.is_set():
+                self._cancel(future, "the service ended while a device did not answer")
+                raise ShuttingDown
+            if stoppable and self._stop_wanted():
+                self._cancel(future, "a stop came while a device did not answer")
+                raise Stopped("stopped by an operator")
 
-    def _cancel(self, future: "Future[Any]") -> None:
-        """Cancel a coroutine on the bench's loop and wait until it has unwound."""
+    def _cancel(self, future: "Future[Any]", why: str) -> None:
+        """Cancel a coroutine on the bench's loop and wait until it has unwound, or is lost."""
         future.cancel()
-        asyncio.run_coroutine_threadsafe(self._unwound(), self._loop).result()
+        try:
+            asyncio.run_coroutine_threadsafe(self._unwound(), self._loop).result(UNWIND_S)
+        except TimeoutError:
+            self._lost = why
+            log.error("job %s, bench %s: %s, and its driver does not come back", self.job.id, self.job.bench, why)
 
     async def _unwound(self) -> None:
         others = asyncio.all_tasks(self._loop) - {asyncio.current_task(self._loop)}
@@ -97,6 +148,10 @@ class BenchSession:
 
     async def _record(self, index: int) -> RecordingInfo:
         station = self.job.stations[index]
+        if self._tap is not None:
+            self._tap.station(index)
+            if self._telling is None:
+                self._tell(self._tap)
         if self._streams is None or self._next != index:
             await self._close_streams()
             self._streams = self._procedure.acquire(self._bench, self.job.stations[index:])
@@ -121,9 +176,15 @@ class BenchSession:
                 launched_s=stream.launched_s,
             )
         )
+        tap, begins_s = self._tap, stream.start_s
+        if tap is not None:
+            tap.stream(stream)
         try:
             async for block in stream.blocks:
                 writer.write(block)
+                if tap is not None:
+                    tap.block(begins_s, block)
+                    begins_s += len(block) / stream.rate_hz
                 await asyncio.sleep(0)  # noqa: TID251  lets a cancel land; no time passes
             return writer.seal(self._bench.checkpoint())
         except BaseException:
@@ -135,6 +196,20 @@ class BenchSession:
             async with aclosing(self._streams):  # pyright: ignore[reportArgumentType]  an async generator
                 pass
         self._streams = None
+
+    def _tell(self, tap: LiveTap) -> None:
+        """Say what the bench does, now and every `PUBLISH_S`: between two steps of the procedure, in their thread."""
+        if self._told is None or self._told.done():
+            self._told = self._loop.create_task(tap.publish())
+        self._telling = self._loop.call_later(PUBLISH_S, self._tell, tap)
+
+    async def _stop_telling(self, tap: LiveTap) -> None:
+        if self._telling is not None:
+            self._telling.cancel()
+        if self._told is not None:
+            self._told.cancel()
+            await asyncio.wait([self._told])
+        tap.end()
 
     async def _make_safe(self) -> None:
         try:

@@ -3,7 +3,7 @@
 Every method is one transaction: it commits, or it raises and nothing of it remains.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Protocol
@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 from bench_service.jobs.corrections import CorrectionStore
 from bench_service.jobs.job import Event, Failure, Job, JobState
+from bench_service.jobs.live import LiveStore
+from bench_service.jobs.queue import QueueStore
+from bench_service.jobs.reservation import ReservationStore
 from bench_service.jobs.stored import (
     BenchStop,
     Idempotency,
@@ -175,6 +178,14 @@ class JobStore(Protocol):
         """Events with a sequence greater than `after`, in order. Raises `NotFound`."""
         ...
 
+    def last_event(self, job_id: str) -> tuple[int, JobState]:
+        """Sequence of the newest event, and the state that goes with it, read at one moment. Raises `NotFound`."""
+        ...
+
+    def on_event(self, tell: Callable[[str], None]) -> None:
+        """From now on call `tell(job_id)` after each commit of this process that appended an event."""
+        ...
+
 
 class ResultStore(Protocol):
     """Results, the calibrations and corrections that come with them, and lineage."""
@@ -230,7 +241,13 @@ class UnitStore(Protocol):
 
     def units(self) -> tuple[Unit, ...]: ...
 
-    def put_bench(self, bench: BenchDescription) -> None: ...
+    def put_bench(self, bench: BenchDescription, mounted: Sequence[str] = ()) -> None:
+        """Register a bench with the serials of the units that it can test."""
+        ...
+
+    def mounted(self, bench_id: str) -> tuple[str, ...]:
+        """The serials of the units that a bench can test. Raises `NotFound`."""
+        ...
 
     def bench(self, bench_id: str) -> BenchDescription:
         """Raises `NotFound`."""
@@ -240,6 +257,10 @@ class UnitStore(Protocol):
 
     def stop_bench(self, stop: BenchStop) -> None:
         """Note that a bench was stopped; it stays so until it is released. A second stop changes nothing."""
+        ...
+
+    def confirm_safe(self, bench_id: str, at: datetime, by: str) -> None:
+        """Note that a stopped bench was seen safe; only the first time counts, and only while the stop stands."""
         ...
 
     def release_bench(self, bench_id: str) -> None:
@@ -256,7 +277,10 @@ class Stores:
     """All memory of one service."""
 
     jobs: JobStore
+    queue: QueueStore
+    reservations: ReservationStore
     recordings: RecordingStore
     results: ResultStore
     units: UnitStore
     corrections: CorrectionStore
+    live: LiveStore

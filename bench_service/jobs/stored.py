@@ -81,6 +81,10 @@ class BenchStop:
     bench: str
     at: datetime
     reason: str
+    safe_at: datetime | None = None
+    """When somebody on the bench's host saw the devices safe, since; None: nobody has confirmed it."""
+    safe_by: str = ""
+    """By whom they were last commanded then."""
 
 
 @dataclass(frozen=True)

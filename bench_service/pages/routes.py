@@ -89,14 +89,22 @@ def _explanation(job: Job) -> str:
 
 @router.get("/")
 def home(request: Request) -> HTMLResponse:
-    """The bench, its units, the latest jobs."""
+    """The benches, their units, the latest jobs."""
     service = _service(request)
+    queued = service.stores.queue.lengths()
     return _page(
         request,
         "home.html",
-        bench=service.driver.description,
-        running=service.running_job(),
-        stop=service.stores.units.bench_stop(service.driver.description.id),
+        benches=[
+            {
+                "bench": service.benches.description(bench_id),
+                "running": service.running_job(bench_id),
+                "stop": service.stores.units.bench_stop(bench_id),
+                "driven": service.benches.driven(bench_id),
+                "queued": queued.get(bench_id, 0),
+            }
+            for bench_id in service.benches.ids()
+        ],
         jobs=service.stores.jobs.list(limit=50).items,
         units=service.stores.units.units(),
     )
@@ -112,9 +120,10 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
         request,
         "job.html",
         job=job,
-        open=job.state not in FINAL,
-        verbs=_VERBS.get(job.state, ()),
+        open=job.state not in FINAL or job.resumable,
+        verbs=(("resume", "Resume"),) if job.state is JobState.FAILED and job.resumable else _VERBS.get(job.state, ()),
         explanation=_explanation(job),
+        standing=service.queues.standing([job])[job.id],
         recordings=service.stores.recordings.of_job(job_id),
         result=result,
         sections=_sections(service.analyses.report(result)) if result else [],

@@ -1,12 +1,23 @@
 """Memory in SQL: SQLite on one machine, Postgres for many, the same code. Knows no HTTP and no job engine.
 
 `open_stores` is the way in; `acquire_lease` is the right to drive a bench. Every error of the database leaves here as
-`StorageFull` or `StorageFailure`.
+`StorageFull` or `StorageFailure`. A supervisor takes lease and database alone: what stores load, it does without.
 """
+
+from typing import TYPE_CHECKING
 
 from bench_service.persistence.database import Database
 from bench_service.persistence.engine_database import engine_database
-from bench_service.persistence.lease import BenchLease, acquire_lease
-from bench_service.persistence.stores import open_stores
+from bench_service.persistence.lease import BenchLease, acquire_lease, lease_holder
 
-__all__ = ["BenchLease", "Database", "acquire_lease", "engine_database", "open_stores"]
+if TYPE_CHECKING:
+    from bench_service.jobs.store import Stores
+
+__all__ = ["BenchLease", "Database", "acquire_lease", "engine_database", "lease_holder", "open_stores"]
+
+
+def open_stores(database_url: str) -> "tuple[Stores, Database]":
+    """All memory behind a URL, brought to the newest form; `Database.dispose` closes it. Raises `StorageFailure`."""
+    from bench_service.persistence.stores import open_stores as opened
+
+    return opened(database_url)

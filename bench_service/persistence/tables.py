@@ -90,6 +90,8 @@ class BenchStopRow(Table):
     bench: Mapped[str] = mapped_column(Id, primary_key=True)
     at: Mapped[datetime]
     reason: Mapped[str]
+    safe_at: Mapped[datetime | None]
+    safe_by: Mapped[str]
 
 
 class JobRow(Table):

@@ -1,10 +1,12 @@
 """Units and benches in SQL: what is declared of them. Calibrations and corrections are the result
 store's: only joined here."""
 
+from collections.abc import Sequence
+from datetime import datetime
 from typing import Any
 
 from pydantic import TypeAdapter
-from sqlalchemy import delete, select
+from sqlalchemy import delete, select, update
 from sqlalchemy.orm import aliased
 
 from bench_service import wall_clock
@@ -55,17 +57,23 @@ class SqlUnitStore:
             rows = session.execute(_UNITS.order_by(UnitRow.serial)).all()
         return tuple(_unit(*row) for row in rows)
 
-    def put_bench(self, bench: BenchDescription) -> None:
-        document = BENCH.dump_python(bench, mode="json")
+    def put_bench(self, bench: BenchDescription, mounted: Sequence[str] = ()) -> None:
+        document = {**BENCH.dump_python(bench, mode="json"), "mounted": list(mounted)}
         with self._database.write() as session:
             session.merge(BenchRow(id=bench.id, document=document, updated_at=wall_clock.now()))
 
     def bench(self, bench_id: str) -> BenchDescription:
+        return BENCH.validate_python(self._bench(bench_id))
+
+    def mounted(self, bench_id: str) -> tuple[str, ...]:
+        return tuple(self._bench(bench_id).get("mounted", ()))
+
+    def _bench(self, bench_id: str) -> dict[str, Any]:
         with self._database.read() as session:
             row = session.get(BenchRow, bench_id)
         if row is None:
             raise NotFound("bench", bench_id)
-        return BENCH.validate_python(row.document)
+        return row.document
 
     def benches(self) -> tuple[BenchDescription, ...]:
         with self._database.read() as session:
@@ -75,7 +83,14 @@ class SqlUnitStore:
     def stop_bench(self, stop: BenchStop) -> None:
         with self._database.write() as session:
             if session.get(BenchStopRow, stop.bench) is None:
-                session.add(BenchStopRow(bench=stop.bench, at=stop.at, reason=stop.reason))
+                row = BenchStopRow(bench=stop.bench, at=stop.at, reason=stop.reason)
+                row.safe_at, row.safe_by = stop.safe_at, stop.safe_by
+                session.add(row)
+
+    def confirm_safe(self, bench_id: str, at: datetime, by: str) -> None:
+        query = update(BenchStopRow).where(BenchStopRow.bench == bench_id, BenchStopRow.safe_at.is_(None))
+        with self._database.write() as session:
+            session.execute(query.values(safe_at=at, safe_by=by))
 
     def release_bench(self, bench_id: str) -> None:
         with self._database.write() as session:
@@ -84,7 +99,7 @@ class SqlUnitStore:
     def bench_stop(self, bench_id: str) -> BenchStop | None:
         with self._database.read() as session:
             row = session.get(BenchStopRow, bench_id)
-            return None if row is None else BenchStop(row.bench, row.at, row.reason)
+            return None if row is None else BenchStop(row.bench, row.at, row.reason, row.safe_at, row.safe_by)
 
 
 _THERMAL, _CONVERTER = aliased(CorrectionRow), aliased(CorrectionRow)

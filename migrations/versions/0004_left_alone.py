@@ -36,6 +36,8 @@ def _jobs() -> None:
 
 
 def _benches() -> None:
+    op.add_column("bench_stops", sa.Column("safe_at", MOMENT, nullable=True))
+    op.add_column("bench_stops", sa.Column("safe_by", sa.String(), nullable=False, server_default=""))
     op.create_table(
         "reservations",
         sa.Column("id", ID, nullable=False),
@@ -152,6 +154,8 @@ def downgrade() -> None:
         op.drop_table(table)
     for table in ("audit", "bench_live", "reservations"):
         op.drop_table(table)
+    for column in ("safe_by", "safe_at"):
+        op.drop_column("bench_stops", column)
     op.drop_index("ix_jobs_bench_state", "jobs")
     for column in ("prompt", "requested_by", "reservation", "retries_left", "retries", "not_before", "queued_at"):
         op.drop_column("jobs", column)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from procedures.bench.chamber import ChamberLimits
+from procedures.bench.current_source import CurrentSourceLimits
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.temperature_profile import TemperatureProfile
@@ -49,6 +50,8 @@ class BenchDescription:
     title: str = ""
     chamber: ChamberLimits | None = None
     """None: the bench has no thermal chamber."""
+    current_source: CurrentSourceLimits | None = None
+    """None: the bench has no precision current source."""
 
     @property
     def axis_motion(self) -> tuple[tuple[float, float], ...]:
@@ -76,6 +79,14 @@ class BenchDescription:
         if turn is not None:
             beyond += self._turn_violations(angles, turn)
         return beyond if profile is None else beyond + self._profile_violations(profile)
+
+    def current_violations(self, current_ma: float, profile: TemperatureProfile | None) -> tuple[str, ...]:
+        """The same for a converter alone: a current on its inputs, a profile that it soaks by."""
+        found: tuple[str, ...] = () if profile is None else self._profile_violations(profile)
+        if self.current_source is None:
+            return (*found, f"bench {self.id} has no precision current source")
+        most = self.current_source.maximum_ma
+        return found if abs(current_ma) <= most else (*found, f"{current_ma:g} mA is outside {-most:g} … {most:g} mA")
 
     def _profile_violations(self, profile: TemperatureProfile) -> tuple[str, ...]:
         if self.chamber is None:

@@ -5,36 +5,71 @@ from typing import Any
 
 import pytest
 
-from bench_service.drivers.simulated import SimulatedDriver
+from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
+from bench_service.jobs.directory import BenchDirectory
+from bench_service.jobs.dispatcher import Unfinished
 from bench_service.jobs.errors import NotDriving
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.request import JobRequest
 from bench_service.jobs.runner import JobRunner
+from bench_service.jobs.safety import SafetyDesk
 from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
 from bench_service.jobs.worker import Worker
 from bench_service.persistence import open_stores
+from bench_service.wall_clock import now
 from procedures.bench import Bench, BenchNeeds
 from procedures.bench.errors import DeviceFault
 from tests.service.client import FAST
 
 
 class IdleEngine:
-    """An engine that takes jobs and never runs them: here the test takes the steps."""
+    """An engine that runs nothing: here the test takes the steps."""
 
     def launch(self) -> None: ...
 
-    def enqueue(self, job: Job) -> None: ...
+    def run(self, job: Job) -> None: ...
+
+    def unfinished(self, job: Job) -> Unfinished:
+        return Unfinished()
 
     def shut_down(self) -> None: ...
+
+
+class IdleDispatcher:
+    """A dispatcher that claims nothing."""
+
+    def begin(self) -> None: ...
+
+    def wake(self) -> None: ...
+
+    def lease_held(self) -> bool:
+        return True
+
+    def shut_down(self) -> None: ...
+
+
+class NoWatch:
+    """A host on which nobody says who drives the bench."""
+
+    def driving(self) -> None: ...
+
+    def supervisor(self) -> None: ...
 
 
 class JammedDriver(SimulatedDriver):
     """A bench whose table does not obey the last demand."""
 
-    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None, needs: BenchNeeds) -> Bench:
-        bench = super().open(unit, seed, checkpoint, needs)
+    def open(
+        self,
+        unit: str,
+        seed: int | None,
+        checkpoint: dict[str, Any] | None,
+        needs: BenchNeeds,
+        job: str | None = None,
+    ) -> Bench:
+        bench = super().open(unit, seed, checkpoint, needs, job)
 
         async def refuse() -> None:
             raise DeviceFault("the table's brake does not close")
@@ -52,14 +87,19 @@ def stores(sqlite_url: str) -> Generator[Stores]:
 
 def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], bool]) -> tuple[JobRunner, Job]:
     """A runner, and a job of its that has begun."""
-    planner = Planner(stores, driver)
+    planner = Planner(stores, BenchDirectory(stores.units, driver, "sim", drawn_unit, lambda _: "this process"))
     runner = JobRunner(stores, planner, driver, "test", lease_held)
-    worker = Worker(runner, lambda _: IdleEngine())
-    service = BenchService(stores, driver, planner, worker, "test")
+    worker = Worker(runner, lambda _: IdleEngine(), lambda *_: IdleDispatcher())
+    service = BenchService(
+        stores, driver, planner, worker, "test", SafetyDesk(stores, lambda _: driver, lambda _: NoWatch())
+    )
     service.register()
     service.begin()
     job = service.submit(JobRequest("calibration_12_orientations", "SIM-0001", parameters=FAST, seed=1))
-    assert runner.prepare(job.id, 1) == 12
+    entry = stores.queue.look("sim", now()).next()
+    assert entry is not None
+    assert runner.claim(entry) is not None
+    assert runner.stations(job.id, 1) == 12
     return runner, job
 
 
@@ -98,13 +138,15 @@ def test_a_bench_is_made_safe_after_a_restart_in_which_nothing_was_driven(stores
 
 def test_an_engine_that_does_not_start_is_told_to_whoever_needs_it(stores: Stores) -> None:
     driver = SimulatedDriver("sim")
-    planner = Planner(stores, driver)
+    planner = Planner(stores, BenchDirectory(stores.units, driver, "sim", drawn_unit, lambda _: "this process"))
 
     def fail(_: JobRunner) -> IdleEngine:
         raise OSError("no books")
 
-    worker = Worker(JobRunner(stores, planner, driver, "test", lambda: True), fail)
-    service = BenchService(stores, driver, planner, worker, "test")
+    worker = Worker(JobRunner(stores, planner, driver, "test", lambda: True), fail, lambda *_: IdleDispatcher())
+    service = BenchService(
+        stores, driver, planner, worker, "test", SafetyDesk(stores, lambda _: driver, lambda _: NoWatch())
+    )
     service.register()
     service.begin()
     with pytest.raises(NotDriving, match="did not start: no books"):

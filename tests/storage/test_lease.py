@@ -106,7 +106,7 @@ def test_a_lease_whose_connection_ended_is_lost(postgres_url: str) -> None:
     lease = acquire_lease(postgres_url, "sim")
     admin = sa.create_engine(postgres_url, isolation_level="AUTOCOMMIT", poolclass=sa.NullPool)
     with admin.connect() as connection:
-        ended = "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name LIKE 'bench sim pid %'"
+        ended = "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name LIKE 'bench sim %pid %'"
         assert connection.scalar(sa.text(ended))
     assert not lease.held()
     assert not lease.held()

@@ -1,0 +1,110 @@
+"""Reservations: to keep a bench or a unit for a while. Jobs of others wait until the reservation ends."""
+
+from datetime import datetime, timedelta
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+from pydantic import AwareDatetime, BaseModel, Field, model_validator
+
+from bench_service.api.dependencies import After, IdempotencyKey, Limit, Service
+from bench_service.api.errors import made, problems
+from bench_service.api.requests import NAME, Request
+from bench_service.jobs.queue_desk import LONGEST, ReservationRequest
+from bench_service.jobs.reservation import Reservation, Reserved
+from bench_service.wall_clock import now
+
+router = APIRouter(prefix="/api/v1/reservations", tags=["reservations"])
+
+
+class ReservationSubmission(Request):
+    """A bench or a unit, until when, and for whom."""
+
+    bench: Annotated[str, NAME] | None = Field(None, description="Either this, or `unit`")
+    unit: Annotated[str, NAME] | None = None
+    holder: str = NAME
+    until: AwareDatetime | None = Field(None, description="Either this, or `minutes`")
+    minutes: float | None = Field(None, gt=0, le=LONGEST / timedelta(minutes=1), allow_inf_nan=False)
+    note: str = Field("", max_length=500)
+
+    @model_validator(mode="after")
+    def _one_of_each(self) -> "ReservationSubmission":
+        for pair in (("bench", "unit"), ("until", "minutes")):
+            if sum(getattr(self, name) is not None for name in pair) != 1:
+                raise ValueError(f"exactly one of {pair[0]} and {pair[1]} is needed")
+        return self
+
+
+class ReservationView(BaseModel):
+    """A reservation. It ends by itself at `until`."""
+
+    id: str
+    bench: str | None
+    unit: str | None
+    holder: str
+    note: str
+    created_at: datetime
+    until: datetime
+    ended_at: datetime | None = Field(description="When it was given back before its time")
+    active: bool = Field(description="Whether it holds now")
+
+    @classmethod
+    def of(cls, kept: Reservation) -> "ReservationView":
+        """As HTTP says it."""
+        return cls(
+            id=kept.id,
+            bench=kept.name if kept.kind is Reserved.BENCH else None,
+            unit=kept.name if kept.kind is Reserved.UNIT else None,
+            holder=kept.holder,
+            note=kept.note,
+            created_at=kept.created_at,
+            until=kept.until,
+            ended_at=kept.ended_at,
+            active=kept.active(now()),
+        )
+
+
+class ReservationPage(BaseModel):
+    """Reservations, newest first."""
+
+    items: list[ReservationView]
+    next: str | None = Field(description="Cursor: pass it as `after` for the next page")
+
+
+@router.post(
+    "",
+    status_code=201,
+    responses={**problems(404, 409, 507), **made(201, "reservation_id", "read_reservation", "end_reservation")},
+)
+def reserve(
+    body: ReservationSubmission, service: Service, response: Response, key: IdempotencyKey = None
+) -> ReservationView:
+    """Keep a bench or a unit. One that somebody keeps already is refused, with the holder and the end."""
+    kind = Reserved.UNIT if body.bench is None else Reserved.BENCH
+    name = body.bench or body.unit or ""
+    kept = service.queues.reserve(ReservationRequest(kind, name, body.holder, body.until, body.minutes, body.note), key)
+    response.headers["Location"] = f"/api/v1/reservations/{kept.id}"
+    return ReservationView.of(kept)
+
+
+@router.get("", responses=problems())
+def list_reservations(
+    service: Service,
+    active: Annotated[bool, Query(description="Only those that hold now")] = False,
+    after: After = None,
+    limit: Limit = 50,
+) -> ReservationPage:
+    """Reservations, newest first."""
+    page = service.stores.reservations.list(active_at=now() if active else None, after=after, limit=limit)
+    return ReservationPage(items=[ReservationView.of(kept) for kept in page.items], next=page.next)
+
+
+@router.get("/{reservation_id}", responses=problems(404))
+def read_reservation(reservation_id: str, service: Service) -> ReservationView:
+    """One reservation."""
+    return ReservationView.of(service.stores.reservations.get(reservation_id))
+
+
+@router.delete("/{reservation_id}", responses=problems(404, 507))
+def end_reservation(reservation_id: str, service: Service) -> ReservationView:
+    """Give it back before its time: jobs that waited for it may start. One that is over stays as it is."""
+    return ReservationView.of(service.queues.give_back(reservation_id))

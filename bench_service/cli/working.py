@@ -1,0 +1,33 @@
+"""``bench worker``: the jobs of one bench, in a process without HTTP."""
+
+import signal
+import threading
+from collections.abc import Callable
+from contextlib import ExitStack
+from types import FrameType
+
+from bench_service.app import open_service
+from bench_service.cli.supervising import accompanied
+from bench_service.settings import Settings
+
+
+def work(settings: Settings, say: Callable[[str], object]) -> None:
+    """Drive the settings' bench until SIGTERM or SIGINT; then the bench is made safe, and its job left as it is.
+
+    Raises what `open_service` raises, `BenchBusy` first of all, and `NotDriving` where the engine does not start.
+    """
+    ending = threading.Event()
+
+    def end(_signal: int, _frame: FrameType | None) -> None:
+        ending.set()
+
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, end)
+    started = threading.Event()
+    with accompanied(settings, started.is_set), ExitStack() as closing:
+        service = open_service(settings, closing)
+        service.begin()
+        service.ready()
+        started.set()
+        say(f"working for bench {settings.bench_id}")
+        ending.wait()

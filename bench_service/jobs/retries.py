@@ -1,0 +1,34 @@
+"""Which failures are answered by trying again, and when. A job goes on with the station that failed."""
+
+from datetime import timedelta
+
+from bench_service.jobs.job import BENCH_FAULTS, Failure, Job
+from bench_service.jobs.queue import QueueStore
+from bench_service.wall_clock import now
+
+RETRY_PAUSES_S = (10.0, 30.0, 60.0, 120.0, 300.0)
+"""How long a job waits before its first, second, … retry after a fault of the bench [s]."""
+DATABASE_FAULTS = frozenset({"StorageFailure", "LeaseLost"})
+"""Kinds of failure that a restart of the database leaves in a running job."""
+DATABASE_PAUSE_S = 1.0
+"""How long such a job waits before it goes on [s]."""
+MOST_ATTEMPTS = 20
+"""A job that was queued this often is not queued again by itself for the database's sake."""
+
+
+def try_again(queue: QueueStore, job: Job, failure: Failure | None, scale: float) -> Job | None:
+    """Queue a running job again where its failure may be gone the next time; None where it ends.
+
+    A fault of the bench costs one of the retries that were asked for. A database that was restarted costs none: like a
+    killed process, that is not the job's affair. `scale`: of the pauses before a retry.
+    """
+    if failure is None:
+        return None
+    if failure.kind in BENCH_FAULTS and job.retries_left > 0:
+        pauses = RETRY_PAUSES_S[: job.retries - job.retries_left + 1]
+        due = now() + timedelta(seconds=pauses[-1] * scale)
+        return queue.requeue(job.id, now(), due, failure, spend=True)
+    if failure.kind in DATABASE_FAULTS and job.attempt < MOST_ATTEMPTS:
+        due = now() + timedelta(seconds=DATABASE_PAUSE_S)
+        return queue.requeue(job.id, now(), due, failure, spend=False)
+    return None

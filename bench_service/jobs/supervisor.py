@@ -1,0 +1,223 @@
+"""The supervisor of a bench: a process that outlives the worker, and makes the bench safe where the worker cannot.
+
+It looks at three things: which process drives the bench and whether it lives, what the devices last said of themselves,
+and whether a person has stopped the bench. It starts nothing again; it never commands a device while the
+process that drives the bench lives, but it ends one that does not answer a stop.
+"""
+
+import logging
+from collections.abc import Callable
+from threading import Event, Lock, Thread
+from typing import Protocol
+
+from bench_service.jobs.devices import BenchDevices, DeviceState
+from bench_service.jobs.errors import BenchBusy, ServiceError
+from bench_service.jobs.processes import Driving, ProcessIdentity, Watch
+from bench_service.wall_clock import monotonic_s
+from procedures.bench.errors import BenchError, DeviceBusy
+
+LOOK_S = 0.1
+"""How often the bench is looked at [s]: a worker's death is noticed within this."""
+STOP_LOOK_S = 0.5
+"""How often the database is asked whether the bench is stopped [s]."""
+HUNG_S = 10.0
+"""How long a worker may leave a stop unanswered before it is killed [s]."""
+LEASE_S = 0.8
+"""How long the lease of a dead worker is waited for [s]: then the devices' own link, exclusive too, must do."""
+AGAIN_S = 1.0
+"""How often devices that could not be made safe are tried again [s]."""
+LINGER_S = 60.0
+"""How long it stays after a crash, once the bench is safe [s]."""
+
+log = logging.getLogger(__name__)
+
+
+class Lease(Protocol):
+    """The right to drive a bench."""
+
+    def release(self) -> None: ...
+
+
+class SafetyBooks(Protocol):
+    """What the supervisor reads and writes in the database. Every verb raises `ServiceError` if it does not answer."""
+
+    def stopped(self) -> bool:
+        """Whether the bench is stopped."""
+        ...
+
+    def confirm_safe(self, by: str) -> None:
+        """A stopped bench is safe."""
+        ...
+
+    def stop(self, reason: str) -> None:
+        """Stop the bench until a person releases it."""
+        ...
+
+    def note(self, by: str, text: str, job: str | None) -> None:
+        """Say what was done: in the trail, and to the job that it concerns."""
+        ...
+
+
+class Supervisor:
+    """Watches one bench until it is told to end, or nothing is left to watch."""
+
+    def __init__(
+        self,
+        bench_id: str,
+        devices: BenchDevices,
+        watch: Watch,
+        books: SafetyBooks,
+        take_lease: Callable[[], Lease],
+        hung_s: float = HUNG_S,
+        linger_s: float = LINGER_S,
+    ) -> None:
+        self._bench_id = bench_id
+        self._devices = devices
+        self._watch = watch
+        self._books = books
+        self._take_lease = take_lease
+        self._hung_s = hung_s
+        self._linger_s = linger_s
+        self._by = f"the supervisor, {ProcessIdentity.own()}"
+        self._unsaid: list[tuple[str, str | None]] = []
+        self._stopped = False
+        self._confirmed = False
+        self._told_not_safe = False
+        self._next_stop_look_s = 0.0
+        self._next_try_s = 0.0
+        self._unanswered_since_s: float | None = None
+        self._gone_since_s: float | None = None
+        self._looked_s = monotonic_s()
+
+    def run(self, ending: Event, companion: bool) -> None:
+        """Watch until `ending` is set; a `companion` also ends with the process that it accompanies."""
+        while not ending.wait(LOOK_S):
+            if not self.look(companion):
+                return
+
+    def look(self, companion: bool = False) -> bool:
+        """Look once, and do what must be done; False once a companion has nothing left to watch."""
+        now_s = monotonic_s()
+        driving, state = self._watch.driving(), self._devices.device_state()
+        alive = driving is not None and driving.alive
+        self._look_for_stop(now_s, state)
+        if alive:
+            self._gone_since_s = None
+            self._look_for_hang(now_s, driving, state)
+        else:
+            self._unanswered_since_s = None
+            self._gone_since_s = now_s if self._gone_since_s is None else self._gone_since_s
+            if state is not None and not state.safe and now_s >= self._next_try_s:
+                self._rescue(now_s, driving, state)
+                return True
+        self._looked_s = now_s
+        return not companion or alive or not self._may_leave(now_s, driving, state)
+
+    def _may_leave(self, now_s: float, driving: Driving | None, state: DeviceState | None) -> bool:
+        """After an orderly end at once; after a crash when it has lasted; but never from a bench that is not safe."""
+        if self._unsaid or (state is not None and not state.safe):
+            return False
+        assert self._gone_since_s is not None
+        in_order = driving is not None and driving.ended
+        return in_order or now_s - self._gone_since_s > self._linger_s
+
+    def _look_for_stop(self, now_s: float, state: DeviceState | None) -> None:
+        if now_s < self._next_stop_look_s and not self._unsaid:
+            return
+        self._next_stop_look_s = now_s + STOP_LOOK_S
+        try:
+            self._stopped = self._books.stopped()
+            if not self._stopped:
+                self._confirmed = False
+            elif not self._confirmed and state is not None and state.safe:
+                self._books.confirm_safe(state.by)
+                self._confirmed = True
+            while self._unsaid:
+                self._books.note(self._by, *self._unsaid[0])
+                self._unsaid.pop(0)
+        except ServiceError as error:
+            log.warning("the database does not answer the supervisor of bench %s: %s", self._bench_id, error)
+
+    def _look_for_hang(self, now_s: float, driving: Driving | None, state: DeviceState | None) -> None:
+        """A worker that lives, is told to stop, and leaves the bench unsafe, does not answer."""
+        if not self._stopped or state is None or state.safe:
+            self._unanswered_since_s = None
+            return
+        if self._unanswered_since_s is None:
+            self._unanswered_since_s = now_s
+        elif now_s - self._unanswered_since_s > self._hung_s and driving is not None and driving.process.kill():
+            unsafe = ", ".join(state.unsafe)
+            self._say(f"{driving.process} left a stop unanswered for {self._hung_s:g} s ({unsafe}): killed", state.job)
+            self._unanswered_since_s = None
+
+    def _rescue(self, now_s: float, driving: Driving | None, state: DeviceState) -> None:
+        """Nobody drives the bench, and it is not safe."""
+        who = f"{driving.process} is gone" if driving is not None else "nobody drives the bench"
+        lease = self._lease_within(LEASE_S)
+        again = self._watch.driving()
+        try:
+            if again is not None and again.alive:  # somebody took the bench this moment, and makes it safe himself
+                return
+            self._devices.make_safe(self._by)
+        except DeviceBusy as busy:
+            log.warning("bench %s: %s", self._bench_id, busy)
+            self._next_try_s = now_s + AGAIN_S
+        except (BenchError, ExceptionGroup) as failure:
+            self._next_try_s = now_s + AGAIN_S
+            self._not_safe(failure, state)
+        else:
+            self._told_not_safe = False
+            safe_s = monotonic_s()
+            self._say(
+                f"{who}, and {' and '.join(state.unsafe)}: made safe by the supervisor {safe_s - now_s:.3f} s after "
+                f"it noticed, at most {safe_s - self._looked_s:.3f} s after that end",
+                state.job,
+            )
+        finally:
+            if lease is not None:
+                lease.release()
+        self._next_stop_look_s = 0.0
+
+    def _not_safe(self, failure: Exception, state: DeviceState) -> None:
+        """Nothing else may run on it until a person has looked. Said once, tried again and again."""
+        if self._told_not_safe:
+            return
+        reasons = "; ".join(map(str, failure.exceptions)) if isinstance(failure, ExceptionGroup) else str(failure)
+        self._say(f"could not be made safe: {reasons}", state.job)
+        try:
+            self._books.stop(f"could not be made safe: {reasons}")
+            self._told_not_safe = True
+        except ServiceError as error:
+            log.warning("the stop of bench %s cannot be noted yet: %s", self._bench_id, error)
+
+    def _lease_within(self, seconds: float) -> Lease | None:
+        """The bench's lease; None where it does not come in time, because a server does not know of a death yet, or
+        does not answer at all."""
+        found: list[Lease] = []
+        deciding, given_up = Lock(), Event()
+
+        def take() -> None:
+            while not given_up.is_set():
+                try:
+                    lease = self._take_lease()
+                except BenchBusy:
+                    given_up.wait(0.05)
+                    continue
+                except ServiceError:
+                    return
+                with deciding:
+                    if not given_up.is_set():
+                        found.append(lease)
+                        return
+                lease.release()
+
+        thread = Thread(target=take, name="lease", daemon=True)
+        thread.start()
+        thread.join(seconds)
+        with deciding:
+            given_up.set()
+            return found[0] if found else None
+
+    def _say(self, text: str, job: str | None) -> None:
+        log.warning("bench %s: %s", self._bench_id, text)
+        self._unsaid.append((text, job))

@@ -1,0 +1,123 @@
+"""The service as an operating system process, for tests that kill it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from bench_service.drivers.device_register import DeviceRegister
+from bench_service.jobs.devices import DeviceState
+from bench_service.jobs.stored import BenchStop
+from bench_service.persistence import open_stores
+from bench_service.persistence.host_files import HostFiles
+from bench_service.wall_clock import monotonic_s, now, pause
+
+
+class BenchProcess:
+    """`bench serve` on a database, with its files in a folder."""
+
+    def __init__(self, database_url: str, port: int, folder: Path, **settings: str) -> None:
+        self.environment = {
+            **os.environ,
+            "BENCH_DATABASE_URL": database_url,
+            "BENCH_PORT": str(port),
+            "BENCH_DEVICE_FOLDER": str(folder),
+            **{f"BENCH_{name.upper()}": value for name, value in settings.items()},
+        }
+        self.log = folder / "service.log"
+        self.register = DeviceRegister(folder, "sim")
+        self.files = HostFiles(folder, "sim")
+        self.client = httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=30)
+
+    def start(self, command: str = "serve") -> None:
+        with self.log.open("ab") as log:
+            arguments = [sys.executable, "-m", "bench_service", command]
+            self.process = subprocess.Popen(arguments, env=self.environment, stdout=log, stderr=log)
+        self.until(self._answers, 90)
+
+    def _answers(self) -> bool:
+        assert self.process.poll() is None, self.log.read_text()
+        try:
+            return self.client.get("/healthz").is_success
+        except httpx.TransportError:
+            return False
+
+    def kill(self) -> None:
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+
+    def end(self) -> None:
+        """End in order what still lives: the service, and a supervisor that it may have left."""
+        self.client.close()
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGCONT)
+            self.process.terminate()
+            self.process.wait(60)
+        supervisor = self.files.supervisor()
+        if supervisor is not None:
+            os.kill(supervisor.pid, signal.SIGTERM)
+            self.until(lambda: self.files.supervisor() is None, 20)
+
+    def supervised(self) -> None:
+        """Wait for the supervisor that the service starts beside itself."""
+        self.until(lambda: self.files.supervisor() is not None, 60)
+
+    def submit(self, procedure: str = "calibration_12_orientations", **more: Any) -> str:
+        answer = self.client.post("/api/v1/jobs", json={"procedure": procedure, "unit": "SIM-0001", **more})
+        assert answer.status_code == 202, answer.text
+        return answer.json()["id"]
+
+    def job(self, job_id: str) -> dict[str, Any]:
+        return self.client.get(f"/api/v1/jobs/{job_id}").json()
+
+    def state(self) -> DeviceState:
+        state = self.register.read()
+        assert state is not None
+        return state
+
+    def moving(self, job_id: str) -> bool:
+        found = self.register.read()
+        return found is not None and found.table == "moving" and found.job == job_id
+
+    def events(self, job_id: str) -> str:
+        """Everything that was said of a job."""
+        stores, database = open_stores(self.environment["BENCH_DATABASE_URL"])
+        try:
+            return "\n".join(str(event.data) for event in stores.jobs.events(job_id))
+        finally:
+            database.dispose()
+
+    def stop_from_elsewhere(self) -> None:
+        """What another process does that has the database, and is asked to stop the bench."""
+        stores, database = open_stores(self.environment["BENCH_DATABASE_URL"])
+        try:
+            stores.units.stop_bench(BenchStop("sim", now(), "a test"))
+        finally:
+            database.dispose()
+
+    @staticmethod
+    def until(reached: Any, seconds: float) -> None:
+        deadline = monotonic_s() + seconds
+        while not reached():
+            assert monotonic_s() < deadline, f"not within {seconds} s"
+            pause(0.01)
+
+
+def one_master_at_a_time(entries: list[dict[str, Any]]) -> int:
+    """Check a devices' journal: between a link's opening and its process's next closing or death nobody else
+    commands. How many processes there were.
+    """
+    masters: list[int] = []
+    for entry in entries:
+        if entry["verb"] == "link.refused":
+            continue
+        if entry["verb"] == "link.opened":
+            masters.append(entry["pid"])
+        assert masters, json.dumps(entry)
+        assert entry["pid"] == masters[-1], f"{json.dumps(entry)} while process {masters[-1]} was the master"
+    return len(set(masters))

@@ -1,0 +1,92 @@
+"""The worker is killed, or hangs, in the middle of a move: the bench is made safe by a process that outlives it."""
+
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bench_service.wall_clock import monotonic_s
+from tests.end_to_end.bench_process import BenchProcess, one_master_at_a_time
+
+pytestmark = pytest.mark.timeout(240)
+
+
+@pytest.fixture(params=["sqlite", "postgres"])
+def bench(request: pytest.FixtureRequest, tmp_path: Path, free_port: int) -> Iterator[BenchProcess]:
+    """A service at four times real time: a move lasts long enough to be hit."""
+    url = f"sqlite:///{tmp_path / 'bench.sqlite'}"
+    if request.param == "postgres":
+        url = request.getfixturevalue("new_postgres_database")()
+    made = BenchProcess(url, free_port, tmp_path, real_time_factor="4")
+    made.start()
+    yield made
+    made.end()
+
+
+def test_killed_in_a_move_the_bench_is_safe_within_two_seconds_of_being_noticed(
+    bench: BenchProcess, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bench.supervised()
+    supervisor = bench.files.supervisor()
+    job = bench.submit(seed=7)
+    bench.until(lambda: bench.moving(job), 60)
+    killed_s = monotonic_s()
+    bench.kill()
+    bench.until(lambda: bench.state().safe, 10)
+    safe_s = monotonic_s() - killed_s
+    assert "the supervisor" in bench.state().by
+    bench.start()  # the supervisor may have the lease this moment: the service waits for it
+    assert bench.files.supervisor() == supervisor, "one supervisor looks after the new process too"
+    said = bench.events(job)
+    assert "made safe by the supervisor" in said
+    noticed = float(said.split("made safe by the supervisor ")[1].split(" s after")[0])
+    with capsys.disabled():
+        print(f"\nfrom kill to safe {safe_s:.3f} s, from notice to safe {noticed:.3f} s")
+    assert noticed < 2.0
+    answer = bench.client.post("/api/v1/benches/sim/stop", json={"reason": "a test"})
+    assert answer.status_code == 202, answer.text
+    bench.until(lambda: bench.job(job)["state"] == "cancelled", 60)
+    assert bench.client.get("/api/v1/benches/sim").json()["safety"]["safe"] is True
+    assert one_master_at_a_time(bench.register.journal.entries()) >= 3
+    bench.process.terminate()
+    assert bench.process.wait(60) in (0, -signal.SIGTERM), bench.log.read_text()
+    bench.until(lambda: bench.files.supervisor() is None, 20)
+
+
+def test_a_worker_that_hangs_is_told_to_stop_and_then_killed(bench: BenchProcess) -> None:
+    """SIGSTOP: the process is there and does nothing. The stop is noted by whoever else has the database."""
+    bench.supervised()
+    job = bench.submit(seed=7)
+    bench.until(lambda: bench.moving(job), 60)
+    bench.process.send_signal(signal.SIGSTOP)
+    assert not bench.state().safe
+    bench.stop_from_elsewhere()
+    bench.until(lambda: bench.process.poll() is not None, 30)
+    assert bench.process.returncode == -signal.SIGKILL
+    bench.until(lambda: bench.state().safe, 10)
+    bench.start()
+    said = bench.events(job)
+    assert "left a stop unanswered" in said
+    assert "made safe by the supervisor" in said
+    bench.until(lambda: bench.job(job)["state"] == "cancelled", 60)
+    view = bench.client.get("/api/v1/benches/sim").json()
+    assert (view["state"], view["safety"]["safe"]) == ("stopped", True)
+
+
+def test_with_worker_and_supervisor_killed_the_next_start_makes_the_bench_safe_first(bench: BenchProcess) -> None:
+    bench.supervised()
+    job = bench.submit(seed=7)
+    bench.until(lambda: bench.moving(job), 60)
+    supervisor = bench.files.supervisor()
+    assert supervisor is not None
+    os.kill(supervisor.pid, signal.SIGKILL)
+    bench.kill()
+    assert not bench.state().safe
+    assert bench.files.supervisor() is None
+    before = len(bench.register.journal.entries())
+    bench.start()
+    first = [entry["verb"] for entry in bench.register.journal.entries()[before:]]
+    assert first[:4] == ["link.opened", "turntable.make_safe", "chamber.make_safe", "supply.make_safe"]
+    assert "made safe first" in bench.events(job)
