@@ -70,8 +70,8 @@ async def record_profile(bench: Bench, station: Station, request: str) -> Stream
 
     While the unit is off the chamber goes to the profile's first temperature. While the stream is read the profile is
     driven: each leg is commanded, and left when the *unit's* temperatures say that it has soaked. What the chamber says
-    of itself stands in two more channels, `CHAMBER_CHANNELS`, so that every soak can be judged again from the
-    recording. The stream ends with the last soak, at the latest after `record_s`.
+    of itself, asked once a block, stands in two more channels, `CHAMBER_CHANNELS`, so that every soak can be judged
+    again from the recording. The stream ends with the last soak, at the latest after `record_s`.
 
     Reading it may raise `SoakNotReached`, `DeviceFault` (chamber tripped or open, a temperature sensor disconnected or
     stuck, the unit too hot or too cold), `OutOfRange`, `Disconnected`. Raises `DeviceFault` where the bench has no

@@ -37,6 +37,7 @@ OURS = (
     "scale_factor_whole_turns",
     "static_run",
     "table_program",
+    "thermal_cycle",
 )
 
 

@@ -25,6 +25,8 @@ LEGS = (
     ProfileLeg(25.0, 2.0, least_soak_s=60.0, longest_s=7200.0),
     ProfileLeg(35.0, 2.0, least_soak_s=60.0, longest_s=7200.0, least_s=3600.0),
 )
+MOST_BLOCK_S = 60.0
+"""The simulated world hands on its samples in blocks of no more than this."""
 SENSORS = ("case", "converter", "gyro_x", "gyro_y", "gyro_z")
 
 
@@ -73,7 +75,7 @@ def drive(
     meddle: Callable[[SimulatedBench], None] | None = None,
     bench: BenchTruth | None = None,
 ) -> Run:
-    """One run; `meddle` is called after 100 blocks."""
+    """One run; `meddle` is called once, after 1000 s."""
     unit = default_unit()
     sensors = tuple((thermometers or {}).get(i, t) for i, t in enumerate(unit.thermal.thermometers))
     unit = replace(unit, thermal=replace(unit.thermal, thermometers=sensors))
@@ -86,7 +88,8 @@ def drive(
         try:
             async for block in stream.blocks:
                 found.blocks.append(block)
-                if meddle is not None and len(found.blocks) == 100:
+                before, now = (sum(len(b) for b in found.blocks[:n]) for n in (-1, None))
+                if meddle is not None and before < 1000 * RATE_HZ <= now:
                     meddle(world)
         except BenchError as failure:
             found.failure = failure
@@ -106,8 +109,8 @@ def test_the_profile_is_followed_and_ends_the_recording_early(sound: Run):
     air, set_point = sound.channel("chamber_air"), sound.channel("chamber_set_point")
     assert np.abs(air[:600] - 25.0).max() < 1.5  # it waited there while the unit was off
     assert set_point[-1] == pytest.approx(35.0, abs=1e-3)
-    moving = np.diff(set_point)
-    assert moving.max() * 6.0 <= 2.0 + 0.01  # told every ten seconds, a ramp of 2 °C/min
+    told = np.flatnonzero(np.diff(set_point)) + 1  # once a block
+    assert np.all(np.diff(set_point[told]) / np.diff(told) * 60.0 * RATE_HZ <= 2.0 + 0.01)  # a ramp of 2 °C/min
     assert np.abs(air[-300:] - 35.0).max() < 1.5
 
 
@@ -116,7 +119,7 @@ def test_each_soak_can_be_shown_from_the_recording_alone(sound: Run):
     series = read_cycle(sound.recording(), 0)
     assert [leg.target_c for leg in series.legs] == [25.0, 35.0]
     assert series.legs[0].ended_s == series.legs[1].began_s
-    assert series.legs[1].ended_s == len(sound.raw)
+    assert 0.0 <= len(sound.raw) - series.legs[1].ended_s < MOST_BLOCK_S
     assert series.legs[1].ended_s - series.legs[1].began_s >= 3600.0
     for leg in series.legs:
         at = np.arange(leg.ended_s - 120.0, leg.ended_s + 1.0, 10.0).astype(int) - 1
@@ -157,7 +160,7 @@ def test_a_sensor_that_is_disconnected_ends_the_run_at_once(sensor: int):
     truth = replace(default_unit().thermal.thermometers[sensor], disconnected_from_s=moment)
     run = drive(thermometers={sensor: truth})
     failed(run, DeviceFault, f"temperature_{SENSORS[sensor]} is disconnected", "-32768")
-    assert len(run.raw) / RATE_HZ + run.stream.start_s - moment <= 20.0
+    assert len(run.raw) / RATE_HZ + run.stream.start_s - moment <= 2.0 * MOST_BLOCK_S
 
 
 def test_a_sensor_that_is_stuck_is_found_on_the_next_ramp():

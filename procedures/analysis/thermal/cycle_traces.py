@@ -10,7 +10,7 @@ from procedures.analysis.allan.statistic import OVERLAPPING_ALLAN, Sizes, decade
 from procedures.analysis.thermal.cycle_results import AllanFound, LegRegime, Trace
 from procedures.analysis.thermal.cycle_runs import PreparedRun
 from procedures.analysis.thermal.judgement import Corrects, Soak
-from procedures.analysis.thermal.profile_progress import CHECK_S, LegEvidence
+from procedures.analysis.thermal.profile_progress import LegEvidence
 from procedures.core.arrays import Array
 from procedures.core.recording import AXES
 
@@ -63,10 +63,9 @@ def _leg_regime(run: PreparedRun, leg: LegEvidence, delay_s: float) -> LegRegime
     sample_s = run.series.sample_s
     first, last = round(leg.began_s / sample_s), min(round(leg.ended_s / sample_s), len(run.dynamic))
     set_point, dynamic = run.series.set_point_c[first:last], run.dynamic[first:last]
-    # The chamber is asked once in `CHECK_S`, so the set point of the leg before stands for so long.
-    steps = round(CHECK_S / sample_s)
-    moving = np.flatnonzero(np.abs(set_point[steps:] - set_point[0]) > MOVED_C)
-    ramp_began_s = None if not len(moving) else leg.began_s
+    # The chamber is asked once a block, so its ramp is seen late; it is commanded when the leg begins.
+    before = run.series.set_point_c[max(first - 1, 0)]
+    ramp_began_s = leg.began_s if abs(before - leg.target_c) > MOVED_C else None
     there = np.flatnonzero(np.abs(set_point - leg.target_c) <= MOVED_C)
     ramp_ended_s = None if ramp_began_s is None or not len(there) else leg.began_s + float(there[0]) * sample_s
     changes = np.flatnonzero(np.diff(dynamic.astype(np.int8))) + 1
