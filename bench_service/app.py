@@ -9,7 +9,19 @@ from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
-from bench_service.api import analyses, benches, errors, health, jobs, procedures, recordings, units
+from bench_service.api import (
+    analyses,
+    benches,
+    campaigns,
+    errors,
+    health,
+    jobs,
+    procedures,
+    recordings,
+    schedules,
+    trends,
+    units,
+)
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs.code_version import code_version
 from bench_service.jobs.planning import Planner
@@ -21,7 +33,7 @@ from bench_service.pages import figures, routes
 from bench_service.persistence import acquire_lease, engine_database, open_stores
 from bench_service.settings import Settings
 
-ROUTERS = (procedures, jobs, recordings, analyses, units, benches, health)
+ROUTERS = (procedures, jobs, recordings, analyses, units, trends, benches, campaigns, schedules, health)
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> BenchService:

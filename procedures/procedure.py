@@ -120,6 +120,8 @@ class Procedure(Generic[P, R]):
     """Whether the result rests on the unit's current calibration, which then belongs to its lineage."""
     learns: Callable[[R, Unit, str], Unit] = _nothing_learnt
     """The unit's record with what a job's result found of it; the text names that result as its origin."""
+    quantities: Callable[[P, Context], tuple[str, ...]] | None = None
+    """Names of the checks and of the named estimates that a result will have; None: not known before the job."""
 
 
 @dataclass(frozen=True)

@@ -86,7 +86,7 @@ class Planner:
             for sentence in context.bench.violations(s.angles, s.turn)
         )
         prediction = procedure.predict(parameters, context)
-        samples = sum(round(s.record_s * context.unit.sample_rate_hz) for s in stations)
+        samples = sum(round(s.record_s * (s.sample_rate_hz or context.unit.sample_rate_hz)) for s in stations)
         data_bytes = samples * len(context.unit.channels) * BYTES_PER_SAMPLE
         return Plan(procedure, parameters, context, stations, prediction, data_bytes, violations)
 

@@ -5,6 +5,7 @@ from datetime import timedelta
 from random import SystemRandom
 
 from bench_service.jobs.analyses import AnalysisDesk
+from bench_service.jobs.campaigns.desk import CampaignDesk
 from bench_service.jobs.driver import BenchDriver, TrueTriad
 from bench_service.jobs.errors import IllegalTransition, NotDriving, NotFound
 from bench_service.jobs.job import Job, JobState
@@ -38,6 +39,7 @@ class BenchService:
         self.code_version = code_version
         self.analyses = AnalysisDesk(stores, planner, code_version)
         self._worker = worker
+        self.campaigns = CampaignDesk(stores, planner, driver, self.analyses, self.submit, self.cancel)
 
     def register(self) -> None:
         """Remember the bench and its units, and forget what crashed imports left."""
@@ -53,6 +55,7 @@ class BenchService:
         """
         if self._worker is not None:
             self._worker.begin([lambda: (self.planner.catalog, self.analyses.methods), *warm_up])
+            self.campaigns.conductor.begin()
 
     def ready(self) -> None:
         """Return once requests can be served in full. Raises `StorageFailure`, `NotDriving`."""
@@ -62,6 +65,7 @@ class BenchService:
 
     def stop(self) -> None:
         """End the service: the running job is left for the next start, the bench made safe."""
+        self.campaigns.conductor.stop()
         if self._worker is not None:
             self._worker.shut_down()
 

@@ -1,6 +1,7 @@
-"""Putting the stores together: one database, four stores. Must not know who uses them."""
+"""Putting the stores together: one database, five stores. Must not know who uses them."""
 
 from bench_service.jobs.store import Stores
+from bench_service.persistence.campaign_store import SqlCampaignStore
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.job_store import SqlJobStore
 from bench_service.persistence.migration import upgrade_to_head
@@ -27,4 +28,5 @@ def stores_of(database: Database) -> Stores:
         recordings=SqlRecordingStore(database),
         results=SqlResultStore(database),
         units=SqlUnitStore(database),
+        campaigns=SqlCampaignStore(database),
     )

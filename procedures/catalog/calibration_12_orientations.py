@@ -146,6 +146,16 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
     return tuple(t.calibration for t in result.triads)
 
 
+def quantities(params: Params, context: Context) -> tuple[str, ...]:
+    """Its checks and its coefficients."""
+    checks = ("bias in run, δ/√3", "condition number", "residuals, p-value of chi-square")
+    return tuple(
+        name
+        for triad in TRIAD_NAMES
+        for name in (*(f"{triad} {c}" for c in checks), *(f"{triad}.{c}" for c in COEFFICIENT_NAMES))
+    )
+
+
 def report(result: Result) -> Report:
     """Coefficients, checks, residuals and magnitudes (thesis Tables 5.1-5.4, figures 5.6-5.12)."""
     magnitudes = [t.magnitudes for t in result.triads]
@@ -258,4 +268,5 @@ PROCEDURE = Procedure(
     analyse,
     report,
     calibrations,
+    quantities=quantities,
 )
