@@ -29,7 +29,7 @@ from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
 from bench_service.jobs.worker import JobEngine, Worker
-from bench_service.pages import figures, routes
+from bench_service.pages import campaign_pages, figures, routes
 from bench_service.persistence import acquire_lease, engine_database, open_stores
 from bench_service.settings import Settings
 
@@ -90,6 +90,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
     for module in ROUTERS:
         app.include_router(module.router)
     app.include_router(routes.router)
+    app.include_router(campaign_pages.router)
     errors.install(app)
     _declare_problem(app)
     return app

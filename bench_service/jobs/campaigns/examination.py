@@ -1,6 +1,6 @@
 """A campaign against catalogue, unit and bench, before anything moves: what it will do, and what is wrong with it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -70,7 +70,7 @@ class Examiner:
         if campaign.window_h is not None and duration_s > campaign.window_h * HOUR:
             needs = f"at least {duration_s / HOUR:.4g} h: so long the steps take by their plans"
             raise BadParameter("window_h", campaign.window_h, needs)
-        warnings = [f"step {p.name}: {w}" for p in plans for w in ((p.left_out,) if p.left_out else p.warnings)]
+        warnings = _warnings(plans)
         if all(plan.left_out for plan in plans):
             warnings.append("every step is left out: the verdict will be error, because nothing is judged")
         return Examination(plans, duration_s, sum(p.data_bytes for p in plans), tuple(warnings))
@@ -140,6 +140,15 @@ class Examiner:
         duration_s = sum(s.power_off_s + s.settle_s + s.record_s for s in stations)
         warning = "not predicted: the calibration that it uses is not there yet"
         return StepPlan(step.name, step.does, "", len(stations), duration_s, 0, (warning,))
+
+
+def _warnings(plans: Sequence[StepPlan]) -> list[str]:
+    """What is to be known before the campaign begins; what several steps say is said once."""
+    said: dict[str, list[str]] = {}
+    for plan in plans:
+        for warning in (plan.left_out,) if plan.left_out else plan.warnings:
+            said.setdefault(warning, []).append(plan.name)
+    return [f"step{'s' if len(names) > 1 else ''} {', '.join(names)}: {text}" for text, names in said.items()]
 
 
 def _calibrates(procedure: AnyProcedure) -> bool:
