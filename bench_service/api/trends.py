@@ -21,7 +21,8 @@ def read_trend(
     ],
     procedure: Annotated[str, NAME],
     simulated: Annotated[bool | None, Query(description="Null: results of the kind that this bench gives")] = None,
+    same_parameters: Annotated[bool, Query(description="Only results with the newest one's parameters")] = False,
     limit: Annotated[int, Query(ge=2, le=500, description="The latest results")] = 100,
 ) -> TrendView:
     """The quantity over the results that gave jobs their verdict: an individuals chart with Western Electric rules."""
-    return TrendView.of(service.campaigns.trend(serial, procedure, quantity, simulated, limit))
+    return TrendView.of(service.campaigns.trend(serial, procedure, quantity, simulated, limit, same_parameters))

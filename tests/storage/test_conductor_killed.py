@@ -8,8 +8,10 @@ import pytest
 
 from bench_service.jobs.campaigns.conductor import Conductor
 from bench_service.jobs.job import Job, JobState
+from bench_service.jobs.request import JobRequest
 from bench_service.jobs.store import Stores
 from bench_service.persistence import Database
+from procedures.core.errors import BadParameter
 from procedures.core.limits import Verdict
 from tests.storage.campaigns import Laboratory, campaign, new_run
 
@@ -117,3 +119,26 @@ def test_killed_at_every_touch_of_a_cancel(
         if not fuse.blown:
             break
     assert not fuse.blown
+
+
+def test_a_job_that_a_slower_process_submitted_for_nothing_is_taken_back(
+    stores: Stores, new_job: Callable[..., Job], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slow, fast = Laboratory(stores, new_job), Laboratory(stores, new_job)
+    run = new_run(campaign({}))
+    stores.campaigns.add_run(run)
+    submit = slow.submit
+
+    def refuse(request: JobRequest, key: str) -> Job:
+        raise BadParameter("dwell_s", -1, "not in this process's catalogue")
+
+    def overtaken(request: JobRequest, key: str) -> Job:
+        """The other process is refused, and ends the run, before this one's submit comes through."""
+        fast.conductor().advance(run.id)
+        return submit(request, key)
+
+    monkeypatch.setattr(fast, "submit", refuse)
+    monkeypatch.setattr(slow, "submit", overtaken)
+    slow.conductor().advance(run.id)
+    assert stores.campaigns.run(run.id).state is JobState.FAILED
+    assert [job.state for job in slow.jobs()] == [JobState.CANCELLED]

@@ -44,7 +44,7 @@ class StepLimit(Document):
 
 
 class TrendRule(Document):
-    """Hold a quantity to the control limits of the unit's earlier results by the same procedure."""
+    """Hold a quantity to the control limits of the unit's earlier results of the same procedure and parameters."""
 
     quantity: str = QUANTITY
     outcome: Literal["warning", "fail"] = Field("warning", description="what a signal of the chart means")

@@ -136,13 +136,21 @@ class CampaignDesk:
                 self.conductor.nudge()
                 return campaigns.run(run_id)
 
-    def trend(self, unit: str, procedure: str, name: str, simulated: bool | None, last: int) -> Trend:
-        """A quantity over the unit's results by a procedure. Raises `NotFound`."""
+    def trend(
+        self, unit: str, procedure: str, name: str, simulated: bool | None, last: int, same_parameters: bool = False
+    ) -> Trend:
+        """A quantity over the unit's results by a procedure, of the newest one's parameters alone where that is wanted.
+
+        Raises `NotFound`.
+        """
         self._stores.units.unit(unit)
         self._planner.procedure(procedure)
         if simulated is None:
             simulated = self._driver.description.simulated
-        return trend_of(history(self._stores.results, unit, procedure, simulated, last), unit, procedure, name, None)
+        found = history(self._stores.results, unit, procedure, simulated, last)
+        if same_parameters:
+            found = [result for result in found if result.parameters == found[-1].parameters]
+        return trend_of(found, unit, procedure, name, None)
 
 
 def overridden(campaign: Campaign, parameters: Mapping[str, Mapping[str, Any]]) -> Campaign:

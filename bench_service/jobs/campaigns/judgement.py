@@ -78,17 +78,15 @@ def _limited(limit: StepLimit, campaign: Campaign, document: dict[str, Any]) -> 
 
 def _trend(rule: TrendRule, result: StoredResult, stores: Stores) -> tuple[list[Check], list[str]]:
     """The newest value against limits from the results before it."""
-    before = [
-        r
-        for r in history(stores.results, result.unit or "", result.name, result.simulated, rule.last + 1)
-        if r.id < result.id
-    ][-rule.last :]
-    earlier = trend_of(before, result.unit or "", result.name, rule.quantity, None) if before else None
+    unit = result.unit or ""
+    found = history(stores.results, unit, result.name, result.simulated, rule.last + 1, result.parameters)
+    before = [r for r in found if r.id < result.id][-rule.last :]
+    earlier = trend_of(before, unit, result.name, rule.quantity, None) if before else None
     known = 0 if earlier is None else len(earlier.points)
     now = quantity(result.document, rule.quantity)
     if earlier is None or known < rule.at_least or earlier.limits is None:
         return [], [f"trend of {rule.quantity}: {known} earlier results, {rule.at_least} are needed to judge it"]
-    chart = trend_of([*before, result], result.unit or "", result.name, rule.quantity, known)
+    chart = trend_of([*before, result], unit, result.name, rule.quantity, known)
     assert chart.limits is not None
     broken = [s.rule for s in chart.signals if s.index == len(chart.points) - 1]
     text = f"trend of {rule.quantity} over {known} results: {'; '.join(broken) or 'no signal'}"

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
 from bench_service.jobs.campaigns.quantities import Quantity, quantity
 from bench_service.jobs.errors import NotFound
@@ -64,10 +65,20 @@ def trend_of(results: Sequence[StoredResult], unit: str, procedure: str, name: s
     return Trend(unit, procedure, name, unit_of, points, limits, broken, len(results) - len(points))
 
 
-def history(results: ResultStore, unit: str, procedure: str, simulated: bool, last: int) -> list[StoredResult]:
-    """The latest results that gave a job of the unit its verdict, oldest first; real and simulated ones apart."""
+def history(
+    results: ResultStore,
+    unit: str,
+    procedure: str,
+    simulated: bool,
+    last: int,
+    parameters: dict[str, Any] | None = None,
+) -> list[StoredResult]:
+    """The latest results that gave a job of the unit its verdict, oldest first; real and simulated ones apart.
+
+    With `parameters` only those of the same plan: another dwell has another spread.
+    """
     found = results.of_verdicts(unit, procedure, simulated=simulated, limit=last)
-    return list(found[::-1])
+    return [result for result in found[::-1] if parameters is None or result.parameters == parameters]
 
 
 def _point(result: StoredResult, q: Quantity) -> TrendPoint:
