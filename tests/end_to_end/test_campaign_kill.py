@@ -58,7 +58,7 @@ class Process:
 
 @pytest.mark.timeout(200)
 @pytest.mark.parametrize("backend", ["sqlite", "postgres"])
-def test_a_campaign_survives_killed_services(
+def test_a_campaign_survives_a_killed_service(
     backend: str, tmp_path: Path, request: pytest.FixtureRequest, free_port: int
 ) -> None:
     url = f"sqlite:///{tmp_path / 'bench.sqlite'}"
@@ -68,8 +68,6 @@ def test_a_campaign_survives_killed_services(
     try:
         service.client.post("/api/v1/campaigns", json={"name": "night", "steps": STEPS}).raise_for_status()
         run_id = service.client.post("/api/v1/campaigns/night/runs", json={"unit": "SIM-0001", "seed": 3}).json()["id"]
-        service.kill()  # as soon as it was acknowledged
-        service.start()
         deadline = monotonic_s() + 120
         killed = False
         while (run := service.run(run_id))["state"] in ("queued", "running"):
