@@ -14,6 +14,7 @@ from bench_service.api import (
     benches,
     campaigns,
     errors,
+    event_stream,
     health,
     jobs,
     procedures,
@@ -22,15 +23,20 @@ from bench_service.api import (
     trends,
     units,
 )
+from bench_service.drivers.device_faults import FaultPlan
+from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs.code_version import code_version
+from bench_service.jobs.dispatcher import Dispatcher, JobEngine
+from bench_service.jobs.event_hub import EventHub
+from bench_service.jobs.live import Heartbeat, LiveBoard
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
-from bench_service.jobs.worker import JobEngine, Worker
+from bench_service.jobs.worker import Worker
 from bench_service.pages import campaign_pages, figures, routes
-from bench_service.persistence import acquire_lease, engine_database, open_stores
+from bench_service.persistence import BenchLease, acquire_lease, engine_database, open_stores
 from bench_service.settings import Settings
 
 ROUTERS = (procedures, jobs, recordings, analyses, units, trends, benches, campaigns, schedules, health)
@@ -43,28 +49,48 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     Raises `BenchBusy`, `StorageFailure`, `NotMounted`.
     """
     threadpool_limits(1)  # our matrices have at most 72 rows: BLAS threads would only spin against the bench's own
-    driver = SimulatedDriver(settings.bench_id, settings.unit_truth, settings.bench_truth, settings.real_time_factor)
+    driver = _driver(settings)
     stores, database = open_stores(settings.database_url)
     closing.callback(database.dispose)
     planner = Planner(stores, driver)
     code = code_version()
     worker: Worker | None = None
+    board = LiveBoard(stores.live)
     if drive:
         lease = acquire_lease(settings.database_url, settings.bench_id)
         closing.callback(lease.release)
-        worker = Worker(JobRunner(stores, planner, driver, code, lease.held), partial(_engine, settings, stores))
-    service = BenchService(stores, driver, planner, worker, code)
+        board = LiveBoard(stores.live, settings.bench_id)
+        heartbeat = Heartbeat(board, stores.live)
+        heartbeat.begin()
+        closing.callback(heartbeat.end)
+        runner = JobRunner(stores, planner, driver, code, lease.held, board)
+        worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease))
+    service = BenchService(stores, driver, planner, worker, code, board)
     closing.callback(service.stop)
     service.register()
     return service
 
 
-def _engine(settings: Settings, stores: Stores, runner: JobRunner) -> JobEngine:
+def _driver(settings: Settings) -> SimulatedDriver:
+    """The bench, with what its devices remember."""
+    register = DeviceRegister(settings.devices_in(), settings.bench_id)
+    faults = None if settings.device_faults is None else FaultPlan.parse(settings.device_faults)
+    truths = settings.unit_truth, settings.bench_truth
+    return SimulatedDriver(settings.bench_id, *truths, settings.real_time_factor, register, faults)
+
+
+def _engine(settings: Settings, runner: JobRunner) -> JobEngine:
     """The job engine, which is imported here because it takes as long as the rest of the service."""
     from bench_service.jobs.engine import Engine
 
-    books = engine_database(settings.database_url)
-    return Engine(*books, settings.bench_id, settings.poll_s, runner, stores.jobs)
+    books = engine_database(settings.database_url, settings.bench_id)
+    return Engine(*books, settings.bench_id, runner)
+
+
+def _dispatcher(
+    settings: Settings, stores: Stores, lease: BenchLease, runner: JobRunner, engine: JobEngine
+) -> Dispatcher:
+    return Dispatcher(settings.bench_id, stores, runner, engine, lease, settings.poll_s)
 
 
 def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[], None]) -> FastAPI:
@@ -86,6 +112,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.service = service
+    app.state.hub = EventHub(service.stores.jobs, service.live, event_stream.FRAMES)
     app.state.max_import_bytes = max_import_bytes
     for module in ROUTERS:
         app.include_router(module.router)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -27,10 +28,25 @@ class Settings(BaseModel):
     """Truth file of the simulated table and site; None: the one that ships."""
     real_time_factor: float | None = Field(None, gt=0)
     """Simulated seconds per real second; None: as fast as the machine allows."""
+    device_folder: Path | None = None
+    """Where a simulated bench's devices keep their state; None: beside an SQLite file, in .bench/ for Postgres.
+
+    A folder of the bench's own host, the same for every process of that bench."""
+    device_faults: str | None = None
+    """For exercises: faults put into a simulated bench's devices (see `bench_service.drivers.device_faults`)."""
     poll_s: float = Field(0.1, gt=0, le=10)
-    """How often the job engine looks for queued work."""
+    """How often a worker looks for jobs that other processes queued; its own it sees at once."""
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported."""
+
+    def devices_in(self) -> Path:
+        """The folder of the devices' registers."""
+        if self.device_folder is not None:
+            return self.device_folder
+        address = urlsplit(self.database_url)
+        if address.scheme.startswith("sqlite"):
+            return Path(self.database_url.partition(":///")[2] or "bench.sqlite").parent
+        return Path(".bench") / (address.path.strip("/") or "postgres")
 
     @classmethod
     def from_environ(cls, environ: Mapping[str, str]) -> "Settings":

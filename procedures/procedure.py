@@ -13,6 +13,7 @@ from procedures.core.limits import Check, Verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.unit import Unit
+from procedures.core.unit_correction import CorrectionKind, UnitCorrection
 
 
 class Parameters(BaseModel):
@@ -90,6 +91,14 @@ def _no_calibrations(_: Any) -> tuple[TriadCalibration, ...]:
     return ()
 
 
+def _no_corrections(_: Any) -> tuple[UnitCorrection, ...]:
+    return ()
+
+
+def _uses_none(_: Any) -> tuple[CorrectionKind, ...]:
+    return ()
+
+
 def _nothing_learnt(_: Any, unit: Unit, _origin: str) -> Unit:
     return unit
 
@@ -118,6 +127,10 @@ class Procedure(Generic[P, R]):
     calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
     uses_calibration: bool = False
     """Whether the result rests on the unit's current calibration, which then belongs to its lineage."""
+    corrections: Callable[[R], tuple[UnitCorrection, ...]] = _no_corrections
+    """The correction sets that a result gives: at most one of a kind."""
+    uses_corrections: Callable[[P], tuple[CorrectionKind, ...]] = _uses_none
+    """Kinds of the unit's current corrections that the result rests on; those it has then belong to its lineage."""
     learns: Callable[[R, Unit, str], Unit] = _nothing_learnt
     """The unit's record with what a job's result found of it; the text names that result as its origin."""
     quantities: Callable[[P, Context], tuple[str, ...]] | None = None
@@ -136,3 +149,5 @@ class Method(Generic[P, R]):
     analyse: Callable[[Evidence, P, Unit | None], R]
     report: Callable[[R], Report]
     calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
+    corrections: Callable[[R], tuple[UnitCorrection, ...]] = _no_corrections
+    """The correction sets that a result gives: at most one of a kind."""

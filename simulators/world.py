@@ -1,6 +1,6 @@
 """The door: a whole simulated bench from its truth, a seed, and perhaps a checkpoint.
 
-Knows how clock, table, supply and unit are wired; knows none of their physics.
+Knows how clock, table, supply, unit, chamber and operator are wired; knows none of their physics.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,32 +10,38 @@ from typing import Any
 import numpy as np
 
 from procedures.bench import Bench
+from procedures.bench.errors import DeviceFault
 from procedures.core import units
 from procedures.core.recording import Station
 from procedures.core.table_angles import TableAngles
+from simulators.chamber.device import SimChamber, Warmth
 from simulators.clock import SimClock, Wait
+from simulators.imu.climate import Climate, Drift
 from simulators.imu.device import SimImu
 from simulators.imu.sensor import TRIADS, Coefficients, launch_coefficients, station_means
+from simulators.operator.person import SimOperator
 from simulators.supply.device import SimSupply
 from simulators.truth import Array, BenchTruth, UnitTruth, default_bench, default_unit
 from simulators.turntable.device import SETTLE_S, SimTurntable, pointing_error_rad
 from simulators.turntable.kinematics import at_rest, attitude
 from simulators.turntable.profile import move_ticks
 
-CHECKPOINT_VERSION = 2
+CHECKPOINT_VERSION = 3
 
 
 @dataclass(frozen=True)
 class WorldConfig:
-    """What makes a world: two truths, a seed, and how fast time may pass (None: as fast as it can)."""
+    """What makes a world: two truths, a seed, whether it has a chamber, and how fast time may pass."""
 
     unit: UnitTruth = field(default_factory=default_unit)
     bench: BenchTruth = field(default_factory=default_bench)
     seed: int = 1
     sample_rate_hz: float | None = None
     """Instead of the unit's own rate."""
+    thermal: bool = False
+    """Whether the unit stands in the chamber and feels its temperature; else it is warm through, at the reference."""
     real_time_factor: float | None = None
-    """Bench seconds per real second."""
+    """Bench seconds per real second; None: as fast as it can."""
     wait: Wait | None = field(default=None, repr=False)
     """Waits real seconds; needed with a real-time factor."""
 
@@ -54,6 +60,8 @@ class SimulatedBench(Bench):
     turntable: SimTurntable  # pyright: ignore[reportIncompatibleVariableOverride]
     imu: SimImu  # pyright: ignore[reportIncompatibleVariableOverride]
     supply: SimSupply  # pyright: ignore[reportIncompatibleVariableOverride]
+    chamber: SimChamber | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
+    operator: SimOperator = field(kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def checkpoint(self) -> dict[str, Any]:
         """What `build` needs to go on from here, JSON-ready. Raises `DeviceFault` while the table moves."""
@@ -65,6 +73,8 @@ class SimulatedBench(Bench):
             "turntable": self.turntable.checkpoint(),
             "supply": self.supply.checkpoint(),
             "imu": self.imu.checkpoint(),
+            "operator": self.operator.checkpoint(),
+            "chamber": None if self.chamber is None else self.chamber.checkpoint(),
         }
 
     def true_calibration(self) -> dict[str, tuple[Array, Array]]:
@@ -73,22 +83,86 @@ class SimulatedBench(Bench):
 
 
 def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> SimulatedBench:
-    """A bench with the table at zero and the unit off, or as a checkpoint of the same seed and rate left it."""
+    """A bench with the table at zero and the unit off, or as a checkpoint of the same seed and rate left it.
+
+    Raises `DeviceFault` where a chamber is wanted and the bench has none.
+    """
     clock = SimClock(config.rate_hz, config.real_time_factor, config.wait)
     table = SimTurntable(config.bench, config.seed, clock)
     supply = SimSupply()
-    imu = SimImu(config.unit, config.seed, clock, supply.launch)
-    supply.connect(imu.power_up, imu.power_down)
-    clock.connect(lambda ticks: imu.feel(table.advance(ticks)))
+    imu = SimImu(config.unit, config.seed, clock, supply.launch, config.thermal)
+    chamber = _chamber(config, clock) if config.thermal else None
+    door = (lambda _is_open: None) if chamber is None else chamber.set_door
+    operator = SimOperator(config.bench.operator, config.seed, clock, supply.is_on, door, table.place)
+    if chamber is None:
+        supply.connect(imu.power_up, imu.power_down)
+        clock.connect(lambda ticks: imu.feel(table.advance(ticks)))
+    else:
+        _connect_warm(clock, table, supply, imu, chamber)
+    bench = SimulatedBench(
+        config.bench.description, clock, table, imu, supply, chamber, operator=operator, config=config
+    )
     if checkpoint is not None:
-        made_with = (checkpoint["version"], checkpoint["seed"], checkpoint["rate_hz"])
-        if made_with != (CHECKPOINT_VERSION, config.seed, config.rate_hz):
-            raise ValueError(f"the checkpoint was made with (version, seed, rate_hz) = {made_with!r}")
-        clock.ticks = int(checkpoint["ticks"])
-        table.resume(checkpoint["turntable"])
-        supply.resume(checkpoint["supply"])
-        imu.resume(supply.launch(), checkpoint["imu"])
-    return SimulatedBench(config.bench.description, clock, table, imu, supply, config=config)
+        _resume(bench, checkpoint)
+    return bench
+
+
+def _chamber(config: WorldConfig, clock: SimClock) -> SimChamber:
+    truth, limits = config.bench, config.bench.description.chamber
+    if limits is None:
+        raise DeviceFault(f"bench {truth.description.id!r} has no thermal chamber, and the job reads temperatures")
+    return SimChamber(
+        truth.chamber, config.unit.thermal, config.seed, config.rate_hz, clock.now_s, truth.chamber_faults, limits
+    )
+
+
+def _connect_warm(clock: SimClock, table: SimTurntable, supply: SimSupply, imu: SimImu, chamber: SimChamber) -> None:
+    """Whatever moves the unit also warms it; its power heats it."""
+
+    def advance(ticks: int) -> None:
+        motion, warmth = table.advance(ticks), chamber.advance(ticks)
+        if supply.is_on():
+            imu.feel(motion, climate_of(chamber, warmth, ticks))
+
+    def power_up(launch: int) -> None:
+        chamber.unit_power(True)
+        imu.power_up(launch)
+
+    def power_down() -> None:
+        chamber.unit_power(False)
+        imu.power_down()
+
+    supply.connect(power_up, power_down)
+    clock.connect(advance)
+
+
+def climate_of(chamber: SimChamber, warmth: Warmth, ticks: int) -> Climate:
+    """What the temperatures of some ticks do to the unit: the last second's until the next one ends."""
+    felt = chamber.response(np.concatenate([warmth.before_c[None], warmth.temperatures_c]))
+    lengths = np.diff([0, *warmth.end_ticks, ticks])
+    gyro, gyro_added = None, felt.gyro_added_rad_s.T
+    if np.any(gyro_added):
+        same, none = np.ones_like(gyro_added), np.zeros_like(gyro_added)
+        gyro = Drift(lengths, same, none, same, gyro_added)
+    forces = (felt.sensor_gain, felt.sensor_added_m_s2, felt.converter_gain, felt.converter_added_m_s2)
+    accelerometer = Drift(lengths, *(part.T for part in forces))
+    return Climate(gyro, accelerometer, np.concatenate([warmth.codes_before[None], warmth.codes]))
+
+
+def _resume(bench: SimulatedBench, checkpoint: Mapping[str, Any]) -> None:
+    config = bench.config
+    version = checkpoint["version"]
+    warm = checkpoint.get("chamber") is not None
+    made_with = (version, checkpoint["seed"], checkpoint["rate_hz"], warm)
+    if made_with != (CHECKPOINT_VERSION, config.seed, config.rate_hz, config.thermal):
+        raise ValueError(f"the checkpoint was made with (version, seed, rate_hz, thermal) = {made_with!r}")
+    bench.clock.ticks = int(checkpoint["ticks"])
+    bench.turntable.resume(checkpoint["turntable"])
+    bench.supply.resume(checkpoint["supply"])
+    bench.imu.resume(bench.supply.launch(), checkpoint["imu"])
+    bench.operator.resume(checkpoint["operator"])
+    if bench.chamber is not None:
+        bench.chamber.resume(checkpoint["chamber"])
 
 
 def launch_coefficients_of(config: WorldConfig, launch: int = 1) -> dict[str, Coefficients]:

@@ -1,5 +1,7 @@
 """Benches: what they are, what they are doing, and the software stop."""
 
+from datetime import datetime
+
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
@@ -7,7 +9,9 @@ from bench_service.api.dependencies import Service
 from bench_service.api.errors import problems
 from bench_service.api.requests import StopRequest
 from bench_service.jobs.errors import NotFound
+from bench_service.jobs.live import BenchLive
 from bench_service.jobs.service import BenchService
+from bench_service.wall_clock import now
 from procedures.bench import BenchDescription
 
 router = APIRouter(prefix="/api/v1/benches", tags=["benches"])
@@ -22,6 +26,9 @@ class BenchView(BaseModel):
     stopped: str | None = Field(description="Why it is stopped")
     job: str | None = Field(description="The job that drives it")
     units: list[str] = Field(description="Units that it can test")
+    live: BenchLive | None = Field(description="The last that its driver said; null: it never had one")
+    driver_seen_at: datetime | None = Field(description="When that was")
+    driver_there: bool = Field(description="Whether a driver is there now, as far as can be known from here")
 
 
 class Stopping(BaseModel):
@@ -34,6 +41,7 @@ class Stopping(BaseModel):
 
 def _view(service: BenchService) -> BenchView:
     running = service.running_job()
+    live = service.live.of_bench(service.driver.description.id)
     stop = service.stores.units.bench_stop(service.driver.description.id)
     return BenchView(
         id=service.driver.description.id,
@@ -42,6 +50,9 @@ def _view(service: BenchService) -> BenchView:
         stopped=None if stop is None else f"{stop.at.isoformat()}: {stop.reason}",
         job=None if running is None else running.id,
         units=[unit.serial for unit in service.driver.mounted()],
+        live=live,
+        driver_seen_at=None if live is None else live.at,
+        driver_there=live is not None and live.there(now()),
     )
 
 

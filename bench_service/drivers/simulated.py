@@ -6,10 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from bench_service.drivers.device_faults import DeviceFaults, FaultPlan
+from bench_service.drivers.device_register import DeviceRegister
+from bench_service.drivers.registered import RegisteredBench, RegisteredDevices
+from bench_service.jobs.devices import DeviceState
 from bench_service.jobs.driver import TrueTriad
 from bench_service.jobs.errors import Misconfigured, NotMounted
 from bench_service.wall_clock import pause_async
 from procedures.bench import Bench, BenchDescription, BenchNeeds
+from procedures.bench.errors import BenchError
 from procedures.core.unit import Unit
 from simulators.truth import (
     UnitTruth,
@@ -48,11 +53,17 @@ class SimulatedDriver:
         unit_truth: Path | None = None,
         bench_truth: Path | None = None,
         real_time_factor: float | None = None,
+        register: DeviceRegister | None = None,
+        faults: FaultPlan | None = None,
     ) -> None:
-        """Raises `Misconfigured` for a truth file that cannot be used, `NotMounted` for one of another bench."""
+        """`register`: where the devices' state outlives this process; without one, nobody else can make them safe.
+
+        Raises `Misconfigured` for a truth file that cannot be used, `NotMounted` for one of another bench."""
         self._bench = default_bench() if bench_truth is None else _loaded(bench_truth, load_bench)
         self._unit = default_unit() if unit_truth is None else _loaded(unit_truth, load_unit)
         self._real_time_factor = real_time_factor
+        self._register = register
+        self._faults = faults
         if bench_id != self._bench.description.id:
             raise NotMounted(f"the truth file is of bench {self._bench.description.id!r}, not {bench_id!r}")
 
@@ -67,12 +78,37 @@ class SimulatedDriver:
             units.append(self._truth_of(serial))
         return tuple(declared_unit(unit) for unit in units)
 
-    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None, needs: BenchNeeds) -> Bench:
-        """A world with that unit on the table, at its beginning or at a checkpoint."""
+    def open(
+        self,
+        unit: str,
+        seed: int | None,
+        checkpoint: dict[str, Any] | None,
+        needs: BenchNeeds,
+        job: str | None = None,
+    ) -> Bench:
+        """A world with that unit on the table, at its beginning or at a checkpoint. Raises `DeviceBusy`."""
         from simulators.world import build  # with MuJoCo: not needed before a bench is opened
 
-        config = replace(self._config(unit, 0 if seed is None else seed), sample_rate_hz=needs.sample_rate_hz)
-        return build(config, checkpoint)
+        config = self._config(unit, 0 if seed is None else seed)
+        config = replace(config, sample_rate_hz=needs.sample_rate_hz, thermal=needs.temperatures)
+        bench = build(config, checkpoint)
+        if self._register is None:
+            return bench
+        link = self._register.open(job=job)
+        chamber = self.description.chamber
+        link.note("bench.opened", {"unit": unit}, chamber_ambient_c=None if chamber is None else chamber.ambient_c)
+        faults = None if self._faults is None else DeviceFaults(self._faults, f"{job} {link.openings}")
+        return RegisteredBench(bench, link, faults)
+
+    def device_state(self) -> DeviceState | None:
+        """What the register holds; None without one."""
+        return None if self._register is None else RegisteredDevices(self._register).device_state()
+
+    def make_safe(self, by: str) -> DeviceState:
+        """Over the register, without a world. Raises `DeviceBusy`, and `BenchError` without a register."""
+        if self._register is None:
+            raise BenchError("this bench keeps no register of its devices: only the job that drives it can stop them")
+        return RegisteredDevices(self._register).make_safe(by)
 
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
         """Bias and matrix of the job's launch, run-to-run changes included."""

@@ -59,7 +59,7 @@ class AnalysisDesk:
         merged = {**job.requested_parameters, **parameters}
         result = analysed(job, self._planner.procedure(job.procedure), merged, recordings, self._code_version)
         idempotency = None if key is None else Idempotency(f"again:{key}", fingerprint([job_id, parameters]))
-        return self._stores.results.add(result.stored, result.calibrations, False, idempotency)
+        return self._stores.results.add(result.stored, result.calibrations, False, idempotency, result.corrections)
 
     def run_method(self, request: AnalysisRequest, key: str | None = None) -> StoredResult:
         """Run a method on stored recordings or calibrations. Raises `NotFound`, `DomainError`, `ValidationError`."""
@@ -89,7 +89,8 @@ class AnalysisDesk:
             unit=serial,
         )
         idempotency = None if key is None else Idempotency(f"analyses:{key}", fingerprint(request))
-        return self._stores.results.add(stored, method.calibrations(outcome), False, idempotency)
+        gives = method.calibrations(outcome), method.corrections(outcome)
+        return self._stores.results.add(stored, gives[0], False, idempotency, gives[1])
 
     def import_recording(
         self, files: Sequence[ImportFile], description: ImportDescription, key: str | None = None

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from bench_service.jobs.devices import BenchDevices
 from procedures.bench import Bench, BenchDescription, BenchNeeds
 from procedures.core.unit import Unit
 
@@ -17,7 +18,23 @@ class TrueTriad:
     matrix: tuple[tuple[float, ...], ...]
 
 
-class BenchDriver(Protocol):
+class Lease(Protocol):
+    """The right to drive a bench, held for a process's life unless it is lost."""
+
+    def held(self) -> bool:
+        """Whether it is still ours."""
+        ...
+
+    def regain(self) -> bool:
+        """Take it again after it was lost; False where somebody else has it, or the database does not answer."""
+        ...
+
+    def release(self) -> None:
+        """Give the bench back; a second time does nothing."""
+        ...
+
+
+class BenchDriver(BenchDevices, Protocol):
     """One bench's devices. `open` is called once per job, and again after a restart."""
 
     @property
@@ -27,10 +44,17 @@ class BenchDriver(Protocol):
         """The units that this bench can test, as declared; a simulated bench mounts some when they are asked for."""
         ...
 
-    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None, needs: BenchNeeds) -> Bench:
-        """The bench with a unit on it; from a checkpoint, a simulated world goes on where it was.
+    def open(
+        self,
+        unit: str,
+        seed: int | None,
+        checkpoint: dict[str, Any] | None,
+        needs: BenchNeeds,
+        job: str | None = None,
+    ) -> Bench:
+        """The bench with a unit on it, for a job; from a checkpoint, a simulated world goes on where it was.
 
-        Raises `NotMounted`, `BenchError`.
+        It has the devices' links until `Bench.close`. Raises `NotMounted`, `DeviceBusy`, `BenchError`.
         """
         ...
 

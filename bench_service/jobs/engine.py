@@ -1,26 +1,26 @@
 """The job engine, DBOS, behind four verbs. The only file that knows it.
 
-One queue per bench with one job at a time, one step per station, steps that may be repeated. An operator's cancel is a
-flag of our own that the steps see (a cancelled DBOS workflow would free the bench while it still moves); the workflow
-then makes the bench safe and ends. The version is the procedures' contract, not a hash of the sources, so a
-new build goes on with the jobs of the old one.
+Jobs wait in our own table (`bench_service.jobs.dispatcher`); here a job that was claimed is run, as a workflow that
+survives the process: one step per station, steps that may be repeated. An operator's cancel is a flag of our own that
+the steps see (a cancelled DBOS workflow would free the bench while it still moves); the workflow then makes the bench
+safe and ends. The version is the procedures' contract, not a hash of the sources, so a new build goes on with the jobs
+of the old one.
 """
 
 import json
 import logging
 from collections.abc import Callable
-from threading import Event
+from threading import Event, Lock
 from typing import Any
 
-from dbos import DBOS, DBOSConfig, Serializer, SetEnqueueOptions, SetWorkflowID
+from dbos import DBOS, DBOSConfig, Serializer, SetWorkflowID
 from pydantic import TypeAdapter
 
+from bench_service.jobs.dispatcher import Unfinished
 from bench_service.jobs.errors import ServiceError
-from bench_service.jobs.job import Failure, Job, JobState
+from bench_service.jobs.job import Failure, Job
 from bench_service.jobs.runner import JobRunner, StepOutcome
 from bench_service.jobs.session import ShuttingDown
-from bench_service.jobs.store import JobStore
-from bench_service.wall_clock import now
 
 PROCEDURE_ABI = "1"
 """Raise it when stored workflows can no longer be continued by this code."""
@@ -30,6 +30,9 @@ RETRY_S = 0.5
 """How often a bad end that could not be written is tried again [s]."""
 MAX_RECOVERIES = 50
 """How often a job may take the service down before it is given up."""
+
+ALIVE = frozenset({"PENDING", "ENQUEUED"})
+"""Of a workflow that DBOS runs, or will run after it recovered it."""
 
 OUTCOME = TypeAdapter(StepOutcome)
 log = logging.getLogger(__name__)
@@ -54,31 +57,32 @@ class JsonSerializer(Serializer):
 
 
 class Engine:
-    """Runs jobs of one bench, in this process, durably."""
+    """Runs jobs of one bench, in this process, durably. One engine is one application of DBOS, named after its bench.
+
+    H1: an operator's cancel is a flag that the steps see, so the bench is never free before it is safe.
+    H2: one process has the bench's lease, and `_one_at_a_time` lets one workflow in whatever DBOS recovers.
+    H3: DBOS recovers over a queue that every worker of an application polls: so each bench is an application.
+    H4: a job whose workflow is of another version is said to be so (`unfinished`), and its workflow is ended.
+    """
 
     def __init__(
         self,
         database_url: str,
         connection: dict[str, Any],
         bench_id: str,
-        poll_s: float,
         runner: JobRunner,
-        jobs: JobStore,
     ) -> None:
-        self._queue = f"bench:{bench_id}"
-        self._poll_s = poll_s
+        self._version = f"{bench_id}:{PROCEDURE_ABI}"
         self._runner = runner
-        self._jobs = jobs
         self._last = StepOutcome()
         self._ending = Event()
-        self._idle = Event()
-        self._idle.set()
+        self._one_at_a_time = Lock()
         config: DBOSConfig = {
-            "name": "bench",
+            "name": f"bench-{bench_id}",
             "system_database_url": database_url,
             "db_engine_kwargs": connection,
             "executor_id": f"bench:{bench_id}",
-            "application_version": PROCEDURE_ABI,
+            "application_version": self._version,
             "serializer": JsonSerializer(),
             "log_level": "WARNING",
             "console_log_level": "ERROR",
@@ -88,71 +92,86 @@ class Engine:
         DBOS(config=config)
 
         @DBOS.workflow(name="run_job", max_recovery_attempts=MAX_RECOVERIES)
-        def run_job(job_id: str, attempt: int = 1) -> None:
-            self._idle.clear()
-            try:
+        def run_job(job_id: str, attempt: int) -> None:
+            with self._one_at_a_time:
                 self._run_job(job_id, attempt)
-            finally:
-                self._idle.set()
 
         self._workflow = run_job
 
     def launch(self) -> None:
         """Start working; jobs that a dead process left go on. The bench's lease must be held."""
-        DBOS.listen_queues([self._queue])
+        DBOS.listen_queues([])
         DBOS.launch()
-        DBOS.register_queue(
-            self._queue,
-            concurrency=1,
-            worker_concurrency=1,
-            polling_interval_sec=self._poll_s,
-            on_conflict="always_update",
-        )
-        self._reconcile()
 
-    def enqueue(self, job: Job) -> None:
-        """Queue a job's present attempt; queueing it twice is a no-op."""
-        with SetWorkflowID(_workflow_id(job)), SetEnqueueOptions(priority=job.priority):
-            DBOS.enqueue_workflow(self._queue, self._workflow, job.id, job.attempt)
+    def run(self, job: Job) -> None:
+        """Run a claimed job to its end. Raises `ShuttingDown`, or what kept its workflow from being written."""
+        with SetWorkflowID(_workflow_id(job), workflow_id_reuse_policy="reject"):
+            handle = DBOS.start_workflow(self._workflow, job.id, job.attempt)
+        handle.get_result()
+
+    def unfinished(self, job: Job) -> Unfinished:
+        """What became of a running job's workflow."""
+        status = DBOS.get_workflow_status(_workflow_id(job))
+        if status is None:
+            return Unfinished()
+        if status.app_version != self._version:
+            if status.status in ALIVE:
+                DBOS.cancel_workflow(status.workflow_id)  # an older version that came back would go on with it
+            begun = f"begun by version {status.app_version} of the procedures, this is {self._version}"
+            return Unfinished(gone=Failure("OtherVersion", begun))
+        if status.status in ALIVE:
+            return Unfinished(alive=True)
+        return Unfinished(gone=Failure("EngineGaveUp", f"the job engine ended this job as {status.status}"))
 
     def shut_down(self) -> None:
         """Stop working, once the running job has left the bench safe; it goes on after the next start."""
         self._ending.set()
-        self._idle.wait(SHUT_DOWN_S)
+        if self._one_at_a_time.acquire(timeout=SHUT_DOWN_S):
+            self._one_at_a_time.release()
         DBOS.destroy(destroy_registry=True)
 
     def _run_job(self, job_id: str, attempt: int) -> None:
         runner = self._runner
-        runner.wait_for_release(job_id)
+        if self._ending.is_set():
+            raise ShuttingDown
+        self._last = StepOutcome()
         try:
-            self._last = StepOutcome()
-            count: int = _step("prepare", lambda: runner.prepare(job_id, attempt))
+            count = runner.stations(job_id, attempt)
             if count < 0:
                 return
             outcome = self._stations(job_id, count)
             if count > 0:
                 safe = self._checked("safe", lambda: runner.make_safe(job_id))
                 outcome = outcome if not outcome.good else safe
-            if outcome.good:
-                outcome = self._checked("conclude", lambda: runner.conclude(job_id))
+            if outcome.good:  # no step of its own: it may be repeated, and its end is in our own books
+                outcome = runner.conclude(job_id)
         except ShuttingDown:
-            runner.make_safe(job_id)
+            self._make_safe(job_id)
             raise
         except Exception as error:  # a defect, or books that cannot be kept: the job must still end, and the bench safe
             log.exception("job %s failed inside the service", job_id)
-            runner.make_safe(job_id)
+            self._make_safe(job_id)
             unexpected = StepOutcome(Failure("InternalError", f"{type(error).__name__}: {error}"))
             outcome = unexpected if self._last.good else self._last
         if not outcome.good:
             self._end(job_id, outcome)
 
+    def _make_safe(self, job_id: str) -> None:
+        """Out of every other way: an open bench is made safe at once, whether or not the database answers."""
+        while True:
+            try:
+                self._runner.make_safe(job_id)
+                return
+            except ServiceError as error:
+                log.warning("nobody knows yet what bench job %s drove: %s", job_id, error)
+            if self._ending.wait(RETRY_S):
+                return
+
     def _end(self, job_id: str, outcome: StepOutcome) -> None:
         """Note a bad end, as soon as it can be: while the disk is full the job waits, and the bench is safe already."""
         while True:
             try:
-                job = self._runner.end_early(job_id, outcome)
-                if job.state is JobState.QUEUED:  # the wish to pause was taken back while the bench was made safe
-                    self.enqueue(job)
+                self._runner.end_early(job_id, outcome)
                 return
             except ServiceError as error:
                 log.warning("the end of job %s cannot be noted yet: %s", job_id, error)
@@ -176,37 +195,10 @@ class Engine:
                 return outcome
         return StepOutcome()
 
-    def _reconcile(self) -> None:
-        """Make our jobs and the engine's workflows agree after a crash or a change of version."""
-        for state in (JobState.QUEUED, JobState.RUNNING):
-            cursor: str | None = None
-            while True:
-                page = self._jobs.list(state=state, after=cursor, limit=200)
-                for job in page.items:
-                    self._reconcile_job(job)
-                cursor = page.next
-                if cursor is None:
-                    break
-
-    def _reconcile_job(self, job: Job) -> None:
-        if f"bench:{job.bench}" != self._queue:
-            return
-        status = DBOS.get_workflow_status(_workflow_id(job))
-        if status is None:
-            self.enqueue(job)
-        elif status.status in ("ERROR", "CANCELLED", "MAX_RECOVERY_ATTEMPTS_EXCEEDED"):
-            failure = Failure("EngineGaveUp", f"the job engine ended this job as {status.status}")
-            self._jobs.transition(job.id, JobState.INTERRUPTED, at=now(), failure=failure)
-        elif status.app_version not in (None, PROCEDURE_ABI):
-            failure = Failure(
-                "OtherVersion", f"begun by version {status.app_version} of the procedures, this is {PROCEDURE_ABI}"
-            )
-            self._jobs.transition(job.id, JobState.INTERRUPTED, at=now(), failure=failure)
-
 
 def _workflow_id(job: Job) -> str:
-    """The first attempt has the job's own id, each later one its number with it."""
-    return job.id if job.attempt == 1 else f"{job.id}:{job.attempt}"
+    """Each attempt of a job is a workflow of its own."""
+    return f"{job.id}/{job.attempt}"
 
 
 def _step(name: str, work: Any) -> Any:

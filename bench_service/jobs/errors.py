@@ -8,6 +8,7 @@ ServiceError
 ├── BenchBusy            another process drives this bench
 ├── Misconfigured        a file that the settings name cannot be used
 ├── NotDriving           this process drives no bench
+├── AlreadyReserved      somebody keeps this bench or unit
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
@@ -49,6 +50,10 @@ class Misconfigured(ServiceError):
 
 class NotDriving(ServiceError):
     """This process drives no bench: it only reads."""
+
+
+class AlreadyReserved(ServiceError):
+    """Somebody keeps this bench or unit."""
 
 
 class NotMounted(ServiceError):

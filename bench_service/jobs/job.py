@@ -5,6 +5,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any
 
+from procedures.bench.errors import BenchError, DeviceFault, Disconnected, NotPowered, NotSettled
 from procedures.core.limits import Verdict
 from procedures.core.recording import Station
 
@@ -31,15 +32,28 @@ LEGAL: dict[JobState, frozenset[JobState]] = {
         {JobState.RUNNING, JobState.PAUSED, JobState.CANCELLED, JobState.FAILED, JobState.INTERRUPTED}
     ),
     JobState.RUNNING: frozenset(
-        {JobState.PAUSED, JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLED, JobState.INTERRUPTED}
+        {
+            JobState.QUEUED,
+            JobState.PAUSED,
+            JobState.SUCCEEDED,
+            JobState.FAILED,
+            JobState.CANCELLED,
+            JobState.INTERRUPTED,
+        }
     ),
     JobState.PAUSED: frozenset({JobState.QUEUED, JobState.CANCELLED}),
     JobState.INTERRUPTED: frozenset({JobState.QUEUED, JobState.CANCELLED}),
     JobState.SUCCEEDED: frozenset(),
-    JobState.FAILED: frozenset(),
+    JobState.FAILED: frozenset({JobState.QUEUED}),
     JobState.CANCELLED: frozenset(),
 }
-"""From each state, the states that may follow."""
+"""From each state, the states that may follow. From failed to queued only where `Job.resumable` allows it."""
+
+BENCH_FAULTS = frozenset(fault.__name__ for fault in (BenchError, NotSettled, NotPowered, DeviceFault, Disconnected))
+"""Kinds of failure that are the bench's, and may be gone the next time; a demand out of range never will be."""
+
+RESUMABLE = BENCH_FAULTS | {"NotSafe", "DeadlinePassed", "LeaseLost", "StorageFull", "StorageFailure"}
+"""Kinds of failure after which the stations that remain, or the analysis, can still be done."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +117,13 @@ class Job:
     finished_at: datetime | None = None
     result_id: str | None = None
     failure: Failure | None = None
+
+    @property
+    def resumable(self) -> bool:
+        """Whether it can be queued again to go on where it ended."""
+        if self.state is JobState.FAILED:
+            return self.failure is not None and self.failure.kind in RESUMABLE
+        return self.state in (JobState.PAUSED, JobState.INTERRUPTED)
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,12 @@ from threading import Event
 from typing import Any
 
 from bench_service.jobs.driver import BenchDriver
-from bench_service.jobs.errors import IllegalTransition, ServiceError
+from bench_service.jobs.errors import ServiceError
 from bench_service.jobs.job import FINAL, Failure, Job, JobState
+from bench_service.jobs.live import LiveBoard
+from bench_service.jobs.live_tap import LiveTap
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
+from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.session import BenchSession, ShuttingDown
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import Idempotency, StoredResult
@@ -16,12 +19,11 @@ from bench_service.wall_clock import new_id, now
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, Stopped
 from procedures.core.errors import DomainError
+from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import Recording
+from procedures.core.unit_correction import UnitCorrection
 from procedures.procedure import Outcome
-
-RELEASE_CHECK_S = 0.2
-"""How often a waiting job asks whether its bench was released [s]."""
 
 
 @dataclass(frozen=True)
@@ -47,45 +49,34 @@ class JobRunner:
         driver: BenchDriver,
         code_version: str,
         lease_held: Callable[[], bool],
+        live: LiveBoard | None = None,
     ) -> None:
-        """`lease_held`: whether this process still has the right to drive the bench; asked before every station."""
+        """`lease_held`: whether this process still has the right to drive the bench; asked before every station.
+
+        `live`: where it is said what the bench does; None: nowhere.
+        """
         self._stores = stores
         self._planner = planner
         self._driver = driver
         self._code_version = code_version
         self._lease_held = lease_held
+        self._live = live
         self._session: BenchSession | None = None
         self._ending = Event()
 
-    def wait_for_release(self, job_id: str) -> None:
-        """While a person's stop stands, the job waits in its queue. Raises `ShuttingDown` when the service ends."""
-        jobs, told = self._stores.jobs, False
-        while True:
-            stop = self._stores.units.bench_stop(self._driver.description.id)
-            if stop is None or jobs.get(job_id).state is not JobState.QUEUED:
-                return
-            if not told:
-                jobs.note(job_id, "note", now(), {"text": f"bench {stop.bench} is stopped: {stop.reason}"})
-                told = True
-            if self._ending.wait(RELEASE_CHECK_S):
-                raise ShuttingDown
+    def claim(self, entry: QueueEntry) -> Job | None:
+        """Begin a queued job, with what is known of its unit now; None where it cannot begin any more."""
+        job = self._stores.jobs.get(entry.job)
+        context = self._planner.refreshed(CONTEXT.validate_python(job.context))
+        return self._stores.queue.claim(entry, CONTEXT.dump_python(context, mode="json"), now())
 
-    def prepare(self, job_id: str, attempt: int) -> int:
-        """Note what is known of the unit now, and start. How many stations there are; 0 stations, nothing moves.
+    def stations(self, job_id: str, attempt: int) -> int:
+        """How many stations a claimed job has; 0 stations, nothing moves.
 
         -1 where there is nothing to do: the job has ended, is put aside, or was queued again since.
         """
-        jobs = self._stores.jobs
-        job = jobs.get(job_id)
-        if job.state not in (JobState.QUEUED, JobState.RUNNING) or job.attempt != attempt:
-            return -1
-        context = self._planner.refreshed(CONTEXT.validate_python(job.context))
-        job = jobs.set_context(job_id, CONTEXT.dump_python(context, mode="json"))
-        try:
-            jobs.transition(job_id, JobState.RUNNING, at=now())
-        except IllegalTransition:  # it was cancelled or put aside this moment
-            return -1
-        return len(job.stations)
+        job = self._stores.jobs.get(job_id)
+        return len(job.stations) if job.state is JobState.RUNNING and job.attempt == attempt else -1
 
     def acquire(self, job_id: str, index: int) -> StepOutcome:
         """Record one station. Where its recording exists already, a crash came between storing and noting it.
@@ -99,7 +90,7 @@ class JobRunner:
             jobs.station_done(job_id, index, now(), {})
             return StepOutcome()
         job = jobs.get(job_id)
-        if job.cancel_requested or job.state in FINAL:
+        if job.cancel_requested or job.state in FINAL or self._stores.units.bench_stop(job.bench) is not None:
             return StepOutcome(cancelled=True)
         if job.pause_requested:
             return StepOutcome(paused=True)
@@ -121,10 +112,13 @@ class JobRunner:
 
     def make_safe(self, job_id: str) -> StepOutcome:
         """Leave the bench safe; after a restart in which no session survived, by opening it for that alone."""
-        try:
-            session = self._session_of(self._stores.jobs.get(job_id))
-        except (BenchError, ServiceError) as error:
-            return self._not_safe(job_id, str(error))
+        session = self._session
+        if session is None or session.job.id != job_id:
+            job = self._stores.jobs.get(job_id)
+            try:
+                session = self._session_of(job)
+            except (BenchError, ServiceError) as error:
+                return self._not_safe(job_id, str(error))
         try:
             session.make_safe()
         except ExceptionGroup as group:
@@ -135,14 +129,19 @@ class JobRunner:
         return StepOutcome()
 
     def conclude(self, job_id: str) -> StepOutcome:
-        """Analyse, store the result with its calibrations, and end the job with the verdict."""
+        """Analyse, store the result with what it found of the unit, and end the job; may be repeated."""
         job = self._stores.jobs.get(job_id)
+        if job.state in FINAL:  # a crash came after its end was noted
+            return StepOutcome()
         procedure = self._planner.procedure(job.procedure)
         try:
             recordings = recordings_of(self._stores, job_id)
             result = analysed(job, procedure, job.parameters, recordings, self._code_version)
             stored = self._stores.results.add(
-                result.stored, result.calibrations, idempotency=Idempotency(f"job:{job_id}", job_id)
+                result.stored,
+                result.calibrations,
+                idempotency=Idempotency(f"job:{job_id}", job_id),
+                corrections=result.corrections,
             )
             self._remember(procedure, result.outcome, stored)
         except (DomainError, ServiceError) as error:
@@ -192,24 +191,26 @@ class JobRunner:
             return self._session
         self._stores.recordings.interrupt_open(job.id)
         checkpoint = self._stores.recordings.checkpoint(job.id)
-        bench = self._driver.open(job.unit, job.seed, checkpoint, BenchNeeds.of(job.stations))
+        bench = self._driver.open(job.unit, job.seed, checkpoint, BenchNeeds.of(job.stations), job.id)
         self._session = BenchSession(
             job,
             self._planner.procedure(job.procedure),
             bench,
             self._stores.recordings,
             lambda: self._stores.jobs.cancel_requested(job.id),
+            None if self._live is None else LiveTap(job, bench, self._live),
         )
         return self._session
 
 
 @dataclass(frozen=True)
 class Analysed:
-    """A result ready to be stored, with the calibrations that it gives."""
+    """A result ready to be stored, with the calibrations and corrections that it gives."""
 
     outcome: Outcome
     stored: StoredResult
-    calibrations: tuple[Any, ...]
+    calibrations: tuple[TriadCalibration, ...]
+    corrections: tuple[UnitCorrection, ...]
 
 
 def recordings_of(stores: Stores, job_id: str) -> list[Recording]:
@@ -229,6 +230,7 @@ def analysed(
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
     outcome = procedure.analyse(recordings, params, context)
     used = context.unit.calibration_id if procedure.uses_calibration else None
+    corrections = (context.unit.correction_id(kind) for kind in procedure.uses_corrections(params))
     stored = StoredResult(
         id=new_id(),
         kind="procedure",
@@ -246,5 +248,6 @@ def analysed(
         job_id=job.id,
         seed=job.seed,
         context=job.context,
+        corrections=tuple(c for c in corrections if c is not None),
     )
-    return Analysed(outcome, stored, procedure.calibrations(outcome))
+    return Analysed(outcome, stored, procedure.calibrations(outcome), procedure.corrections(outcome))

@@ -9,6 +9,7 @@ from bench_service.jobs.campaigns.desk import CampaignDesk
 from bench_service.jobs.driver import BenchDriver, TrueTriad
 from bench_service.jobs.errors import IllegalTransition, NotDriving, NotFound
 from bench_service.jobs.job import Job, JobState
+from bench_service.jobs.live import LiveBoard
 from bench_service.jobs.planning import CONTEXT, Plan, Planner, register
 from bench_service.jobs.request import JobRequest, fingerprint
 from bench_service.jobs.store import Stores
@@ -32,7 +33,9 @@ class BenchService:
         planner: Planner,
         worker: Worker | None,
         code_version: str,
+        live: LiveBoard | None = None,
     ) -> None:
+        self.live = live or LiveBoard(stores.live)
         self.stores = stores
         self.driver = driver
         self.planner = planner
@@ -82,7 +85,7 @@ class BenchService:
         job = self._new_job(request, plan)
         key = None if idempotency_key is None else Idempotency(f"jobs:{idempotency_key}", fingerprint(request))
         stored = self.stores.jobs.add(job, key)
-        self._worker.require_engine().enqueue(stored)
+        self._wake()
         return stored
 
     def cancel(self, job_id: str) -> Job:
@@ -94,13 +97,9 @@ class BenchService:
         return self.stores.jobs.request_pause(job_id, now())
 
     def resume(self, job_id: str) -> Job:
-        """Go on with a paused or interrupted job, with the stations that remain. Raises `IllegalTransition`."""
-        if self._worker is None:
-            raise NotDriving("this process does not drive a bench; ask the service that does")
-        engine = self._worker.require_engine()
+        """Go on with a job that can be resumed, with the stations that remain. Raises `IllegalTransition`."""
         job = self.stores.jobs.resume(job_id, now())
-        if job.state is JobState.QUEUED:
-            engine.enqueue(job)
+        self._wake()
         return job
 
     def stop_bench(self, bench_id: str, reason: str) -> Job | None:
@@ -124,10 +123,15 @@ class BenchService:
         if bench_id != self.driver.description.id:
             raise NotFound("bench", bench_id)
         self.stores.units.release_bench(bench_id)
+        self._wake()
 
     def running_job(self) -> Job | None:
         """The job that drives the bench now."""
-        return None if self._worker is None else self._worker.running_job()
+        return self.stores.queue.running(self.driver.description.id)
+
+    def _wake(self) -> None:
+        if self._worker is not None:
+            self._worker.wake()
 
     def result_of(self, job_id: str) -> StoredResult:
         """The result that gave the job its verdict. Raises `NotFound` where there is none (yet)."""
@@ -144,7 +148,7 @@ class BenchService:
         return self.driver.truth(job.unit, job.seed)
 
     def _new_job(self, request: JobRequest, plan: Plan) -> Job:
-        bench = plan.context.bench
+        bench, created_at = plan.context.bench, now()
         seed = request.seed if request.seed is not None else SEEDS.getrandbits(48)
         return Job(
             id=new_id(),
@@ -153,7 +157,8 @@ class BenchService:
             unit=request.unit,
             bench=bench.id,
             state=JobState.QUEUED,
-            created_at=now(),
+            created_at=created_at,
+            queued_at=created_at,
             requested_parameters=request.parameters,
             parameters=plan.parameters.model_dump(mode="json"),
             context=CONTEXT.dump_python(plan.context, mode="json"),

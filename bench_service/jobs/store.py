@@ -3,7 +3,7 @@
 Every method is one transaction: it commits, or it raises and nothing of it remains.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Protocol
@@ -12,7 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench_service.jobs.campaigns.store import CampaignStore
+from bench_service.jobs.corrections import CorrectionStore
 from bench_service.jobs.job import Event, Failure, Job, JobState
+from bench_service.jobs.live import LiveStore
+from bench_service.jobs.queue import QueueStore
+from bench_service.jobs.reservation import ReservationStore
 from bench_service.jobs.stored import (
     BenchStop,
     Idempotency,
@@ -27,6 +31,7 @@ from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import RawArray, Recording, RecordingInfo
 from procedures.core.unit import Unit
+from procedures.core.unit_correction import UnitCorrection
 
 
 class RecordingWriter(Protocol):
@@ -174,9 +179,17 @@ class JobStore(Protocol):
         """Events with a sequence greater than `after`, in order. Raises `NotFound`."""
         ...
 
+    def last_event(self, job_id: str) -> tuple[int, JobState]:
+        """Sequence of the newest event, and the state that goes with it, read at one moment. Raises `NotFound`."""
+        ...
+
+    def on_event(self, tell: Callable[[str], None]) -> None:
+        """From now on call `tell(job_id)` after each commit of this process that appended an event."""
+        ...
+
 
 class ResultStore(Protocol):
-    """Results, calibrations and lineage."""
+    """Results, the calibrations and corrections that come with them, and lineage."""
 
     def add(
         self,
@@ -184,9 +197,11 @@ class ResultStore(Protocol):
         calibrations: Sequence[TriadCalibration] = (),
         make_current: bool = True,
         idempotency: Idempotency | None = None,
+        corrections: Sequence[UnitCorrection] = (),
     ) -> StoredResult:
         """Store a result with its lineage, and its calibrations as the unit's current ones, in one transaction.
 
+        Corrections, at most one of a kind, are stored in the same manner; see `CorrectionStore` for their history.
         Raises `IdempotencyConflict`; a known key with the same fingerprint returns the first result.
         """
         ...
@@ -226,11 +241,11 @@ class UnitStore(Protocol):
     """Units and benches: what is declared of them."""
 
     def put_unit(self, unit: Unit) -> None:
-        """Create or replace; the calibrations of the record are not stored here (`ResultStore` has them)."""
+        """Create or replace; calibrations and corrections of the record are not stored here: `ResultStore` has them."""
         ...
 
     def unit(self, serial: str) -> Unit:
-        """With its current calibration. Raises `NotFound`."""
+        """With its current calibration and corrections. Raises `NotFound`."""
         ...
 
     def units(self) -> tuple[Unit, ...]: ...
@@ -261,7 +276,11 @@ class Stores:
     """All memory of one service."""
 
     jobs: JobStore
+    queue: QueueStore
+    reservations: ReservationStore
     recordings: RecordingStore
     results: ResultStore
     units: UnitStore
     campaigns: CampaignStore
+    corrections: CorrectionStore
+    live: LiveStore

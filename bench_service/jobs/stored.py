@@ -107,6 +107,8 @@ class StoredResult:
     job_id: str | None = None
     seed: int | None = None
     context: dict[str, Any] = field(default_factory=dict[str, Any])
+    corrections: tuple[str, ...] = ()
+    """Ids of correction sets used."""
 
 
 @dataclass(frozen=True)

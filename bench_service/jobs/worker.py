@@ -1,7 +1,7 @@
-"""The worker of a bench: the job engine, loaded and launched beside the first answers of the service.
+"""The worker of a bench: the job engine, loaded and launched beside the service's first answers, and its dispatcher.
 
 The engine takes longer to load than everything else together. A service that is asked whether it lives can say so
-meanwhile; whoever needs the engine waits for it.
+meanwhile; jobs that are submitted meanwhile wait in the queue.
 """
 
 import logging
@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from threading import Event, Thread
 from typing import Protocol
 
+from bench_service.jobs.dispatcher import JobEngine
 from bench_service.jobs.errors import NotDriving
 from bench_service.jobs.job import Job
 from bench_service.jobs.runner import JobRunner
@@ -16,12 +17,12 @@ from bench_service.jobs.runner import JobRunner
 log = logging.getLogger(__name__)
 
 
-class JobEngine(Protocol):
-    """What the worker needs of `bench_service.jobs.engine.Engine`."""
+class JobDispatcher(Protocol):
+    """What the worker needs of `bench_service.jobs.dispatcher.Dispatcher`."""
 
-    def launch(self) -> None: ...
+    def begin(self) -> None: ...
 
-    def enqueue(self, job: Job) -> None: ...
+    def wake(self) -> None: ...
 
     def shut_down(self) -> None: ...
 
@@ -29,10 +30,17 @@ class JobEngine(Protocol):
 class Worker:
     """Runs the jobs of one bench from `begin` to `shut_down`."""
 
-    def __init__(self, runner: JobRunner, make_engine: Callable[[JobRunner], JobEngine]) -> None:
+    def __init__(
+        self,
+        runner: JobRunner,
+        make_engine: Callable[[JobRunner], JobEngine],
+        make_dispatcher: Callable[[JobRunner, JobEngine], JobDispatcher],
+    ) -> None:
         self._runner = runner
         self._make_engine = make_engine
+        self._make_dispatcher = make_dispatcher
         self._engine: JobEngine | None = None
+        self._dispatcher: JobDispatcher | None = None
         self._failure: Exception | None = None
         self._begun = Event()
         self._thread: Thread | None = None
@@ -49,8 +57,13 @@ class Worker:
             raise NotDriving(f"the job engine did not start: {self._failure}")
         return self._engine
 
+    def wake(self) -> None:
+        """There may be something to do: a job was queued, a bench released."""
+        if self._dispatcher is not None:
+            self._dispatcher.wake()
+
     def running_job(self) -> Job | None:
-        """The job that drives the bench now."""
+        """The job whose bench is open in this process."""
         return self._runner.running_job()
 
     def shut_down(self) -> None:
@@ -59,6 +72,8 @@ class Worker:
             return
         self._runner.shut_down()
         self._begun.wait()
+        if self._dispatcher is not None:
+            self._dispatcher.shut_down()
         if self._engine is not None:
             self._engine.shut_down()
 
@@ -66,6 +81,8 @@ class Worker:
         try:
             engine = self._make_engine(self._runner)
             engine.launch()
+            self._dispatcher = self._make_dispatcher(self._runner, engine)
+            self._dispatcher.begin()
             self._engine = engine
         except Exception as failure:  # said to whoever asks, see `require_engine`
             log.exception("the job engine did not start")

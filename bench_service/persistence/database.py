@@ -5,15 +5,16 @@ a station that the job engine counts as done would have lost its samples. The pr
 Writers begin with ``BEGIN IMMEDIATE``, so two processes queue for the lock instead of failing in mid-transaction.
 """
 
+import hashlib
 import json
 import sqlite3
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event, make_url
+from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
 from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError, SQLAlchemyError
 from sqlalchemy.orm import Session
 
@@ -23,6 +24,7 @@ from bench_service.jobs.errors import StorageFailure, StorageFull
 BUSY_S = 30.0
 """How long a writer waits for another one."""
 
+_NEWS = "news"
 _SQLITE_FULL = frozenset({sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_SHMSIZE})
 _POSTGRES_FULL = frozenset({"53100"})
 
@@ -37,6 +39,7 @@ class Database:
     def __init__(self, engine: Engine) -> None:
         self.engine = engine
         self._writing_engine = engine.execution_options(bench_write=True)
+        self._tell: list[Callable[[str], None]] = []
 
     @contextmanager
     def read(self) -> Generator[Session, None, None]:
@@ -47,14 +50,32 @@ class Database:
     @contextmanager
     def write(self) -> Generator[Session, None, None]:
         """A transaction that commits at the end, or leaves nothing behind. Raises `StorageFull`, `StorageFailure`."""
+        news: list[str] = []
         with storage_errors(), Session(self._writing_engine, expire_on_commit=False) as session, session.begin():
+            session.info[_NEWS] = news
             yield session
+        for subject in dict.fromkeys(news):
+            for tell in self._tell:
+                tell(subject)
+
+    def on_news(self, tell: Callable[[str], None]) -> None:
+        """From now on call `tell` after each commit with every subject that was announced in it; it may not raise."""
+        self._tell.append(tell)
 
     @contextmanager
     def write_connection(self) -> Generator[Connection, None, None]:
         """The same for work below the tables: migrations."""
         with storage_errors(), self._writing_engine.begin() as connection:
             yield connection
+
+    def one_at_a_time(self, session: Session, what: str) -> None:
+        """In a writing transaction: go on only once no other one that said the same words is open.
+
+        On SQLite writers queue for the whole database anyway.
+        """
+        if self.is_postgres:
+            key = int.from_bytes(hashlib.sha256(what.encode()).digest()[:8], "big", signed=True)
+            session.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": key})
 
     @property
     def is_postgres(self) -> bool:
@@ -63,6 +84,11 @@ class Database:
     def dispose(self) -> None:
         """Close all connections."""
         self.engine.dispose()
+
+
+def announce(session: Session, subject: str) -> None:
+    """Once this writing transaction is committed, who wants to know is told of a subject: see `Database.on_news`."""
+    session.info[_NEWS].append(subject)
 
 
 def connect(database_url: str) -> Database:

@@ -1,4 +1,5 @@
-"""Where the job engine keeps its own books: beside our SQLite file, or in a schema of the same Postgres database.
+"""Where the job engine of a bench keeps its own books: a file beside our SQLite file, or a schema of the same Postgres
+database, which the engines of all benches share.
 
 On SQLite the books are written with ``synchronous=NORMAL``: a power cut may take back their last entries, and then a
 step is done again, which every step allows; what we acknowledge ourselves is written with FULL.
@@ -18,10 +19,10 @@ class _Books(sqlite3.Connection):
         self.execute("PRAGMA synchronous=NORMAL")
 
 
-def engine_database(database_url: str) -> tuple[str, dict[str, Any]]:
-    """URL and connection options of the engine's database for ours. An SQLite file is switched to WAL here."""
+def engine_database(database_url: str, bench_id: str) -> tuple[str, dict[str, Any]]:
+    """URL and connection options of the database of a bench's engine. An SQLite file is switched to WAL here."""
     if make_url(database_url).get_backend_name() != "sqlite":
         return database_url, {}
-    beside = f"{database_url}.jobs"
+    beside = f"{database_url}.{bench_id}.jobs"
     connect(beside).dispose()
     return beside, {"connect_args": {"factory": _Books}}

@@ -4,18 +4,19 @@ Every change reads the job's row under a lock (`FOR UPDATE`; on SQLite the writi
 processes that want different ends for one job, one wins and the other is told `IllegalTransition`.
 """
 
+from collections.abc import Callable
 from datetime import datetime
 from typing import Any
 
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session
 
 from bench_service.jobs.errors import IllegalTransition, NotFound
-from bench_service.jobs.job import FINAL, LEGAL, Event, Failure, Job, JobState
+from bench_service.jobs.job import FINAL, Event, Failure, Job, JobState
 from bench_service.jobs.stored import Idempotency, Page
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
-from bench_service.persistence.job_rows import event_of_row, failure_document, job_of_row, row_of_job
+from bench_service.persistence.job_changes import append_event, found_job, move_job
+from bench_service.persistence.job_rows import event_of_row, job_of_row, row_of_job
 from bench_service.persistence.pages import page
 from bench_service.persistence.tables import EventRow, JobRow
 from procedures.core.limits import Verdict
@@ -32,18 +33,18 @@ class SqlJobStore:
             with self._database.write() as session:
                 known = made_before(session, idempotency, "job")
                 if known is not None:
-                    return job_of_row(_found(session, known))
+                    return job_of_row(found_job(session, known))
                 remember(session, idempotency, "job", job.id, job.created_at)
                 session.add(row_of_job(job))
                 session.flush()
-                _append(session, job.id, "state", job.created_at, {"state": job.state.value})
+                append_event(session, job.id, "state", job.created_at, {"state": job.state.value})
                 return job
 
         return again_after_conflict(once)
 
     def get(self, job_id: str) -> Job:
         with self._database.read() as session:
-            return job_of_row(_found(session, job_id))
+            return job_of_row(found_job(session, job_id))
 
     def list(
         self,
@@ -81,69 +82,77 @@ class SqlJobStore:
         result_id: str | None = None,
     ) -> Job:
         with self._database.write() as session:
-            row = _found(session, job_id, lock=True)
+            row = found_job(session, job_id, lock=True)
             if row.state != to.value:
-                _move(session, row, to, at, verdict, failure, result_id)
+                move_job(session, row, to, at, verdict, failure, result_id)
             return job_of_row(row)
 
     def station_done(self, job_id: str, station: int, at: datetime, data: dict[str, Any]) -> Job:
         with self._database.write() as session:
-            row = _found(session, job_id, lock=True)
+            row = found_job(session, job_id, lock=True)
             if row.stations_done <= station:
                 row.stations_done = station + 1
-                _append(session, job_id, "station", at, {"station": station, **data})
+                append_event(session, job_id, "station", at, {"station": station, **data})
             return job_of_row(row)
 
     def set_context(self, job_id: str, context: dict[str, Any]) -> Job:
         with self._database.write() as session:
-            row = _found(session, job_id, lock=True)
+            row = found_job(session, job_id, lock=True)
             row.context = context
             return job_of_row(row)
 
     def request_cancel(self, job_id: str, at: datetime) -> Job:
         with self._database.write() as session:
-            row = _found(session, job_id, lock=True)
+            row = found_job(session, job_id, lock=True)
             state = JobState(row.state)
             if state in FINAL:
                 raise IllegalTransition(f"job {job_id} has ended: it is {state.value}, and cannot be cancelled")
             if state in (JobState.QUEUED, JobState.PAUSED, JobState.INTERRUPTED):
                 row.cancel_requested = True
-                _move(session, row, JobState.CANCELLED, at, None, None, None)
+                move_job(session, row, JobState.CANCELLED, at)
             elif not row.cancel_requested:
                 row.cancel_requested = True
-                _append(session, job_id, "note", at, {"cancel_requested": True})
+                append_event(session, job_id, "note", at, {"cancel_requested": True})
             return job_of_row(row)
 
     def request_pause(self, job_id: str, at: datetime) -> Job:
         with self._database.write() as session:
-            row = _found(session, job_id, lock=True)
+            row = found_job(session, job_id, lock=True)
             state = JobState(row.state)
             if state is JobState.RUNNING:
                 if not row.pause_requested:
                     row.pause_requested = True
-                    _append(session, job_id, "note", at, {"pause_requested": True})
+                    append_event(session, job_id, "note", at, {"pause_requested": True})
             elif state is not JobState.PAUSED:
-                _move(session, row, JobState.PAUSED, at, None, None, None)
+                move_job(session, row, JobState.PAUSED, at)
             return job_of_row(row)
 
     def put_aside(self, job_id: str, at: datetime) -> Job:
         with self._database.write() as session:
-            row = _found(session, job_id, lock=True)
+            row = found_job(session, job_id, lock=True)
             if JobState(row.state) is JobState.RUNNING:
                 wanted = row.pause_requested
-                _move(session, row, JobState.PAUSED, at, None, None, None)
+                move_job(session, row, JobState.PAUSED, at)
                 if not wanted:
-                    _move(session, row, JobState.QUEUED, at, None, None, None)
+                    move_job(session, row, JobState.QUEUED, at)
             return job_of_row(row)
 
     def resume(self, job_id: str, at: datetime) -> Job:
         with self._database.write() as session:
-            row = _found(session, job_id, lock=True)
+            row = found_job(session, job_id, lock=True)
             if JobState(row.state) is JobState.RUNNING and row.pause_requested:
                 row.pause_requested = False
-                _append(session, job_id, "note", at, {"pause_requested": False})
+                append_event(session, job_id, "note", at, {"pause_requested": False})
                 return job_of_row(row)
-            _move(session, row, JobState.QUEUED, at, None, None, None)
+            job = job_of_row(row)
+            if job.state in FINAL and not job.resumable:
+                why = "" if job.failure is None else f" ({job.failure.kind}: {job.failure.message})"
+                raise IllegalTransition(f"job {job_id} is {row.state}{why}; it cannot be resumed")
+            move_job(session, row, JobState.QUEUED, at)
+            row.not_before = None
+            if row.deadline_at is not None and row.deadline_at < at:  # it would fail again at once
+                append_event(session, job_id, "note", at, {"deadline_lifted": row.deadline_at.isoformat()})
+                row.deadline_at = None
             return job_of_row(row)
 
     def cancel_requested(self, job_id: str) -> bool:
@@ -155,8 +164,8 @@ class SqlJobStore:
 
     def note(self, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
         with self._database.write() as session:
-            _found(session, job_id, lock=True)
-            _append(session, job_id, kind, at, data)
+            found_job(session, job_id, lock=True)
+            append_event(session, job_id, kind, at, data)
 
     def events(self, job_id: str, after: int = 0, limit: int = 1000) -> tuple[Event, ...]:
         query = (
@@ -171,51 +180,13 @@ class SqlJobStore:
                 raise NotFound("job", job_id)
         return events
 
+    def last_event(self, job_id: str) -> tuple[int, JobState]:
+        newest = select(func.max(EventRow.sequence)).where(EventRow.job_id == job_id).scalar_subquery()
+        with self._database.read() as session:
+            row = session.execute(select(newest, JobRow.state).where(JobRow.id == job_id)).one_or_none()
+        if row is None:
+            raise NotFound("job", job_id)
+        return row[0] or 0, JobState(row[1])
 
-def _found(session: Session, job_id: str, *, lock: bool = False) -> JobRow:
-    query = select(JobRow).where(JobRow.id == job_id)
-    row = session.scalar(query.with_for_update() if lock else query)
-    if row is None:
-        raise NotFound("job", job_id)
-    return row
-
-
-def _move(
-    session: Session,
-    row: JobRow,
-    to: JobState,
-    at: datetime,
-    verdict: Verdict | None,
-    failure: Failure | None,
-    result_id: str | None,
-) -> None:
-    """Change the state of a locked row, with what goes with it, and say so in an event."""
-    before = JobState(row.state)
-    if to not in LEGAL[before]:
-        raise IllegalTransition(f"job {row.id} is {before.value}; it cannot become {to.value}")
-    if verdict is None and to is JobState.FAILED:
-        verdict = Verdict.ERROR
-    row.state = to.value
-    data: dict[str, Any] = {"state": to.value, "before": before.value}
-    if to is JobState.QUEUED:
-        row.verdict = row.failure = row.finished_at = row.result_id = None
-        row.cancel_requested = row.pause_requested = False
-        row.attempt += 1
-    elif to is JobState.RUNNING:
-        row.started_at = row.started_at or at
-    elif to is not JobState.PAUSED:
-        row.finished_at = at
-    if verdict is not None:
-        row.verdict = data["verdict"] = verdict.value
-    if failure is not None:
-        row.failure = data["failure"] = failure_document(failure)
-    if result_id is not None:
-        row.result_id = data["result_id"] = result_id
-    _append(session, row.id, "state", at, data)
-
-
-def _append(session: Session, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
-    """Add the next event of a job whose row is locked."""
-    last = session.scalar(select(func.max(EventRow.sequence)).where(EventRow.job_id == job_id)) or 0
-    session.add(EventRow(job_id=job_id, sequence=last + 1, at=at, kind=kind, data=data))
-    session.flush()
+    def on_event(self, tell: Callable[[str], None]) -> None:
+        self._database.on_news(tell)

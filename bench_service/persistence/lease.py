@@ -15,6 +15,7 @@ from typing import Protocol
 
 from sqlalchemy import URL, Connection, create_engine, make_url, text
 from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.orm import Session
 from sqlalchemy.pool import NullPool
 
 from bench_service import wall_clock
@@ -26,6 +27,8 @@ class BenchLease(Protocol):
     """The right to drive a bench, held for a process's life, and whether it is still ours."""
 
     def held(self) -> bool: ...
+
+    def regain(self) -> bool: ...
 
     def release(self) -> None: ...
 
@@ -55,15 +58,8 @@ class FileLease:
     def __init__(self, path: Path, bench_id: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._path = path
-        self._file: int | None = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            holder = _written_holder(self._file)
-            os.close(self._file)
-            raise BenchBusy(f"bench {bench_id!r} is driven by {_process(holder)}") from None
-        os.ftruncate(self._file, 0)
-        os.pwrite(self._file, f"{os.getpid()}\n".encode(), 0)
+        self._bench_id = bench_id
+        self._file: int | None = self._locked()
 
     def held(self) -> bool:
         """Whether the locked file is still the one that others would lock."""
@@ -76,11 +72,33 @@ class FileLease:
         here = os.fstat(self._file)
         return (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino)
 
+    def regain(self) -> bool:
+        """Lock the file that is there now, after ours was taken away; False where somebody else was first."""
+        self.release()
+        try:
+            self._file = self._locked()
+        except (BenchBusy, OSError):
+            return False
+        return True
+
     def release(self) -> None:
         """Give the bench back; a second time does nothing."""
         if self._file is not None:
             os.close(self._file)
             self._file = None
+
+    def _locked(self) -> int:
+        """The file, locked, with our process id in it. Raises `BenchBusy`."""
+        file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            holder = _written_holder(file)
+            os.close(file)
+            raise BenchBusy(f"bench {self._bench_id!r} is driven by {_process(holder)}") from None
+        os.ftruncate(file, 0)
+        os.pwrite(file, f"{os.getpid()}\n".encode(), 0)
+        return file
 
 
 class ServerLease:
@@ -88,7 +106,9 @@ class ServerLease:
 
     def __init__(self, url: URL, bench_id: str) -> None:
         self._mutex = threading.Lock()
-        engine = create_engine(
+        self._bench_id = bench_id
+        self._key = lease_key(bench_id)
+        self._engine = create_engine(
             url,
             poolclass=NullPool,
             isolation_level="AUTOCOMMIT",
@@ -101,13 +121,7 @@ class ServerLease:
                 "tcp_user_timeout": 10_000,
             },
         )
-        key = int.from_bytes(hashlib.sha256(f"bench lease {bench_id}".encode()).digest()[:8], "big", signed=True)
-        connection = engine.connect()
-        if not connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": key}):
-            holder = _holder(connection, key)
-            connection.close()
-            raise BenchBusy(f"bench {bench_id!r} is driven by {holder}")
-        self._connection: Connection | None = connection
+        self._connection: Connection | None = self._locked()
 
     def held(self) -> bool:
         """Ask the server over the connection that has the lock: while it answers, the lock is ours."""
@@ -121,10 +135,29 @@ class ServerLease:
                 return False
             return True
 
+    def regain(self) -> bool:
+        """Lock again over a new connection, after the old one ended; False where that cannot be done now."""
+        with self._mutex:
+            self._drop()
+            try:
+                self._connection = self._locked()
+            except (BenchBusy, SQLAlchemyError):
+                return False
+            return True
+
     def release(self) -> None:
         """Give the bench back; a second time does nothing."""
         with self._mutex:
             self._drop()
+
+    def _locked(self) -> Connection:
+        """A connection that has the lock. Raises `BenchBusy`, and the driver's errors."""
+        connection = self._engine.connect()
+        if not connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": self._key}):
+            who = holder(connection, self._key)
+            connection.close()
+            raise BenchBusy(f"bench {self._bench_id!r} is driven by {who or 'another process'}")
+        return connection
 
     def _drop(self) -> None:
         if self._connection is not None:
@@ -137,8 +170,13 @@ def _process(holder: str) -> str:
     return f"process {holder}" if holder else "another process"
 
 
-def _holder(connection: Connection, key: int) -> str:
-    """Who has an advisory lock, in the words of its connection."""
+def lease_key(bench_id: str) -> int:
+    """The advisory lock of a bench."""
+    return int.from_bytes(hashlib.sha256(f"bench lease {bench_id}".encode()).digest()[:8], "big", signed=True)
+
+
+def holder(connection: Connection | Session, key: int) -> str | None:
+    """Who has an advisory lock, in the words of its connection; None where nobody has it."""
     query = text(
         "SELECT a.application_name FROM pg_locks l JOIN pg_stat_activity a ON a.pid = l.pid "
         "WHERE l.locktype = 'advisory' AND l.granted AND l.objsubid = 1 "
@@ -146,5 +184,5 @@ def _holder(connection: Connection, key: int) -> str:
         "AND l.database = (SELECT oid FROM pg_database WHERE datname = current_database())"
     )
     low, high = key & 0xFFFFFFFF, (key >> 32) & 0xFFFFFFFF
-    name = connection.scalar(query, {"high": high, "low": low})
-    return f"{name!r}" if name else "another process"
+    row = connection.execute(query, {"high": high, "low": low}).first()
+    return None if row is None else f"{row[0]!r}" if row[0] else "another process"

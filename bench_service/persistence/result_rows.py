@@ -6,6 +6,7 @@ from pydantic import TypeAdapter
 
 from bench_service.jobs.stored import StoredCalibration, StoredResult
 from bench_service.persistence.tables import CalibrationRow, ResultCalibrationRow, ResultRecordingRow, ResultRow
+from bench_service.persistence.tables_around_jobs import ResultCorrectionRow
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 
@@ -46,7 +47,10 @@ def lineage_rows(result: StoredResult) -> tuple[ResultRecordingRow | ResultCalib
 
 
 def result_of_row(
-    row: ResultRow, recordings: Iterable[ResultRecordingRow], calibrations: Iterable[ResultCalibrationRow]
+    row: ResultRow,
+    recordings: Iterable[ResultRecordingRow],
+    calibrations: Iterable[ResultCalibrationRow],
+    corrections: Iterable[ResultCorrectionRow],
 ) -> StoredResult:
     """The result that rows keep; lineage in the order of its positions."""
     return StoredResult(
@@ -66,6 +70,7 @@ def result_of_row(
         job_id=row.job_id,
         seed=row.seed,
         context=row.context,
+        corrections=tuple(c.correction_id for c in corrections),
     )
 
 

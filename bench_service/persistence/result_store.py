@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 from bench_service import wall_clock
 from bench_service.jobs.errors import NotFound
 from bench_service.jobs.stored import Idempotency, Page, StoredCalibration, StoredResult
+from bench_service.persistence.correction_rows import add_corrections, check_corrections, correction_lineage
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.pages import page
@@ -27,7 +28,9 @@ from bench_service.persistence.tables import (
     ResultRecordingRow,
     ResultRow,
 )
+from bench_service.persistence.tables_around_jobs import ResultCorrectionRow
 from procedures.core.imu_model import TriadCalibration
+from procedures.core.unit_correction import UnitCorrection
 
 
 class SqlResultStore:
@@ -42,9 +45,12 @@ class SqlResultStore:
         calibrations: Sequence[TriadCalibration] = (),
         make_current: bool = True,
         idempotency: Idempotency | None = None,
+        corrections: Sequence[UnitCorrection] = (),
     ) -> StoredResult:
-        if calibrations and result.unit is None:
-            raise ValueError("a calibration needs the unit that it belongs to")
+        if (calibrations or corrections) and result.unit is None:
+            raise ValueError("a calibration or correction needs the unit that it belongs to")
+        if len({c.kind for c in corrections}) < len(corrections):
+            raise ValueError("a result gives at most one correction of a kind")
 
         def once() -> StoredResult:
             with self._database.write() as session:
@@ -55,9 +61,10 @@ class SqlResultStore:
                 _check_lineage(session, result)
                 session.add(row_of_result(result))
                 session.flush()
-                session.add_all(lineage_rows(result))
+                session.add_all([*lineage_rows(result), *correction_lineage(result)])
                 if calibrations:
                     _add_calibration(session, result, calibrations, make_current)
+                add_corrections(session, result, corrections, make_current)
                 return result
 
         return again_after_conflict(once)
@@ -136,10 +143,11 @@ def _found(session: Session, result_id: str) -> ResultRow:
 
 
 def _results(session: Session, rows: Sequence[ResultRow]) -> tuple[StoredResult, ...]:
-    """Results with their lineage, in two queries however many they are."""
+    """Results with their lineage, in three queries however many they are."""
     ids = [row.id for row in rows]
     recordings: dict[str, list[ResultRecordingRow]] = defaultdict(list)
     calibrations: dict[str, list[ResultCalibrationRow]] = defaultdict(list)
+    corrections: dict[str, list[ResultCorrectionRow]] = defaultdict(list)
     if ids:
         used = select(ResultRecordingRow).where(ResultRecordingRow.result_id.in_(ids))
         for recording in session.scalars(used.order_by(ResultRecordingRow.position)):
@@ -147,7 +155,10 @@ def _results(session: Session, rows: Sequence[ResultRow]) -> tuple[StoredResult,
         applied = select(ResultCalibrationRow).where(ResultCalibrationRow.result_id.in_(ids))
         for calibration in session.scalars(applied.order_by(ResultCalibrationRow.position)):
             calibrations[calibration.result_id].append(calibration)
-    return tuple(result_of_row(row, recordings[row.id], calibrations[row.id]) for row in rows)
+        corrected = select(ResultCorrectionRow).where(ResultCorrectionRow.result_id.in_(ids))
+        for correction in session.scalars(corrected.order_by(ResultCorrectionRow.position)):
+            corrections[correction.result_id].append(correction)
+    return tuple(result_of_row(row, recordings[row.id], calibrations[row.id], corrections[row.id]) for row in rows)
 
 
 def _check_lineage(session: Session, result: StoredResult) -> None:
@@ -158,6 +169,7 @@ def _check_lineage(session: Session, result: StoredResult) -> None:
     for calibration_id in result.calibrations:
         if session.scalar(select(CalibrationRow.id).where(CalibrationRow.id == calibration_id)) is None:
             raise NotFound("calibration", calibration_id)
+    check_corrections(session, result)
 
 
 def _add_calibration(

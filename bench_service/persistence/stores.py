@@ -1,11 +1,15 @@
-"""Putting the stores together: one database, five stores. Must not know who uses them."""
+"""Putting the stores together: one database, all stores. Must not know who uses them."""
 
 from bench_service.jobs.store import Stores
 from bench_service.persistence.campaign_store import SqlCampaignStore
+from bench_service.persistence.correction_store import SqlCorrectionStore
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.job_store import SqlJobStore
+from bench_service.persistence.live_store import SqlLiveStore
 from bench_service.persistence.migration import upgrade_to_head
+from bench_service.persistence.queue_store import SqlQueueStore
 from bench_service.persistence.recording_store import SqlRecordingStore
+from bench_service.persistence.reservation_store import SqlReservationStore
 from bench_service.persistence.result_store import SqlResultStore
 from bench_service.persistence.unit_store import SqlUnitStore
 
@@ -25,8 +29,12 @@ def stores_of(database: Database) -> Stores:
     """The stores of a database that is in the newest form."""
     return Stores(
         jobs=SqlJobStore(database),
+        queue=SqlQueueStore(database),
+        reservations=SqlReservationStore(database),
         recordings=SqlRecordingStore(database),
         results=SqlResultStore(database),
         units=SqlUnitStore(database),
         campaigns=SqlCampaignStore(database),
+        corrections=SqlCorrectionStore(database),
+        live=SqlLiveStore(database),
     )

@@ -1,21 +1,34 @@
-"""Units and benches in SQL: what is declared of them. Calibrations are the result store's: only joined here."""
+"""Units and benches in SQL: what is declared of them. Calibrations and corrections are the result
+store's: only joined here."""
 
 from typing import Any
 
 from pydantic import TypeAdapter
 from sqlalchemy import delete, select
+from sqlalchemy.orm import aliased
 
 from bench_service import wall_clock
 from bench_service.jobs.errors import NotFound
 from bench_service.jobs.stored import BenchStop
+from bench_service.persistence.correction_rows import CORRECTION
 from bench_service.persistence.database import Database
 from bench_service.persistence.result_rows import TRIADS
 from bench_service.persistence.tables import BenchRow, BenchStopRow, CalibrationRow, UnitRow
+from bench_service.persistence.tables_around_jobs import CorrectionRow
 from procedures.bench import BenchDescription
 from procedures.core.unit import Unit
 
 UNIT = TypeAdapter(Unit)
 BENCH = TypeAdapter(BenchDescription)
+_JOINED = {
+    "calibrations",
+    "calibration_id",
+    "thermal_correction",
+    "thermal_correction_id",
+    "converter",
+    "converter_id",
+}
+"""What other tables know of a unit."""
 
 
 class SqlUnitStore:
@@ -25,7 +38,7 @@ class SqlUnitStore:
         self._database = database
 
     def put_unit(self, unit: Unit) -> None:
-        document = UNIT.dump_python(unit, mode="json", exclude={"calibrations", "calibration_id"})
+        document = UNIT.dump_python(unit, mode="json", exclude=_JOINED)
         with self._database.write() as session:
             session.merge(UnitRow(serial=unit.serial, document=document, updated_at=wall_clock.now()))
 
@@ -74,11 +87,40 @@ class SqlUnitStore:
             return None if row is None else BenchStop(row.bench, row.at, row.reason)
 
 
-_UNITS = select(UnitRow.document, CalibrationRow.triads, CalibrationRow.id).outerjoin(
-    CalibrationRow, (CalibrationRow.unit == UnitRow.serial) & CalibrationRow.is_current
+_THERMAL, _CONVERTER = aliased(CorrectionRow), aliased(CorrectionRow)
+_UNITS = (
+    select(
+        UnitRow.document,
+        CalibrationRow.triads,
+        CalibrationRow.id,
+        _THERMAL.document,
+        _THERMAL.id,
+        _CONVERTER.document,
+        _CONVERTER.id,
+    )
+    .outerjoin(CalibrationRow, (CalibrationRow.unit == UnitRow.serial) & CalibrationRow.is_current)
+    .outerjoin(_THERMAL, (_THERMAL.unit == UnitRow.serial) & (_THERMAL.kind == "thermal") & _THERMAL.is_current)
+    .outerjoin(
+        _CONVERTER, (_CONVERTER.unit == UnitRow.serial) & (_CONVERTER.kind == "converter") & _CONVERTER.is_current
+    )
 )
 
 
-def _unit(document: dict[str, Any], triads: list[Any] | None, calibration_id: str | None) -> Unit:
-    calibrations = TRIADS.validate_python(triads or [])
-    return UNIT.validate_python({**document, "calibrations": calibrations, "calibration_id": calibration_id})
+def _unit(
+    document: dict[str, Any],
+    triads: list[Any] | None,
+    calibration_id: str | None,
+    thermal: dict[str, Any] | None,
+    thermal_id: str | None,
+    converter: dict[str, Any] | None,
+    converter_id: str | None,
+) -> Unit:
+    joined: dict[str, Any] = {
+        "calibrations": TRIADS.validate_python(triads or []),
+        "calibration_id": calibration_id,
+        "thermal_correction": None if thermal is None else CORRECTION.validate_python(thermal).thermal,
+        "thermal_correction_id": thermal_id,
+        "converter": None if converter is None else CORRECTION.validate_python(converter).converter,
+        "converter_id": converter_id,
+    }
+    return UNIT.validate_python({**document, **joined})

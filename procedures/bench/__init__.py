@@ -46,3 +46,6 @@ class Bench:
     def checkpoint(self) -> dict[str, Any] | None:
         """What a simulated world needs to go on from here after a restart; a real bench has None: it never stops."""
         return None
+
+    def close(self) -> None:
+        """Give the devices' links back; the bench cannot be used after. One without links has nothing to do."""

@@ -6,6 +6,7 @@ BenchError
 ├── NotPowered      a reading was asked of a unit that is switched off
 ├── DeviceFault     a device reports a fault; it is never reset by itself
 ├── Disconnected    a device does not answer
+├── DeviceBusy      another process has the device's link, which admits one master
 └── Stopped         an operator's stop or cancel ended the work
 """
 
@@ -32,6 +33,10 @@ class DeviceFault(BenchError):
 
 class Disconnected(BenchError):
     """A device does not answer."""
+
+
+class DeviceBusy(BenchError):
+    """Another process has the device's link, which admits one master."""
 
 
 class Stopped(BenchError):

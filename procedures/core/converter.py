@@ -8,7 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from procedures.core import units
 from procedures.core.arrays import Array
+
+CURRENT_MA_PER_M_S2 = 1.1 / units.STANDARD_GRAVITY
+"""Of an accelerometer's nominal output: 1.1 mA a standard g (thesis table 1.3)."""
 
 
 @dataclass(frozen=True)
@@ -58,3 +62,26 @@ class ConverterModel:
     def current_ma(self, code: Array, temperature_c: Array) -> Array:
         """Input current of codes (n,) at temperatures (n,): what stage two is given."""
         return (code - self.zero.value(temperature_c)) / self.scale.value(temperature_c)
+
+
+ConverterTriad = tuple[ConverterModel, ConverterModel, ConverterModel]
+"""The channels x, y, z."""
+
+
+def at_reference(
+    output_m_s2: Array, converter_c: Array, models: ConverterTriad, ma_per_m_s2: float = CURRENT_MA_PER_M_S2
+) -> Array:
+    """Stage one (paper C): nominal outputs as if the converter had stood at its models' references, (n, 3) [m/s²].
+
+    ``V₁ = (V − Fs(t)/(K0·c))/Fc(t)``: the departure of zero and scale is taken out; what they are at the reference, N0
+    and K0, stays, because a calibration of the assembled unit finds it as a part of its bias and scale factor.
+
+    `output_m_s2` nominal outputs (n, 3); `converter_c` the converter's own sensor (n,) [°C]; `ma_per_m_s2` c, the
+    accelerometers' nominal current.
+    """
+    columns = [
+        (output_m_s2[:, i] - m.zero.function(converter_c) / (m.scale.at_reference * ma_per_m_s2))
+        / m.scale.function(converter_c)
+        for i, m in enumerate(models)
+    ]
+    return np.column_stack(columns)

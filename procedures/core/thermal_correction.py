@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from procedures.core.arrays import Array
+from procedures.core.converter import ConverterTriad
 from procedures.core.errors import BadParameter
 
 ALPHAS = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
@@ -109,6 +110,9 @@ class ThermalCorrection:
 
     triad: str
     axes: tuple[AxisCorrection, AxisCorrection, AxisCorrection]
+    first_stage: ConverterTriad | None = None
+    """The converter's models that were taken out of the outputs before the fit (`core.converter.at_reference`), and so
+    must be wherever the correction is used; None: it is for outputs as they are."""
 
     def apply(self, output_m_s2: Array, case_c: Array, converter_c: Array, dynamic: ArrayLike) -> Array:
         """Corrected specific forces (n, 3) [m/s²] of nominal outputs (n, 3).

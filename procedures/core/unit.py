@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass, field
 
+from procedures.core.converter import ConverterTriad
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import Channel
+from procedures.core.thermal_correction import ThermalCorrection
+from procedures.core.unit_correction import CorrectionKind
 
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
 """Form of a serial: what can stand in an address and in a file name."""
@@ -38,10 +41,20 @@ class Unit:
     """The current calibration, one entry a triad; empty before the first."""
     calibration_id: str | None = None
     """Which stored calibration that is."""
+    thermal_correction: ThermalCorrection | None = field(default=None, repr=False)
+    """The current correction of the kind "thermal", or None."""
+    thermal_correction_id: str | None = None
+    converter: ConverterTriad | None = field(default=None, repr=False)
+    """The current models of the signal converter, x, y, z, or None."""
+    converter_id: str | None = None
 
     def calibration(self, triad: str) -> TriadCalibration | None:
         """The current calibration of a triad, or None."""
         return next((c for c in self.calibrations if c.triad == triad), None)
+
+    def correction_id(self, kind: CorrectionKind) -> str | None:
+        """Id of the current correction of a kind, or None."""
+        return {"thermal": self.thermal_correction_id, "converter": self.converter_id}[kind]
 
     def triad(self, triad: str) -> TriadRecord | None:
         """The record of a triad by name."""

@@ -56,23 +56,21 @@ def response(truth: UnitThermalTruth, temperatures_c: Array) -> Response:
 def accelerometers(truths: Sequence[AccelerometerThermalTruth], temperatures_c: Array) -> tuple[Array, Array]:
     """Gain 1/(1 + A) and added −B [m/s²] of each channel, (n, 3) both."""
     departure = temperatures_c - REFERENCE_C
-    board = departure[:, CONVERTER]
-    gains, added = [], []
-    for truth in truths:
-        structure = departure[:, CASE] + truth.block_share * (departure[:, BLOCK] - departure[:, CASE])
-        torquer = _square(truth.scale_static, structure) + _square(truth.scale_dynamic, board)
-        rest = _square(truth.bias_static, structure) + _square(truth.bias_dynamic, board)
-        gains.append(1.0 / (1.0 + torquer))
-        added.append(-rest)
-    return np.column_stack(gains), np.column_stack(added)
+    case, block, board = (departure[:, [node]] for node in (CASE, BLOCK, CONVERTER))
+    share = np.array([t.block_share for t in truths])
+    structure = case + share * (block - case)
+    torquer = _square([t.scale_static for t in truths], structure)
+    torquer += _square([t.scale_dynamic for t in truths], board)
+    rest = _square([t.bias_static for t in truths], structure) + _square([t.bias_dynamic for t in truths], board)
+    return 1.0 / (1.0 + torquer), -rest
 
 
 def converters(truths: Sequence[ConverterTruth], board_c: Array) -> tuple[Array, Array]:
     """Gain Fc and change of zero Fs as nominal output [m/s²] at board temperatures (n,), (n, 3) both."""
-    departure = board_c - REFERENCE_C
-    gains = [1.0 + _square(t.scale_drift, departure) for t in truths]
-    zeros = [_square(t.zero_drift, departure) / (t.codes_a_ma * MA_PER_NOMINAL) for t in truths]
-    return np.column_stack(gains), np.column_stack(zeros)
+    departure = board_c[:, None] - REFERENCE_C
+    codes_per_nominal = MA_PER_NOMINAL * np.array([t.codes_a_ma for t in truths])
+    gain = 1.0 + _square([t.scale_drift for t in truths], departure)
+    return gain, _square([t.zero_drift for t in truths], departure) / codes_per_nominal
 
 
 def converter_codes(truth: ConverterTruth, current_ma: Array, board_c: Array) -> Array:
@@ -87,5 +85,7 @@ def gyros(truth: GyroThermalTruth, temperatures_c: Array) -> Array:
     return np.array(truth.fault_residue_rad_s_c) * (temperatures_c[:, GYRO] - REFERENCE_C)
 
 
-def _square(pair: tuple[float, float], departure: Array) -> Array:
-    return pair[0] * departure + pair[1] * departure**2
+def _square(pairs: Sequence[float] | Sequence[tuple[float, float]], departure: Array) -> Array:
+    """``p₁·d + p₂·d²`` of one pair, or of one for each channel: (n, channels) of d (n, 1) or (n, channels)."""
+    first, second = np.array(pairs).T
+    return (first + second * departure) * departure

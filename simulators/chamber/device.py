@@ -1,7 +1,7 @@
 """The chamber's port, and the unit's heat and thermometers beside it: implements `procedures.bench.chamber.Chamber`.
 
-Knows the bench's clock only as a number of ticks that pass. Temperatures are made once a second; within a second the
-response is that of its end.
+Knows the bench's clock only as a number of ticks that pass. Temperatures are made once a second; what the unit's
+outputs make of them, and what its sensors sent, hold from the end of that second to the end of the next.
 """
 
 from collections.abc import Callable
@@ -18,21 +18,7 @@ from simulators.chamber.behaviour import Response, response
 from simulators.chamber.plant import STEP_S, ChamberPlant
 from simulators.chamber.thermometers import Codes, Thermometers
 from simulators.truth import Array
-from simulators.truth.thermal import ChamberTruth, UnitThermalTruth
-
-FAULTS = ("heater_stuck", "control_sensor_stuck", "cooling_lost", "heating_lost", "link_lost")
-
-
-@dataclass(frozen=True)
-class Fault:
-    """Something breaks at a moment of bench time and stays broken."""
-
-    name: str
-    from_s: float
-
-    def __post_init__(self) -> None:
-        if self.name not in FAULTS or not 0.0 <= self.from_s < float("inf"):
-            raise ValueError(f"fault {self.name!r} from {self.from_s!r} s: one of {', '.join(FAULTS)}, from 0 s on")
+from simulators.truth.thermal import ChamberFault, ChamberTruth, UnitThermalTruth
 
 
 @dataclass(frozen=True)
@@ -47,6 +33,8 @@ class Warmth:
     """At which of the ticks, 1 … ticks, each second ended."""
     before_c: Array
     """(8,), at the end of the last second before these ticks: they hold until the first one ends."""
+    codes_before: Codes
+    """(5,), of that same second."""
 
 
 class SimChamber:
@@ -59,29 +47,31 @@ class SimChamber:
         seed: int,
         rate_hz: float,
         now_s: Callable[[], float],
-        faults: tuple[Fault, ...] = (),
+        faults: tuple[ChamberFault, ...] = (),
+        limits: ChamberLimits | None = None,
     ) -> None:
-        """`rate_hz`: ticks of the clock in a second; `now_s`: bench time."""
+        """`rate_hz`: ticks of the clock in a second; `now_s`: bench time; `limits`: None: all that the truth allows."""
         self.truth, self.unit = chamber, unit
         self.plant = ChamberPlant(chamber, unit.network, seed)
         self.thermometers = Thermometers(unit.thermometers, seed, chamber.ambient_c)
         self.faults = faults
         self._rate_hz, self._now_s = rate_hz, now_s
         self._ticks = 0
+        able = ChamberLimits(chamber.least_c, chamber.most_c, chamber.ramp_c_min, chamber.ambient_c)
+        self._limits = able if limits is None else limits
 
     @property
     def limits(self) -> ChamberLimits:
-        t = self.truth
-        return ChamberLimits(t.least_c, t.most_c, t.ramp_c_min, t.ambient_c)
+        return self._limits
 
     async def command(self, temperature_c: float, ramp_c_min: float) -> None:
         """Go to an air temperature; see the port."""
         self._need_link()
-        t, s = self.truth, self.plant.state
-        if not (isfinite(temperature_c) and t.least_c <= temperature_c <= t.most_c):
-            raise OutOfRange(f"temperature_c = {temperature_c!r} is outside {t.least_c:g} … {t.most_c:g}")
-        if not 0.0 < ramp_c_min <= t.ramp_c_min:
-            raise OutOfRange(f"ramp_c_min = {ramp_c_min!r} must be above 0 and at most {t.ramp_c_min:g}")
+        most, s = self._limits, self.plant.state
+        if not (isfinite(temperature_c) and most.minimum_c <= temperature_c <= most.maximum_c):
+            raise OutOfRange(f"temperature_c = {temperature_c!r} is outside {most.minimum_c:g} … {most.maximum_c:g}")
+        if not 0.0 < ramp_c_min <= most.ramp_c_min:
+            raise OutOfRange(f"ramp_c_min = {ramp_c_min!r} must be above 0 and at most {most.ramp_c_min:g}")
         if s.tripped:
             raise DeviceFault("the chamber's over-temperature limiter has tripped: a person must reset it")
         if s.door_open:
@@ -99,7 +89,7 @@ class SimChamber:
         """To ambient; a chamber that has tripped or stands open stays off."""
         self._need_link()
         if not (self.plant.state.tripped or self.plant.state.door_open):
-            self.plant.command(self.truth.ambient_c, self.truth.ramp_c_min / 60.0)
+            self.plant.command(self._limits.ambient_c, self._limits.ramp_c_min / 60.0)
 
     def unit_power(self, on: bool) -> None:
         """The unit's supply was switched: from the next second on it heats itself, or no more."""
@@ -121,11 +111,11 @@ class SimChamber:
         per_second = self._rate_hz * STEP_S
         first = int(self._ticks / per_second + 1e-9)
         seconds = int((self._ticks + ticks) / per_second + 1e-9) - first
-        before = np.array(self.plant.state.temperatures_c)
+        before, codes_before = np.array(self.plant.state.temperatures_c), self.thermometers.sent
         path = np.concatenate([before[None][:0], *self._pieces(first, seconds)])
         ends = tuple(round((first + k) * per_second) - self._ticks for k in range(1, seconds + 1))
         self._ticks += ticks
-        return Warmth(path, self.thermometers.read(first, path), ends, before)
+        return Warmth(path, self.thermometers.read(first, path), ends, before, codes_before)
 
     def _pieces(self, first: int, seconds: int) -> list[Array]:
         """Node temperatures of so many seconds, cut where something breaks."""

@@ -34,6 +34,9 @@ class Thermometers:
         self._lagged = np.full(len(self.truths), start_c)
         self._before = np.full(len(self.truths), start_c)
         self._last = [round((start_c + t.offset_c) / t.step_c) for t in self.truths]
+        self.sent = np.array(self._last, dtype=np.int32)
+        """Codes of the last second, (5,)."""
+        self.sent[[t.disconnected_from_s <= 0.0 for t in self.truths]] = DISCONNECTED_CODE
         self._offset, self._noise_sd, self._step, lag = (
             np.array([getattr(t, name) for t in self.truths]) for name in ("offset_c", "noise_c", "step_c", "lag_s")
         )
@@ -58,6 +61,7 @@ class Thermometers:
                 self._last[i] = int(codes[-1, i])
             if moments[-1] >= truth.disconnected_from_s:
                 codes[moments >= truth.disconnected_from_s, i] = DISCONNECTED_CODE
+        self.sent = codes[-1].copy()
         return codes
 
     def _lag(self, temperature: Array) -> Array:
@@ -86,9 +90,15 @@ class Thermometers:
 
     def checkpoint(self) -> dict[str, Any]:
         """State to resume from, JSON-ready."""
-        return {"lagged": self._lagged.tolist(), "before": self._before.tolist(), "last": list(self._last)}
+        return {
+            "lagged": self._lagged.tolist(),
+            "before": self._before.tolist(),
+            "last": list(self._last),
+            "sent": self.sent.tolist(),
+        }
 
     def resume(self, state: dict[str, Any]) -> None:
         """Go on from a checkpoint."""
         self._lagged, self._before = np.array(state["lagged"]), np.array(state["before"])
         self._last = [int(code) for code in state["last"]]
+        self.sent = np.array(state["sent"], dtype=np.int32)

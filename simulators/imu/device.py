@@ -10,23 +10,25 @@ from procedures.bench.errors import DeviceFault, NotPowered, OutOfRange
 from procedures.bench.imu import Stream
 from procedures.core.recording import Channel, Station
 from simulators.clock import Motion, SimClock
+from simulators.imu.climate import Climate
 from simulators.imu.counter import Counts
 from simulators.imu.sensor import TRIADS, TriadSensor
-from simulators.truth import UnitTruth, unit_channels
+from simulators.truth import UnitTruth, temperature_channels, unit_channels
 
 BLOCK_S = 10.0
 
 
 @dataclass
 class _Tape:
-    """Counts that a recording wants and has not handed on yet."""
+    """Counts that a recording wants and has not handed on yet: of its first channels, as many as it has."""
 
+    columns: int
     blocks: list[Counts] = field(default_factory=list)
     held: int = 0
     broken: bool = False
 
     def put(self, counts: Counts) -> None:
-        self.blocks.append(counts)
+        self.blocks.append(counts if counts.shape[1] == self.columns else np.array(counts[:, : self.columns]))
         self.held += len(counts)
 
     def take(self, count: int) -> Counts:
@@ -39,13 +41,17 @@ class _Tape:
 class SimImu:
     """A unit that counts from power-up to power-down, whether or not anybody reads it."""
 
-    def __init__(self, truth: UnitTruth, seed: int, clock: SimClock, launch: Callable[[], int]) -> None:
-        """`launch` says which power-up this is, 0 while the unit is off."""
+    def __init__(
+        self, truth: UnitTruth, seed: int, clock: SimClock, launch: Callable[[], int], thermal: bool = False
+    ) -> None:
+        """`launch` says which power-up this is, 0 while the unit is off; `thermal`: it will be told its climate."""
         self.truth = truth
+        self._thermal = thermal
         self._seed = seed
         self._clock = clock
         self._launch = launch
         self._channels = unit_channels(truth)
+        self._temperatures = temperature_channels(truth)
         self._sensors: dict[str, TriadSensor] = {}
         self._ticks = 0
         self._tapes: list[_Tape] = []
@@ -71,32 +77,48 @@ class SimImu:
         for tape in self._tapes:
             tape.broken = True
 
-    def feel(self, motion: Motion) -> None:
-        """Go through some motion; nothing happens while off."""
+    def feel(self, motion: Motion, climate: Climate | None = None) -> None:
+        """Go through some motion, in some climate where the world has one; nothing happens while off."""
         if not self._sensors:
             return
-        counts = np.empty((motion.ticks, 6), dtype=np.int32)
-        self._sensors["gyro"].feel(self._ticks, motion.ticks, motion.angle_rad, counts[:, :3].T)
-        self._sensors["accelerometer"].feel(self._ticks, motion.ticks, motion.velocity_m_s, counts[:, 3:].T)
+        width = max((tape.columns for tape in self._tapes), default=len(self._channels))
+        counts = np.empty((motion.ticks, width), dtype=np.int32)
+        gyro, accelerometer = (None, None) if climate is None else (climate.gyro, climate.accelerometer)
+        self._sensors["gyro"].feel(self._ticks, motion.ticks, motion.angle_rad, counts[:, :3].T, gyro)
+        self._sensors["accelerometer"].feel(
+            self._ticks, motion.ticks, motion.velocity_m_s, counts[:, 3:6].T, accelerometer
+        )
+        if climate is not None and width > len(self._channels):
+            counts[:, len(self._channels) :] = climate.codes_at_ticks()
         self._ticks += motion.ticks
         for tape in self._tapes:
             tape.put(counts)
 
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
-        """Begin a recording now; see the port. Time passes while its blocks are read."""
+        """Begin a recording now; see the port. Time passes while its blocks are read.
+
+        A station that wants temperatures gets their channels after the six, in whole seconds, held at the sample rate.
+        """
         self._need_power()
         if not 0.0 <= duration_s < float("inf"):
             raise OutOfRange(f"duration_s = {duration_s!r} must be finite and not negative")
+        warm = station is not None and station.temperatures
+        if warm and not self._thermal:
+            raise OutOfRange(
+                "station.temperatures = True: this bench was opened without its chamber; "
+                "only a job whose stations read temperatures opens it (needs.temperatures)"
+            )
+        channels = (*self._channels, *self._temperatures) if warm else self._channels
         samples = round(duration_s * self.rate_hz)
         start = self._clock.ticks
         launched_s = (start - self._ticks) / self.rate_hz
-        blocks = self._blocks(samples, start)
-        return Stream(self._channels, self.rate_hz, start / self.rate_hz, blocks, station, launched_s)
+        blocks = self._blocks(samples, start, len(channels))
+        return Stream(channels, self.rate_hz, start / self.rate_hz, blocks, station, launched_s)
 
-    async def _blocks(self, samples: int, start: int) -> AsyncIterator[Counts]:
+    async def _blocks(self, samples: int, start: int, columns: int) -> AsyncIterator[Counts]:
         if self._clock.ticks != start:
             raise DeviceFault("samples were lost: time passed between the recording's beginning and its first reading")
-        tape = _Tape()
+        tape = _Tape(columns)
         self._tapes.append(tape)
         try:
             while samples > 0:

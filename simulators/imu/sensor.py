@@ -12,6 +12,7 @@ import numpy as np
 
 from procedures.core import units
 from simulators.imu.blocks import Dither
+from simulators.imu.climate import Drift
 from simulators.imu.counter import FRACTION_BITS, Counter, Counts
 from simulators.imu.noise import TriadNoise
 from simulators.truth import Array, TriadTruth, keyed_generator
@@ -32,10 +33,19 @@ class Coefficients:
 
     def output(self, v: Array) -> Array:
         """Noise-free nominal output of inputs of shape (n, 3) [rate], as (3, n)."""
+        through, even = self._through(v)
+        return self.bias[:, None] + through + even
+
+    def through(self, v: Array) -> Array:
+        """What inputs of shape (n, 3) put through without the bias, (3, n) [rate]."""
+        through, even = self._through(v)
+        return through + even
+
+    def _through(self, v: Array) -> tuple[Array, Array]:
         inputs = v.T
         through = np.array([row[0] * inputs[0] + row[1] * inputs[1] + row[2] * inputs[2] for row in self.matrix])
         even = 0.5 * self.asymmetry[:, None] * np.abs(through) + self.quadratic[:, None] * through**2
-        return self.bias[:, None] + through + even
+        return through, even
 
 
 def launch_coefficients(truth: TriadTruth, seed: int, launch: int, triad: str) -> Coefficients:
@@ -71,15 +81,23 @@ class TriadSensor:
         else:
             self.counter = Counter(truth.pulse, phase.tolist())
 
-    def feel(self, tick: int, ticks: int, increments: Array, out: Counts | None = None) -> Counts:
+    def feel(
+        self, tick: int, ticks: int, increments: Array, out: Counts | None = None, drift: Drift | None = None
+    ) -> Counts:
         """Counts (3, ticks) of the ticks from `tick` since power-up, perhaps into `out`; true `increments` (ticks, 3).
 
-        Or (1, 3) where every tick is alike.
+        Or (1, 3) where every tick is alike. `drift`: what temperature does to the triad meanwhile, None: nothing.
         """
         if self._total.shape[1] != ticks:
             self._total = np.empty((3, ticks))
-        self._total[...] = self._output(increments)
+        if drift is None:
+            self._total[...] = self._output(increments)
+        else:
+            through = self.coefficients.through(increments * self._rate_hz)
+            np.divide(drift.sensed(self.coefficients.bias, through), self._rate_hz, out=self._total)
         self.noise.add_increments(self._total, tick)
+        if drift is not None:
+            drift.convert(self._total, self._rate_hz)
         return self.counter.count(self._total, tick, out)
 
     def _output(self, increments: Array) -> Array:

@@ -1,7 +1,7 @@
 """What is true of the simulated world: values, the files they live in, and chance keyed by seed."""
 
-from simulators.truth.chance import KeyedBlocks, keyed_generator, random_table_truth, random_unit_truth
-from simulators.truth.data_sheet import declared_unit, unit_channels
+from simulators.truth.chance import KeyedBlocks, keyed_generator
+from simulators.truth.data_sheet import declared_unit, temperature_channels, unit_channels
 from simulators.truth.files import (
     default_bench,
     default_unit,
@@ -10,12 +10,15 @@ from simulators.truth.files import (
     save_bench,
     save_unit,
 )
-from simulators.truth.values import Array, BenchTruth, SiteTruth, TableTruth, TriadTruth, TruthError, UnitTruth, Vector
+from simulators.truth.population import random_table_truth, random_unit_truth
+from simulators.truth.ranges import Array, TruthError, Vector
+from simulators.truth.values import BenchTruth, OperatorTruth, SiteTruth, TableTruth, TriadTruth, UnitTruth
 
 __all__ = [
     "Array",
     "BenchTruth",
     "KeyedBlocks",
+    "OperatorTruth",
     "SiteTruth",
     "TableTruth",
     "TriadTruth",
@@ -32,5 +35,6 @@ __all__ = [
     "random_unit_truth",
     "save_bench",
     "save_unit",
+    "temperature_channels",
     "unit_channels",
 ]

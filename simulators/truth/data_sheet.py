@@ -4,6 +4,7 @@ from procedures.core import units
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import ACCELEROMETER, GYRO, Channel, Quantity
 from procedures.core.unit import TriadRecord, Unit
+from simulators.truth.thermal import THERMOMETERS
 from simulators.truth.values import TriadTruth, UnitTruth
 
 
@@ -15,6 +16,12 @@ def unit_channels(truth: UnitTruth) -> tuple[Channel, ...]:
         *(Channel(name, Quantity.ANGLE_INCREMENT, "rad", scale) for name, scale in gyros),
         *(Channel(name, Quantity.VELOCITY_INCREMENT, "m/s", scale) for name, scale in accelerometers),
     )
+
+
+def temperature_channels(truth: UnitTruth) -> tuple[Channel, ...]:
+    """Five channels in the order of `THERMOMETERS`; the scale of each is the step of its sensor [°C]."""
+    sensors = zip(THERMOMETERS, truth.thermal.thermometers, strict=True)
+    return tuple(Channel(f"temperature_{name}", Quantity.TEMPERATURE, "degC", t.step_c) for name, t in sensors)
 
 
 def declared_unit(truth: UnitTruth, averaging_time_s: float = 70.0, sample_rate_hz: float | None = None) -> Unit:

@@ -8,10 +8,12 @@ from json import dumps
 from pathlib import Path
 from typing import Any
 
+from procedures.bench.chamber import ChamberLimits
 from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
 from procedures.core import units
 from procedures.core.site import Site
-from simulators.truth.values import BenchTruth, SiteTruth, TableTruth, TriadTruth, TruthError, UnitTruth, within
+from simulators.truth.ranges import TruthError, within
+from simulators.truth.values import BenchTruth, SiteTruth, TableTruth, TriadTruth, UnitTruth
 
 Table = Mapping[str, Any]
 
@@ -133,12 +135,18 @@ def _record(kind: type[Any], where: str, table: Any, needed: set[str]) -> Any:
 
 def _description(table: Table) -> BenchDescription:
     axes = {"outer", "middle", "inner"}
-    _only("description", table, {"id", "title", "site", "accuracy", *axes}, {"id", "site", *axes})
+    _only("description", table, {"id", "title", "site", "accuracy", "chamber", *axes}, {"id", "site", *axes})
     outer, middle, inner = (_axis(f"description.{axis}", table[axis]) for axis in ("outer", "middle", "inner"))
     site = _record(Site, "description.site", table["site"], {"latitude_deg", "gravity_m_s2"})
     accuracy = _record(TableAccuracy, "description.accuracy", table.get("accuracy", {}), set())
     title = str(table.get("title", ""))
-    return BenchDescription(str(table["id"]), site, outer, middle, inner, accuracy, simulated=True, title=title)
+    chamber = None
+    if "chamber" in table:
+        needed = {f.name for f in fields(ChamberLimits)}
+        chamber = _record(ChamberLimits, "description.chamber", table["chamber"], needed)
+    return BenchDescription(
+        str(table["id"]), site, outer, middle, inner, accuracy, simulated=True, title=title, chamber=chamber
+    )
 
 
 def _axis(where: str, table: Any) -> AxisLimits:
@@ -214,6 +222,7 @@ def save_bench(truth: BenchTruth, path: Path) -> None:
         "description.middle": described.middle,
         "description.inner": described.inner,
         "description.accuracy": described.accuracy,
+        **({} if described.chamber is None else {"description.chamber": described.chamber}),
         "site_truth": truth.site,
         "table_truth": truth.table,
     }

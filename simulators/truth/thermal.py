@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields, replace
 from math import isfinite
 
 from simulators.truth.chance import keyed_generator
-from simulators.truth.values import ZERO, TruthError, Vector, check_fields, within
+from simulators.truth.ranges import ZERO, TruthError, Vector, check_fields, within
 
 REFERENCE_C = 20.0
 """Node temperature at which nothing of the temperature's effect is left: the thesis's normal conditions (3.2.2)."""
@@ -65,6 +65,22 @@ class ChamberTruth:
             raise TruthError("chamber: limiter_low_c <= least_c < most_c <= limiter_high_c must hold")
 
 
+CHAMBER_FAULTS = ("heater_stuck", "control_sensor_stuck", "cooling_lost", "heating_lost", "link_lost")
+
+
+@dataclass(frozen=True)
+class ChamberFault:
+    """Something of the chamber breaks at a moment of bench time and stays broken."""
+
+    name: str
+    from_s: float
+
+    def __post_init__(self) -> None:
+        if self.name not in CHAMBER_FAULTS:
+            raise TruthError(f"chamber fault {self.name!r} is not known; known are {', '.join(CHAMBER_FAULTS)}")
+        within(f"chamber fault {self.name}: from_s", self.from_s, 0.0, 1e9)
+
+
 @dataclass(frozen=True)
 class NetworkTruth:
     """The unit as lumps of heat: the case in the air, everything else on the case. All ours."""
@@ -108,6 +124,8 @@ class ThermometerTruth:
     def __post_init__(self) -> None:
         check_fields("thermometer", self, {"offset_c": (-50.0, 50.0), "lag_s": (0.0, 3600.0), "noise_c": (0.0, 10.0)})
         within("thermometer.step_c", self.step_c, 1e-6, 10.0)
+        never = float("inf")
+        check_fields("thermometer", self, {"stuck_from_s": (0.0, never), "disconnected_from_s": (0.0, never)})
 
 
 @dataclass(frozen=True)

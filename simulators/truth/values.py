@@ -3,38 +3,15 @@
 Knows numbers and their allowed ranges; knows neither files nor motion.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from procedures.bench.description import BenchDescription
 from procedures.core import units
-
-Array = NDArray[np.float64]
-Vector = tuple[float, float, float]
-Matrix = tuple[Vector, Vector, Vector]
-
-ZERO: Vector = (0.0, 0.0, 0.0)
-
-
-class TruthError(ValueError):
-    """A truth is not allowed: names the field, its value and the allowed range."""
-
-
-def within(where: str, value: object, low: float, high: float) -> float:
-    """A number inside low … high, or `TruthError`. NaN and non-numbers are outside everything."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise TruthError(f"{where} = {value!r} must be a number within {low:g} … {high:g}")
-    return float(value)
-
-
-def check_fields(where: str, record: object, ranges: Mapping[str, tuple[float, float]]) -> None:
-    """Each named field of a record inside its range."""
-    for name, (low, high) in ranges.items():
-        within(f"{where}.{name}", getattr(record, name), low, high)
+from simulators.truth.ranges import ZERO, Matrix, TruthError, Vector, check_fields, within
+from simulators.truth.thermal import ChamberFault, ChamberTruth, UnitThermalTruth
 
 
 @dataclass(frozen=True)
@@ -96,12 +73,43 @@ class TableTruth:
 
 
 @dataclass(frozen=True)
+class OperatorTruth:
+    """How well and how fast the person at the bench sets the unit by hand. Ours."""
+
+    fixture_tilt_sd_arcsec: float = 300.0
+    """The seat in a chamber is a manual table: about each of its axes the unit leans by so much, anew each time."""
+    set_by_hand_s: float = 300.0
+    """Bench time from the door's opening to its closing; the unit is set halfway."""
+
+    def __post_init__(self) -> None:
+        check_fields(
+            "operator_truth", self, {"fixture_tilt_sd_arcsec": (0.0, 36000.0), "set_by_hand_s": (0.0, 86400.0)}
+        )
+
+
+@dataclass(frozen=True)
 class BenchTruth:
-    """A bench: what is true of its site and table, and what its laboratory declares of them."""
+    """A bench: what is true of its site, table, chamber and operator, and what its laboratory declares of them.
+
+    A description without a chamber is a bench without one, whatever `chamber` says.
+    """
 
     site: SiteTruth
     table: TableTruth
     description: BenchDescription
+    chamber: ChamberTruth = field(default_factory=ChamberTruth)
+    chamber_faults: tuple[ChamberFault, ...] = ()
+    operator: OperatorTruth = field(default_factory=OperatorTruth)
+
+    def __post_init__(self) -> None:
+        declared, true = self.description.chamber, self.chamber
+        if declared is None:
+            return
+        where = "description.chamber"
+        within(f"{where}.minimum_c", declared.minimum_c, true.least_c, true.most_c)
+        within(f"{where}.maximum_c", declared.maximum_c, declared.minimum_c, true.most_c)
+        within(f"{where}.ambient_c", declared.ambient_c, declared.minimum_c, declared.maximum_c)
+        within(f"{where}.ramp_c_min", declared.ramp_c_min, 1e-3, true.ramp_c_min)
 
 
 @dataclass(frozen=True)
@@ -207,12 +215,16 @@ class TriadTruth:
 
 @dataclass(frozen=True)
 class UnitTruth:
-    """One unit: who it is, how often it sends, and its two triads (the nominal scale of a channel is its pulse)."""
+    """One unit: who it is, how often it sends, its two triads (the nominal scale of a channel is its pulse), its heat.
+
+    The triads are what they are with the whole unit at `simulators.truth.thermal.REFERENCE_C`.
+    """
 
     serial: str
     gyro: TriadTruth
     accelerometer: TriadTruth
     sample_rate_hz: float = 400.0
+    thermal: UnitThermalTruth = field(default_factory=UnitThermalTruth)
 
     def __post_init__(self) -> None:
         within("unit.sample_rate_hz", self.sample_rate_hz, 1.0, 4000.0)

@@ -18,7 +18,7 @@ from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
 from simulators.clock import Motion, SimClock
 from simulators.truth import Array, BenchTruth, TableTruth, keyed_generator
-from simulators.turntable.kinematics import at_rest, attitude, path_increments
+from simulators.turntable.kinematics import at_rest, attitude, path_increments, small_turn
 from simulators.turntable.plant import Plant
 from simulators.turntable.profile import Profile, Quintic, RampDown, Spin, deceleration_rad_s2, move_ticks
 
@@ -59,6 +59,8 @@ class SimTurntable:
         self._step = 0
         self._demand = 0
         self._fault = ""
+        self._lean: Array | None = None
+        """Rotation vector of the unit on the inner axis, (3,); None: it is mounted on the table as it should be."""
         self._rest = self._at_rest()
 
     @property
@@ -94,6 +96,17 @@ class SimTurntable:
         if self._profile is not None:
             await self._finish(self._profile, self._demand)
 
+    def place(self, angles: TableAngles, lean_rad: Array) -> None:
+        """A person sets the unit by hand: as at these angles, leaning by a rotation vector (3,) in its own axes.
+
+        No servo moves, no time passes; the lean stays until the next setting. Raises `OutOfRange`, `DeviceFault`.
+        """
+        self._need_leave(self._description.violations(angles))
+        self._turns, self._pointing = np.zeros(3), np.zeros(3)
+        self._plant.put(units.DEG * np.array([angles.outer_deg, angles.middle_deg, angles.inner_deg]))
+        self._lean = np.array(lean_rad, dtype=np.float64)
+        self._lock()
+
     def _need_leave(self, violations: tuple[str, ...]) -> None:
         """Limits first, then whether the table may move at all."""
         if violations:
@@ -108,6 +121,10 @@ class SimTurntable:
         encoders = (self._plant.angles_rad - self._pointing + 2.0 * np.pi * self._turns) / units.DEG
         outer, middle, inner = encoders.tolist()
         return TableAngles(outer, middle, inner)
+
+    def is_moving(self) -> bool:
+        """Whether the axes are not at rest and held; see the port."""
+        return not self.locked
 
     def read_rates_deg_s(self) -> Array:
         """Rates of the axes, (3,): for tests and displays."""
@@ -177,7 +194,11 @@ class SimTurntable:
         self._rest = self._at_rest()
 
     def _at_rest(self) -> tuple[Array, Array]:
-        return at_rest(self._plant.attitude()[None], self._truth.site)
+        return at_rest(self._leaning(self._plant.attitude()[None]), self._truth.site)
+
+    def _leaning(self, rot_enu_b: Array) -> Array:
+        """Attitudes (n, 3, 3) of the inner axis' end, and what the unit's are."""
+        return rot_enu_b if self._lean is None else rot_enu_b @ small_turn(self._lean[None])
 
     def rest_truth(self) -> tuple[Array, Array]:
         """True angular rate [rad/s] and specific force [m/s²] in the unit's axes while locked, each (3,)."""
@@ -197,7 +218,7 @@ class SimTurntable:
         self._step += steps
         if isinstance(self._profile, Spin):
             self._unwind(self._profile)
-        rotation = attitude(path, self._truth.table, self._description.site.azimuth_deg)
+        rotation = self._leaning(attitude(path, self._truth.table, self._description.site.azimuth_deg))
         angle, velocity = path_increments(rotation, self._plant.steps_per_tick, tick_s, self._truth.site)
         return Motion(ticks, angle, velocity)
 
@@ -220,6 +241,7 @@ class SimTurntable:
             "pointing_rad": self._pointing.tolist(),
             "moves": self._moves,
             "fault": self._fault,
+            "lean_rad": None if self._lean is None else self._lean.tolist(),
         }
 
     def resume(self, state: dict[str, Any]) -> None:
@@ -228,5 +250,6 @@ class SimTurntable:
         self._pointing = np.array(state["pointing_rad"], dtype=np.float64)
         self._moves = int(state["moves"])
         self._fault = str(state["fault"])
+        self._lean = None if state["lean_rad"] is None else np.array(state["lean_rad"], dtype=np.float64)
         self._plant.put(np.array(state["angles_rad"], dtype=np.float64), np.array(state["integral"], dtype=np.float64))
         self._rest = self._at_rest()

@@ -22,6 +22,7 @@ class Process:
             **os.environ,
             "BENCH_DATABASE_URL": database_url,
             "BENCH_PORT": str(port),
+            "BENCH_DEVICE_FOLDER": str(folder),
             "BENCH_REAL_TIME_FACTOR": "400",  # a station of about 75 s takes 0.2 s: time to hit one
         }
         self.log = folder / "service.log"

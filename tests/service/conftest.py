@@ -18,8 +18,9 @@ def database_url(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
 
 
 @pytest.fixture(scope="module")
-def client(database_url: str) -> Generator[Client]:
-    with connect(Settings(database_url=database_url), None, drive=True) as http:
+def client(database_url: str, tmp_path_factory: pytest.TempPathFactory) -> Generator[Client]:
+    settings = Settings(database_url=database_url, device_folder=tmp_path_factory.mktemp("devices"))
+    with connect(settings, None, drive=True) as http:
         yield Client(http)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from bench_service.drivers.simulated import SimulatedDriver
+from bench_service.jobs.dispatcher import Unfinished
 from bench_service.jobs.errors import NotDriving
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.planning import Planner
@@ -15,17 +16,31 @@ from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
 from bench_service.jobs.worker import Worker
 from bench_service.persistence import open_stores
+from bench_service.wall_clock import now
 from procedures.bench import Bench, BenchNeeds
 from procedures.bench.errors import DeviceFault
 from tests.service.client import FAST
 
 
 class IdleEngine:
-    """An engine that takes jobs and never runs them: here the test takes the steps."""
+    """An engine that runs nothing: here the test takes the steps."""
 
     def launch(self) -> None: ...
 
-    def enqueue(self, job: Job) -> None: ...
+    def run(self, job: Job) -> None: ...
+
+    def unfinished(self, job: Job) -> Unfinished:
+        return Unfinished()
+
+    def shut_down(self) -> None: ...
+
+
+class IdleDispatcher:
+    """A dispatcher that claims nothing."""
+
+    def begin(self) -> None: ...
+
+    def wake(self) -> None: ...
 
     def shut_down(self) -> None: ...
 
@@ -33,8 +48,15 @@ class IdleEngine:
 class JammedDriver(SimulatedDriver):
     """A bench whose table does not obey the last demand."""
 
-    def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None, needs: BenchNeeds) -> Bench:
-        bench = super().open(unit, seed, checkpoint, needs)
+    def open(
+        self,
+        unit: str,
+        seed: int | None,
+        checkpoint: dict[str, Any] | None,
+        needs: BenchNeeds,
+        job: str | None = None,
+    ) -> Bench:
+        bench = super().open(unit, seed, checkpoint, needs, job)
 
         async def refuse() -> None:
             raise DeviceFault("the table's brake does not close")
@@ -54,12 +76,15 @@ def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], b
     """A runner, and a job of its that has begun."""
     planner = Planner(stores, driver)
     runner = JobRunner(stores, planner, driver, "test", lease_held)
-    worker = Worker(runner, lambda _: IdleEngine())
+    worker = Worker(runner, lambda _: IdleEngine(), lambda *_: IdleDispatcher())
     service = BenchService(stores, driver, planner, worker, "test")
     service.register()
     service.begin()
     job = service.submit(JobRequest("calibration_12_orientations", "SIM-0001", parameters=FAST, seed=1))
-    assert runner.prepare(job.id, 1) == 12
+    entry = stores.queue.look("sim", now()).next()
+    assert entry is not None
+    assert runner.claim(entry) is not None
+    assert runner.stations(job.id, 1) == 12
     return runner, job
 
 
@@ -103,7 +128,7 @@ def test_an_engine_that_does_not_start_is_told_to_whoever_needs_it(stores: Store
     def fail(_: JobRunner) -> IdleEngine:
         raise OSError("no books")
 
-    worker = Worker(JobRunner(stores, planner, driver, "test", lambda: True), fail)
+    worker = Worker(JobRunner(stores, planner, driver, "test", lambda: True), fail, lambda *_: IdleDispatcher())
     service = BenchService(stores, driver, planner, worker, "test")
     service.register()
     service.begin()

@@ -9,15 +9,17 @@ import pytest
 
 from procedures.bench.chamber import Chamber, ChamberReading
 from procedures.bench.errors import DeviceFault, Disconnected, OutOfRange
-from simulators.chamber.device import Fault, SimChamber
+from simulators.chamber.device import SimChamber
 from simulators.chamber.thermometers import DISCONNECTED_CODE, Thermometers
-from simulators.truth.thermal import ChamberTruth, ThermometerTruth, UnitThermalTruth
+from simulators.truth.thermal import ChamberFault, ChamberTruth, ThermometerTruth, UnitThermalTruth
 
 
 class Ticking:
     """A chamber with a clock of its own."""
 
-    def __init__(self, rate_hz: float = 400.0, seed: int = 1, faults: tuple[Fault, ...] = (), **unit: object) -> None:
+    def __init__(
+        self, rate_hz: float = 400.0, seed: int = 1, faults: tuple[ChamberFault, ...] = (), **unit: object
+    ) -> None:
         self.ticks, self.rate_hz = 0, rate_hz
         truth = replace(UnitThermalTruth(), **unit)
         self.chamber = SimChamber(ChamberTruth(), truth, seed, rate_hz, lambda: self.ticks / rate_hz, faults)
@@ -75,7 +77,7 @@ def test_an_open_door_stops_it_and_a_closed_one_does_not_start_it() -> None:
 
 
 def test_a_tripped_limiter_stays_until_a_person_resets_it() -> None:
-    bench = Ticking(faults=(Fault("heater_stuck", 100.0),))
+    bench = Ticking(faults=(ChamberFault("heater_stuck", 100.0),))
     bench.command(20.0)
     bench.go(99)
     assert bench.read().air_c == pytest.approx(20.0, abs=0.5)
@@ -89,7 +91,7 @@ def test_a_tripped_limiter_stays_until_a_person_resets_it() -> None:
 
 
 def test_a_lost_link_in_hour_seven_is_said_and_the_air_goes_on() -> None:
-    bench = Ticking(rate_hz=1.0, faults=(Fault("link_lost", 7 * 3600.0),))
+    bench = Ticking(rate_hz=1.0, faults=(ChamberFault("link_lost", 7 * 3600.0),))
     bench.command(60.0)
     bench.go(7 * 3600 - 1)
     assert bench.read().air_c == pytest.approx(60.0, abs=0.1)
@@ -102,7 +104,7 @@ def test_a_lost_link_in_hour_seven_is_said_and_the_air_goes_on() -> None:
 
 def test_faults_that_do_not_exist_are_refused() -> None:
     with pytest.raises(ValueError, match="fault 'fire'"):
-        Fault("fire", 0.0)
+        ChamberFault("fire", 0.0)
 
 
 def test_time_may_be_cut_anywhere_and_a_checkpoint_goes_on() -> None:

@@ -89,6 +89,7 @@ def test_a_job_through_its_life(stores: Stores, new_job: NewJob) -> None:
         stations_done=3,
         context={"bench": "mounted"},
         attempt=2,
+        queued_at=start + 6 * LATER,
         started_at=start + LATER,
         finished_at=start + 8 * LATER,
     )

@@ -1,0 +1,71 @@
+"""Faults that are put into a simulated bench's devices on purpose, for exercises: never into real ones."""
+
+import json
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+from random import Random
+from threading import Event
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from bench_service.jobs.errors import Misconfigured
+from procedures.bench.errors import DeviceFault, Disconnected
+
+HANG_S = 3600.0
+"""How long a device that hangs says nothing [s]: longer than anybody waits."""
+
+
+class FaultRule(BaseModel):
+    """What may happen when a verb begins."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    verb: str = Field(min_length=1)
+    """As in the devices' journal, with wildcards: "turntable.move_to", "supply.*", "imu.block" (each block)."""
+    kind: Literal["hang", "disconnect", "fault"]
+    """No answer at all (the thread that asked is lost, as in a vendor's library), no link, or a fault of the device."""
+    probability: float = Field(gt=0.0, le=1.0)
+    """Each time that the verb begins."""
+
+
+class FaultPlan(BaseModel):
+    """Which faults a bench's devices have, and the seed of their chance."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    seed: int = 0
+    rules: tuple[FaultRule, ...]
+
+    @classmethod
+    def parse(cls, text: str) -> "FaultPlan":
+        """From JSON such as ``{"seed": 7, "rules": [{"verb": "turntable.*", "kind": "hang", "probability": 0.1}]}``.
+
+        Raises `Misconfigured` naming the field.
+        """
+        try:
+            return cls.model_validate(json.loads(text))
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"]))
+            raise Misconfigured(f"BENCH_DEVICE_FAULTS: {where} = {first['input']!r}: {first['msg']}") from error
+        except ValueError as error:
+            raise Misconfigured(f"BENCH_DEVICE_FAULTS is no JSON: {error}") from error
+
+
+class DeviceFaults:
+    """The faults of one opening of the devices; every opening has chances of its own, the same in each exercise."""
+
+    def __init__(self, plan: FaultPlan, opening: str) -> None:
+        self._rules = plan.rules
+        self._chance = Random(f"{plan.seed} {opening}")
+
+    def strike(self, verb: str, arguments: Mapping[str, Any]) -> None:
+        """Let happen what happens as a verb begins. Raises `DeviceFault`, `Disconnected`, or does not return."""
+        for rule in self._rules:
+            if fnmatchcase(verb, rule.verb) and self._chance.random() < rule.probability:
+                if rule.kind == "hang":
+                    Event().wait(HANG_S)
+                if rule.kind == "fault":
+                    raise DeviceFault(f"{verb} {json.dumps(dict(arguments))}: a fault put in for an exercise")
+                raise Disconnected(f"{verb}: no link, put in for an exercise")

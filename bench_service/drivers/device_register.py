@@ -1,0 +1,133 @@
+"""What real devices keep by themselves, kept for a simulated bench: their state, and a link that admits one master.
+
+A real table goes on moving when the process that commanded it dies, and can be asked afterwards. A simulated table
+dies with its process, so what was commanded last is kept in a file beside the database. The file's lock is the link:
+the kernel gives it to one process and takes it back at its death.
+"""
+
+import fcntl
+import json
+import os
+import zlib
+from dataclasses import asdict, replace
+from datetime import datetime
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from bench_service import wall_clock
+from bench_service.drivers.device_journal import DeviceJournal
+from bench_service.jobs.devices import DeviceState
+from bench_service.jobs.processes import ProcessIdentity
+from procedures.bench.errors import DeviceBusy, Disconnected
+
+RECORD_BYTES = 4096
+"""A state is written in one piece of this size, over the one before: nothing is half-written, no disk too full."""
+TRIES = 50
+"""How often a reader looks again that met a writer in the middle."""
+
+
+class DeviceRegister:
+    """State and journal of one bench's devices, in two files of a folder on the bench's host."""
+
+    def __init__(self, folder: Path, bench_id: str) -> None:
+        self.bench_id = bench_id
+        self.path = folder / f"bench-{bench_id}.devices"
+        self.journal = DeviceJournal(folder / f"bench-{bench_id}.journal")
+
+    def read(self) -> DeviceState | None:
+        """The devices' state, without their link; None where no process of this host ever had it."""
+        try:
+            file = os.open(self.path, os.O_RDONLY | os.O_CLOEXEC)
+        except FileNotFoundError:
+            return None
+        try:
+            return _read(file)
+        finally:
+            os.close(file)
+
+    def open(self, by: str = "", job: str | None = None) -> "DeviceLink":
+        """Take the devices' link. Raises `DeviceBusy` naming who has it."""
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            state = _read(file)
+            os.close(file)
+            holder = (state.by if state is not None else "") or "another process"
+            self.journal.write("link.refused", {"holder": holder})
+            raise DeviceBusy(f"the devices of bench {self.bench_id!r} are driven by {holder}") from None
+        return DeviceLink(file, self.journal, by or str(ProcessIdentity.own()), job)
+
+
+class DeviceLink:
+    """The right to command a bench's devices, and the memory of what was commanded. Closed, it commands nothing."""
+
+    def __init__(self, file: int, journal: DeviceJournal, by: str, job: str | None) -> None:
+        self._file: int | None = file
+        self._journal = journal
+        self._mutex = Lock()
+        self.state = _read(file) or DeviceState()
+        self.openings = self.state.openings + 1
+        self.note("link.opened", {}, by=by, job=job, linked=True, openings=self.openings)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it still commands."""
+        return self._file is not None
+
+    def note(self, verb: str, arguments: dict[str, Any], **changes: Any) -> None:
+        """Write what is asked of the devices, and what that makes of them. Raises `Disconnected` once it is closed."""
+        with self._mutex:
+            if self._file is None:
+                raise Disconnected(f"{verb}: this process has given up the devices' link")
+            self._note(self._file, verb, arguments, changes)
+
+    def close(self) -> None:
+        """Give the link back; a second time does nothing. A device that still moves goes on moving."""
+        with self._mutex:
+            if self._file is not None:
+                self._note(self._file, "link.closed", {}, {"linked": False})
+                self._journal.rotate()
+                self._journal.close()
+                os.close(self._file)
+                self._file = None
+
+    def _note(self, file: int, verb: str, arguments: dict[str, Any], changes: dict[str, Any]) -> None:
+        self.state = replace(self.state, at=wall_clock.now(), **changes)
+        os.pwrite(file, _written(self.state), 0)
+        self._journal.write(verb, arguments, job=self.state.job)
+
+
+def _written(state: DeviceState) -> bytes:
+    """A record: CRC-32, then the state as JSON, padded."""
+    document = asdict(state)
+    document["at"] = None if state.at is None else state.at.isoformat()
+    body = json.dumps(document).encode()
+    if len(body) > RECORD_BYTES - 16:
+        return _written(replace(state, fault=state.fault[:200], by=state.by[:200], job=None))
+    return f"{zlib.crc32(body):08x} ".encode() + body + b" " * (RECORD_BYTES - 10 - len(body)) + b"\n"
+
+
+def _read(file: int) -> DeviceState | None:
+    """The state in a file; None in an empty one, which somebody is about to write."""
+    for _ in range(TRIES):
+        record = os.pread(file, RECORD_BYTES, 0)
+        if not record:
+            return None
+        checksum, _, body = record.partition(b" ")
+        body = body.rstrip()
+        if checksum == f"{zlib.crc32(body):08x}".encode():
+            return _state(json.loads(body))
+        wall_clock.pause(0.002)
+    return DeviceState(fault="what the devices' register holds cannot be read: they must be looked at")
+
+
+def _state(document: dict[str, Any]) -> DeviceState:
+    at, angles = document.pop("at"), document.pop("angles_deg")
+    return DeviceState(
+        **document,
+        at=None if at is None else datetime.fromisoformat(at),
+        angles_deg=None if angles is None else tuple(angles),
+    )

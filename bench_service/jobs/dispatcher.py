@@ -1,0 +1,155 @@
+"""The dispatcher of a bench: it takes the next admissible job from the bench's queue, has it run, and takes the next.
+
+The queue is our own jobs table. A job is claimed in one transaction (it is running from then on, and no bench has two
+running jobs), and its durable workflow begins at once. What a crash leaves behind is put right at the next start and
+after every job, so that no job stays running without anybody who runs it:
+
+- claimed, and the process died before its workflow was written: back into its place in the queue;
+- its workflow is this engine's and unfinished: the engine goes on with it by itself, and is waited for;
+- its workflow is of another version, or the engine gave it up: the job is interrupted, with the reason.
+
+While the bench's lease is lost (the database was restarted) nothing is claimed, and the lease is asked for again.
+"""
+
+import logging
+from dataclasses import dataclass
+from threading import Event, Thread
+from typing import Protocol
+
+from bench_service.jobs.driver import Lease
+from bench_service.jobs.errors import NotFound, ServiceError
+from bench_service.jobs.job import Failure, Job, JobState
+from bench_service.jobs.queue import BenchQueue, QueueEntry
+from bench_service.jobs.runner import JobRunner
+from bench_service.jobs.session import ShuttingDown
+from bench_service.jobs.store import Stores
+from bench_service.wall_clock import now
+
+RETRY_S = 0.5
+"""How long the dispatcher waits when the database or the engine does not answer [s]."""
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Unfinished:
+    """What the engine knows of a running job's workflow. Neither field set: it never began."""
+
+    alive: bool = False
+    """The engine goes on with it."""
+    gone: Failure | None = None
+    """Why nobody will go on with it."""
+
+
+class JobEngine(Protocol):
+    """What is needed of `bench_service.jobs.engine.Engine`."""
+
+    def launch(self) -> None:
+        """Start working; unfinished jobs of a dead process go on. The bench's lease must be held."""
+        ...
+
+    def run(self, job: Job) -> None:
+        """Run a claimed job to its end. Raises `ShuttingDown`, and whatever keeps it from running."""
+        ...
+
+    def unfinished(self, job: Job) -> Unfinished:
+        """What became of a running job's workflow."""
+        ...
+
+    def shut_down(self) -> None:
+        """Stop working, once the running job has left the bench safe; it goes on after the next start."""
+        ...
+
+
+class Dispatcher:
+    """Gives one bench its jobs, one after the other, in a thread of its own."""
+
+    def __init__(
+        self, bench_id: str, stores: Stores, runner: JobRunner, engine: JobEngine, lease: Lease, poll_s: float
+    ) -> None:
+        """`poll_s`: how often the queue is looked at for jobs that other processes put there."""
+        self._bench_id = bench_id
+        self._stores = stores
+        self._runner = runner
+        self._engine = engine
+        self._lease = lease
+        self._poll_s = poll_s
+        self._wake = Event()
+        self._ending = Event()
+        self._told: tuple[str, str] | None = None
+        self._thread = Thread(target=self._run, name=f"dispatcher {bench_id}", daemon=True)
+
+    def begin(self) -> None:
+        """Begin to work. The engine must be launched."""
+        self._thread.start()
+
+    def wake(self) -> None:
+        """Look at the queue now."""
+        self._wake.set()
+
+    def shut_down(self) -> None:
+        """Claim nothing any more. The running job is the engine's to end."""
+        self._ending.set()
+        self._wake.set()
+
+    def _run(self) -> None:
+        while not self._ending.is_set():
+            try:
+                if not self._one():
+                    self._wake.wait(self._poll_s)
+                    self._wake.clear()
+            except ServiceError as error:
+                log.warning("bench %s cannot take its next job yet: %s", self._bench_id, error)
+                self._ending.wait(RETRY_S)
+            except ShuttingDown:
+                return
+            except Exception:  # the engine's own books; a dispatcher that ended would strand every job
+                log.exception("the dispatcher of bench %s", self._bench_id)
+                self._ending.wait(RETRY_S)
+
+    def _one(self) -> bool:
+        """Claim and run the next job; False where there is none."""
+        if not self._lease.held() and not self._lease.regain():
+            return False
+        queue = self._stores.queue.look(self._bench_id, now())
+        if queue.running is not None:
+            self._settle()
+            return False
+        entry = queue.next()
+        self._tell(queue)
+        if entry is None:
+            return False
+        try:
+            job = self._runner.claim(entry)
+        except (ValueError, NotFound) as error:  # stored by a version whose words are not understood any more
+            failure = Failure("NotUnderstood", f"this version cannot read the job: {error}")
+            self._stores.jobs.transition(entry.job, JobState.INTERRUPTED, at=now(), failure=failure)
+            return True
+        if job is None:
+            return False
+        self._engine.run(job)
+        self._settle()
+        return True
+
+    def _settle(self) -> None:
+        """Make sure that no job of this bench is running without a workflow that goes on."""
+        job = self._stores.queue.running(self._bench_id)
+        if job is None or self._ending.is_set():
+            return
+        found = self._engine.unfinished(job)
+        if found.alive:
+            return
+        if found.gone is None:
+            never = Failure("NeverBegan", "the service ended after it had chosen this job and before it began")
+            self._stores.queue.requeue(job.id, now(), None, never, spend=False)
+        else:
+            self._stores.jobs.transition(job.id, JobState.INTERRUPTED, at=now(), failure=found.gone)
+
+    def _tell(self, queue: BenchQueue) -> None:
+        """Note in the events of the queue's first job why it does not start, once for each reason."""
+        head: QueueEntry | None = queue.entries[0] if queue.entries else None
+        why = None if head is None or (queue.stop is None and not queue.reservations) else queue.hold(head)
+        if head is None or why is None or self._told == (head.job, why):
+            return
+        self._stores.jobs.note(head.job, "note", now(), {"text": why})
+        self._told = (head.job, why)

@@ -1,0 +1,205 @@
+"""A bench whose every verb is seen as it begins and as it ends: for the devices' register, and for the watchdog.
+
+Whoever drives the bench notices nothing; knows no device.
+"""
+
+from collections.abc import AsyncGenerator, AsyncIterator, Generator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.bench import Bench, Chamber, Imu, Operator, Supply, Turntable
+from procedures.bench.chamber import ChamberLimits, ChamberReading
+from procedures.bench.imu import Stream
+from procedures.core.recording import Channel, Station
+from procedures.core.table_angles import TableAngles
+from procedures.core.turn import Turn
+
+
+class Observer(Protocol):
+    """Sees verbs, named "device.verb", with their arguments as JSON."""
+
+    def begin(self, verb: str, arguments: Mapping[str, Any]) -> None:
+        """Before the device is asked; where this raises, it is not asked, and the verb ends with that failure."""
+        ...
+
+    def end(self, verb: str, failure: BaseException | None) -> None:
+        """After it has answered, or failed to."""
+        ...
+
+    def asked(self, device: str) -> None:
+        """The next block of a recording is wanted."""
+        ...
+
+    def heard(self, device: str) -> None:
+        """It has come, or the recording has ended."""
+        ...
+
+
+class _Seen:
+    def __init__(self, observer: Observer) -> None:
+        self._observer = observer
+
+    @contextmanager
+    def _seen(self, verb: str, **arguments: Any) -> Generator[None]:
+        try:
+            self._observer.begin(verb, arguments)
+            yield
+        except BaseException as failure:
+            self._observer.end(verb, failure)
+            raise
+        self._observer.end(verb, None)
+
+
+class ObservedTurntable(_Seen):
+    """`Turntable`."""
+
+    def __init__(self, table: Turntable, observer: Observer) -> None:
+        super().__init__(observer)
+        self._table = table
+
+    async def move_to(self, angles: TableAngles) -> None:
+        with self._seen("turntable.move_to", angles_deg=[angles.outer_deg, angles.middle_deg, angles.inner_deg]):
+            await self._table.move_to(angles)
+
+    def command_turn(self, turn: Turn) -> None:
+        with self._seen("turntable.command_turn", axis=turn.axis, turns=turn.turns, rate_deg_s=turn.rate_deg_s):
+            self._table.command_turn(turn)
+
+    async def settle(self) -> None:
+        with self._seen("turntable.settle"):
+            await self._table.settle()
+
+    def read_angles(self) -> TableAngles:
+        with self._seen("turntable.read_angles"):
+            return self._table.read_angles()
+
+    def is_moving(self) -> bool:
+        with self._seen("turntable.is_moving"):
+            return self._table.is_moving()
+
+    async def make_safe(self) -> None:
+        with self._seen("turntable.make_safe"):
+            await self._table.make_safe()
+
+
+class ObservedSupply(_Seen):
+    """`Supply`."""
+
+    def __init__(self, supply: Supply, observer: Observer) -> None:
+        super().__init__(observer)
+        self._supply = supply
+
+    async def switch_on(self) -> None:
+        with self._seen("supply.switch_on"):
+            await self._supply.switch_on()
+
+    async def switch_off(self) -> None:
+        with self._seen("supply.switch_off"):
+            await self._supply.switch_off()
+
+    def is_on(self) -> bool:
+        with self._seen("supply.is_on"):
+            return self._supply.is_on()
+
+    async def make_safe(self) -> None:
+        with self._seen("supply.make_safe"):
+            await self._supply.make_safe()
+
+
+class ObservedChamber(_Seen):
+    """`Chamber`."""
+
+    def __init__(self, chamber: Chamber, observer: Observer) -> None:
+        super().__init__(observer)
+        self._chamber = chamber
+
+    @property
+    def limits(self) -> ChamberLimits:
+        return self._chamber.limits
+
+    async def command(self, temperature_c: float, ramp_c_min: float) -> None:
+        with self._seen("chamber.command", temperature_c=temperature_c, ramp_c_min=ramp_c_min):
+            await self._chamber.command(temperature_c, ramp_c_min)
+
+    async def read(self) -> ChamberReading:
+        with self._seen("chamber.read"):
+            return await self._chamber.read()
+
+    async def make_safe(self) -> None:
+        with self._seen("chamber.make_safe"):
+            await self._chamber.make_safe()
+
+
+class ObservedOperator(_Seen):
+    """`Operator`."""
+
+    def __init__(self, operator: Operator, observer: Observer) -> None:
+        super().__init__(observer)
+        self._operator = operator
+
+    async def set_by_hand(self, angles: TableAngles, request: str) -> None:
+        with self._seen("operator.set_by_hand", request=request):
+            await self._operator.set_by_hand(angles, request)
+
+
+class ObservedImu(_Seen):
+    """`Imu`."""
+
+    def __init__(self, imu: Imu, observer: Observer) -> None:
+        super().__init__(observer)
+        self._imu = imu
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return self._imu.channels
+
+    @property
+    def rate_hz(self) -> float:
+        return self._imu.rate_hz
+
+    def record(self, duration_s: float, station: Station | None = None) -> Stream:
+        with self._seen("imu.record", duration_s=duration_s, station=None if station is None else station.index):
+            stream = self._imu.record(duration_s, station)
+        return replace(stream, blocks=self._blocks(stream.blocks))
+
+    async def _blocks(self, blocks: AsyncIterator[NDArray[np.int32]]) -> AsyncIterator[NDArray[np.int32]]:
+        with self._seen("imu.stream"):
+            try:
+                while True:
+                    self._observer.asked("imu")
+                    try:
+                        block = await anext(blocks)
+                    except StopAsyncIteration:
+                        return
+                    finally:
+                        self._observer.heard("imu")
+                    yield block
+            finally:
+                if isinstance(blocks, AsyncGenerator):
+                    await blocks.aclose()
+
+
+class ObservedBench(Bench):
+    """A bench seen by an observer; everything else is the bench's own."""
+
+    def __init__(self, bench: Bench, observer: Observer) -> None:
+        super().__init__(
+            bench.description,
+            bench.clock,
+            ObservedTurntable(bench.turntable, observer),
+            ObservedImu(bench.imu, observer),
+            ObservedSupply(bench.supply, observer),
+            None if bench.chamber is None else ObservedChamber(bench.chamber, observer),
+            None if bench.operator is None else ObservedOperator(bench.operator, observer),
+        )
+        self.inner = bench
+
+    def checkpoint(self) -> dict[str, Any] | None:
+        return self.inner.checkpoint()
+
+    def close(self) -> None:
+        self.inner.close()

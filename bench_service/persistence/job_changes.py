@@ -1,0 +1,66 @@
+"""Changes of a job's row inside a transaction that somebody else began: its state, and the event that tells of it."""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from bench_service.jobs.errors import IllegalTransition, NotFound
+from bench_service.jobs.job import LEGAL, Failure, JobState
+from bench_service.persistence.database import announce
+from bench_service.persistence.job_rows import failure_document
+from bench_service.persistence.tables import EventRow, JobRow
+from procedures.core.limits import Verdict
+
+
+def found_job(session: Session, job_id: str, *, lock: bool = False) -> JobRow:
+    """The row of a job, locked for this transaction where asked. Raises `NotFound`."""
+    query = select(JobRow).where(JobRow.id == job_id)
+    row = session.scalar(query.with_for_update() if lock else query)
+    if row is None:
+        raise NotFound("job", job_id)
+    return row
+
+
+def move_job(
+    session: Session,
+    row: JobRow,
+    to: JobState,
+    at: datetime,
+    verdict: Verdict | None = None,
+    failure: Failure | None = None,
+    result_id: str | None = None,
+) -> None:
+    """Change the state of a locked row, with what goes with it, and say so in an event. Raises `IllegalTransition`."""
+    before = JobState(row.state)
+    if to not in LEGAL[before]:
+        raise IllegalTransition(f"job {row.id} is {before.value}; it cannot become {to.value}")
+    if verdict is None and to is JobState.FAILED:
+        verdict = Verdict.ERROR
+    row.state = to.value
+    data: dict[str, Any] = {"state": to.value, "before": before.value}
+    if to is JobState.QUEUED:
+        row.verdict = row.failure = row.finished_at = row.result_id = None
+        row.cancel_requested = row.pause_requested = False
+        row.attempt += 1
+        row.queued_at = at
+    elif to is JobState.RUNNING:
+        row.started_at = row.started_at or at
+    elif to is not JobState.PAUSED:
+        row.finished_at = at
+    if verdict is not None:
+        row.verdict = data["verdict"] = verdict.value
+    if failure is not None:
+        row.failure = data["failure"] = failure_document(failure)
+    if result_id is not None:
+        row.result_id = data["result_id"] = result_id
+    append_event(session, row.id, "state", at, data)
+
+
+def append_event(session: Session, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
+    """Add the next event of a job whose row is locked."""
+    last = session.scalar(select(func.max(EventRow.sequence)).where(EventRow.job_id == job_id)) or 0
+    session.add(EventRow(job_id=job_id, sequence=last + 1, at=at, kind=kind, data=data))
+    session.flush()
+    announce(session, job_id)

@@ -1,0 +1,39 @@
+"""A correction set of a unit, as it is kept in the unit's history: which kind it is, and its value.
+
+A calibration says what a unit is at one temperature; a correction says how it departs from that.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from procedures.core.converter import ConverterTriad
+from procedures.core.errors import BadParameter
+from procedures.core.thermal_correction import ThermalCorrection
+
+CorrectionKind = Literal["thermal", "converter"]
+CORRECTION_KINDS: tuple[CorrectionKind, ...] = ("thermal", "converter")
+
+
+@dataclass(frozen=True)
+class UnitCorrection:
+    """What the temperature does to a unit, found by one job. Raises `BadParameter` where kind and value disagree."""
+
+    kind: CorrectionKind
+    """"thermal": the accelerometer triad as a whole (T 4.1); "converter": the signal converter alone (T 3.8-3.13)."""
+    value: ThermalCorrection | ConverterTriad
+    """A `ThermalCorrection`, or three `ConverterModel`s, x, y, z."""
+
+    def __post_init__(self) -> None:
+        belongs = "thermal" if isinstance(self.value, ThermalCorrection) else "converter"
+        if self.kind != belongs:
+            raise BadParameter("kind", self.kind, f"{belongs!r}, as the value is")
+
+    @property
+    def thermal(self) -> ThermalCorrection | None:
+        """The value of the kind "thermal", else None."""
+        return self.value if isinstance(self.value, ThermalCorrection) else None
+
+    @property
+    def converter(self) -> ConverterTriad | None:
+        """The value of the kind "converter", else None."""
+        return None if isinstance(self.value, ThermalCorrection) else self.value

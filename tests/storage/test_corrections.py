@@ -1,0 +1,161 @@
+"""Correction sets: they come in with a result, one of a kind is current, a person may choose, lineage both ways."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench_service.jobs.errors import IdempotencyConflict, NotFound
+from bench_service.jobs.store import Stores
+from bench_service.jobs.stored import Idempotency, StoredResult
+from procedures.core.converter import ConverterModel, Normalised
+from procedures.core.errors import BadParameter
+from procedures.core.thermal_correction import AxisCorrection, Form, ThermalCorrection
+from procedures.core.unit import Unit
+from procedures.core.unit_correction import UnitCorrection
+from tests.storage.conftest import CHANNELS
+
+NewResult = Callable[..., StoredResult]
+
+
+def _normalised(rng: np.random.Generator, relative: bool) -> Normalised:
+    a, b, c = rng.normal(size=3).tolist()
+    rows = tuple(tuple(row) for row in rng.normal(size=(3, 3)).tolist())
+    return Normalised(relative, 20.25, a, (b, c), rows, 1e-300)
+
+
+def converter(seed: int) -> UnitCorrection:
+    rng = np.random.Generator(np.random.PCG64(seed))
+    x, y, z = (ConverterModel(_normalised(rng, True), _normalised(rng, False)) for _ in range(3))
+    return UnitCorrection("converter", (x, y, z))
+
+
+def thermal(seed: int, form: Form = Form.BOTH) -> UnitCorrection:
+    rng = np.random.Generator(np.random.PCG64(seed))
+
+    def axis() -> AxisCorrection:
+        a, b = rng.normal(size=(2, 4)).tolist()
+        covariance = tuple(tuple(row) for row in rng.normal(size=(8, 8)).tolist())
+        return AxisCorrection(1.17, -0.09, tuple(a), tuple(b), 20.1, 19.9, form, (1e-4, -1e-5), covariance)
+
+    first_stage = converter(seed + 1).converter if form is Form.SWITCHED else None
+    return UnitCorrection("thermal", ThermalCorrection("accelerometer", (axis(), axis(), axis()), first_stage))
+
+
+def test_a_correction_comes_back_to_the_last_bit(stores: Stores, new_result: NewResult) -> None:
+    given = [thermal(1, Form.SWITCHED), converter(2)]
+    result = stores.results.add(new_result(), corrections=given)
+    newest = stores.corrections.list("U-1").items
+    assert sorted(c.correction.kind for c in newest) == ["converter", "thermal"]
+    assert {repr(c.correction) for c in newest} == {repr(g) for g in given}
+    assert {(c.result_id, c.current, c.simulated, c.made_at) for c in newest} == {
+        (result.id, True, True, result.created_at)
+    }
+    for correction in newest:
+        assert stores.corrections.get("U-1", correction.id) == correction
+        with pytest.raises(NotFound, match="unit U-2 has none"):
+            stores.corrections.get("U-2", correction.id)
+
+
+def test_of_each_kind_one_is_current(stores: Stores, new_result: NewResult) -> None:
+    assert stores.corrections.current("U-1", "thermal") is None
+    for seed in (1, 2):
+        stores.results.add(new_result(), corrections=[thermal(seed)])
+    stores.results.add(new_result(unit="U-2"), corrections=[thermal(3)])
+    stores.results.add(new_result(), corrections=[converter(4)])
+    stores.results.add(new_result(), make_current=False, corrections=[thermal(5), converter(6)])
+    shown = [c for c in stores.corrections.list("U-1").items if c.current]
+    assert {repr(c.correction) for c in shown} == {repr(thermal(2)), repr(converter(4))}
+    page = stores.corrections.list("U-1", kind="thermal", limit=2)
+    rest = stores.corrections.list("U-1", kind="thermal", after=page.next)
+    assert [repr(c.correction) for c in (*page.items, *rest.items)] == [repr(thermal(s)) for s in (5, 2, 1)]
+    assert rest.next is None
+    assert stores.corrections.current("U-1", "converter") in shown
+
+
+def test_a_person_chooses_which_one_is_current(stores: Stores, new_result: NewResult) -> None:
+    for seed in (1, 2):
+        stores.results.add(new_result(), corrections=[thermal(seed), converter(seed)])
+    new, old = stores.corrections.list("U-1", kind="thermal").items
+    models = stores.corrections.current("U-1", "converter")
+    key = Idempotency("k", "f")
+    chosen = stores.corrections.make_current("U-1", old.id, key)
+    assert chosen == replace(old, current=True)
+    assert stores.corrections.list("U-1", kind="thermal").items == (replace(new, current=False), chosen)
+    assert stores.corrections.current("U-1", "converter") == models, "the other kind is left alone"
+    assert stores.corrections.make_current("U-1", new.id).current
+    again = stores.corrections.make_current("U-1", old.id, key)
+    assert not again.current, "a repeated request does not undo what was chosen since"
+    with pytest.raises(IdempotencyConflict):
+        stores.corrections.make_current("U-1", old.id, Idempotency("k", "g"))
+    with pytest.raises(NotFound):
+        stores.corrections.make_current("U-2", old.id)
+    assert stores.corrections.current("U-1", "thermal") == new
+
+
+def test_of_many_choices_at_once_one_stands(stores: Stores, new_result: NewResult) -> None:
+    for seed in range(4):
+        stores.results.add(new_result(), corrections=[thermal(seed)])
+    ids = [c.id for c in stores.corrections.list("U-1").items]
+    with ThreadPoolExecutor(4) as workers:
+        list(workers.map(lambda i: stores.corrections.make_current("U-1", ids[i % 4]), range(12)))
+        list(workers.map(lambda i: stores.results.add(new_result(), corrections=[thermal(i)]), range(4)))
+    history = stores.corrections.list("U-1").items
+    assert len(history) == 8
+    assert sum(c.current for c in history) == 1
+
+
+def test_lineage_is_read_both_ways(stores: Stores, new_result: NewResult) -> None:
+    stores.results.add(new_result(), corrections=[thermal(1), converter(2)])
+    ids = tuple(c.id for c in stores.corrections.list("U-1").items)
+    first = stores.results.add(new_result(corrections=ids))
+    second = stores.results.add(new_result(corrections=ids[:1]))
+    assert stores.results.get(first.id).corrections == ids
+    assert [r.corrections for r in stores.results.list().items] == [ids[:1], ids, ()]
+    assert stores.corrections.used_by(ids[0]) == (second.id, first.id)
+    assert stores.corrections.used_by(ids[1]) == (first.id,)
+    assert stores.corrections.used_by("nobody") == ()
+
+
+def test_a_result_that_cannot_be_stored_leaves_no_correction(stores: Stores, new_result: NewResult) -> None:
+    with pytest.raises(NotFound, match="correction 'c'"):
+        stores.results.add(new_result(corrections=("c",)), corrections=[thermal(1)])
+    with pytest.raises(ValueError, match="unit"):
+        stores.results.add(new_result(unit=None), corrections=[thermal(1)])
+    with pytest.raises(ValueError, match="at most one"):
+        stores.results.add(new_result(), corrections=[thermal(1), thermal(2)])
+    assert stores.results.list().items == ()
+    assert stores.corrections.list("U-1").items == ()
+
+
+def test_a_key_makes_one_correction(stores: Stores, new_result: NewResult) -> None:
+    for _ in range(2):
+        stores.results.add(new_result(), idempotency=Idempotency("k", "f"), corrections=[thermal(1)])
+    assert len(stores.corrections.list("U-1").items) == 1
+
+
+def test_a_unit_comes_back_with_its_current_corrections(stores: Stores, new_result: NewResult) -> None:
+    unit = Unit("U-1", 400.0, CHANNELS)
+    stores.units.put_unit(unit)
+    stores.units.put_unit(replace(unit, serial="U-2"))
+    stores.results.add(new_result(), corrections=[thermal(1), converter(2)])
+    stores.results.add(new_result(), corrections=[thermal(3)])
+    newest = stores.corrections.list("U-1").items
+    current = {c.correction.kind: c for c in newest if c.current}
+    known = stores.units.unit("U-1")
+    assert known == replace(
+        unit,
+        thermal_correction=thermal(3).thermal,
+        thermal_correction_id=current["thermal"].id,
+        converter=converter(2).converter,
+        converter_id=current["converter"].id,
+    )
+    stores.units.put_unit(known)
+    assert stores.units.units() == (known, replace(unit, serial="U-2")), "they are not a part of the unit's document"
+
+
+def test_a_correction_says_what_it_is() -> None:
+    with pytest.raises(BadParameter, match="kind"):
+        UnitCorrection("converter", thermal(1).value)
