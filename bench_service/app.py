@@ -13,6 +13,7 @@ from bench_service.api import (
     analyses,
     audit,
     benches,
+    campaigns,
     errors,
     event_stream,
     health,
@@ -22,6 +23,8 @@ from bench_service.api import (
     recordings,
     request_id,
     reservations,
+    schedules,
+    trends,
     units,
 )
 from bench_service.drivers.device_faults import FaultPlan
@@ -42,12 +45,26 @@ from bench_service.jobs.store import Stores
 from bench_service.jobs.told_runner import ToldRunner
 from bench_service.jobs.tracing import traces_to
 from bench_service.jobs.worker import Worker
-from bench_service.pages import figures, routes
+from bench_service.pages import campaign_pages, figures, routes
 from bench_service.persistence import BenchLease, acquire_lease, engine_database, lease_holder, open_stores
 from bench_service.persistence.host_files import HostFiles
 from bench_service.settings import Settings
 
-ROUTERS = (procedures, jobs, recordings, analyses, units, benches, reservations, audit, health, metrics)
+ROUTERS = (
+    procedures,
+    jobs,
+    recordings,
+    analyses,
+    units,
+    trends,
+    benches,
+    reservations,
+    campaigns,
+    schedules,
+    audit,
+    health,
+    metrics,
+)
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> BenchService:
@@ -138,6 +155,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
     for module in ROUTERS:
         app.include_router(module.router)
     app.include_router(routes.router)
+    app.include_router(campaign_pages.router)
     errors.install(app)
     metrics.install(app, service)
     app.add_middleware(audit.Audited, trail=service.stores.audit)

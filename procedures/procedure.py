@@ -133,6 +133,8 @@ class Procedure(Generic[P, R]):
     """Kinds of the unit's current corrections that the result rests on; those it has then belong to its lineage."""
     learns: Callable[[R, Unit, str], Unit] = _nothing_learnt
     """The unit's record with what a job's result found of it; the text names that result as its origin."""
+    quantities: Callable[[P, Context], tuple[str, ...]] | None = None
+    """Names of the checks and of the named estimates that a result will have; None: not known before the job."""
 
 
 @dataclass(frozen=True)

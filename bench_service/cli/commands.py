@@ -12,7 +12,9 @@ import typer
 from pydantic import ValidationError
 from rich.console import Console
 
+from bench_service.cli import campaign_commands
 from bench_service.cli.client import call, connect, sentence
+from bench_service.cli.options import AsJson, Server, console, errors, parameter
 from bench_service.cli.refusal import Refused
 from bench_service.jobs.errors import ServiceError
 from bench_service.settings import Settings
@@ -24,11 +26,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help=HELP,
 )
-console = Console()
-errors = Console(stderr=True)
-
-Server = Annotated[str | None, typer.Option(help="Address of a service; without it, work in this process")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables")]
+app.add_typer(campaign_commands.campaigns, name="campaign")
+app.add_typer(campaign_commands.schedules, name="schedule")
 
 
 def run_command_line(settings: Settings, arguments: list[str] | None = None) -> int:
@@ -139,7 +138,7 @@ def run(
     from bench_service.cli.tables import check_table
     from bench_service.cli.watching import exit_code, watch
 
-    body = {"procedure": procedure, "unit": unit, "parameters": dict(map(_parameter, set_)), "seed": seed}
+    body = {"procedure": procedure, "unit": unit, "parameters": dict(map(parameter, set_)), "seed": seed}
     with connect(context.obj, server, drive=True) as client:
         job = watch(client, call(client, "POST", "/api/v1/jobs", json=body), errors)
         result = call(client, "GET", f"/api/v1/jobs/{job['id']}/result") if job["result"] else None
@@ -186,7 +185,7 @@ def analyse(
         "method": method,
         "recordings": recording,
         "calibrations": calibration,
-        "parameters": dict(map(_parameter, set_)),
+        "parameters": dict(map(parameter, set_)),
     }
     with connect(context.obj, server, drive=False) as client:
         result = call(client, "POST", "/api/v1/analyses", json=body)
@@ -257,17 +256,6 @@ def _of_bench(settings: Settings, bench: str | None) -> Settings:
         return Settings.model_validate({**settings.model_dump(), "bench_id": bench or settings.bench_id})
     except ValidationError as error:
         raise Refused(f"--bench {bench}: {error.errors()[0]['msg']}") from error
-
-
-def _parameter(text: str) -> tuple[str, Any]:
-    """``name=value`` with the value as JSON, or as plain text where it is none."""
-    name, separator, value = text.partition("=")
-    if not separator or not name:
-        raise Refused(f"--set {text}: expected name=value")
-    try:
-        return name, json.loads(value)
-    except json.JSONDecodeError:
-        return name, value
 
 
 def _until_interrupted() -> None:

@@ -32,3 +32,18 @@ def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict
 def exit_code(verdict: str | None) -> int:
     """0 pass, 1 fail, 2 everything else."""
     return {"pass": 0, "fail": 1}.get(verdict or "", 2)
+
+
+def watch_campaign(client: "httpx.Client", run: dict[str, Any], console: Console) -> dict[str, Any]:
+    """Follow a campaign's run until it has ended; what it waits for is shown beside the bar."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, TextColumn("{task.fields[doing]}"), console=console) as progress:
+        bar = progress.add_task(f"{run['campaign']} {run['unit']}", total=len(run["steps"]), doing="")
+        while True:
+            ended = [step for step in run["steps"] if step["finished_at"] or step["state"] == "skipped"]
+            now = next((s["name"] for s in run["steps"] if s["state"] in ("running", "paused")), "")
+            progress.update(bar, completed=len(ended), doing=run["waiting"] or now)
+            if run["state"] in ENDED:
+                return run
+            pause(LOOK_S)
+            run = call(client, "GET", f"/api/v1/campaign-runs/{run['id']}")

@@ -4,6 +4,7 @@ ServiceError
 ├── NotFound             no such job, recording, result, unit, bench, procedure, method
 ├── IllegalTransition    the job's state does not allow it
 ├── IdempotencyConflict  the key was used before with another request
+├── NameTaken            a campaign of that name is there already
 ├── BenchBusy            another process drives this bench
 ├── Misconfigured        a file that the settings name cannot be used
 ├── NotDriving           this process drives no bench
@@ -37,6 +38,10 @@ class IllegalTransition(ServiceError):
 
 class IdempotencyConflict(ServiceError):
     """The key was used before with another request."""
+
+
+class NameTaken(ServiceError):
+    """A campaign of that name is there already."""
 
 
 class BenchBusy(ServiceError):

@@ -28,4 +28,8 @@ class JobRequest:
 
 def fingerprint(request: object) -> str:
     """A digest of what a client asked, the same for the same request."""
-    return hashlib.sha256(json.dumps(request, sort_keys=True, default=vars).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(request, sort_keys=True, default=_plain).encode()).hexdigest()
+
+
+def _plain(value: object) -> object:
+    return value.isoformat() if isinstance(value, datetime) else vars(value)

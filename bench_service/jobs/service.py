@@ -8,6 +8,7 @@ from datetime import timedelta
 from random import SystemRandom
 
 from bench_service.jobs.analyses import AnalysisDesk
+from bench_service.jobs.campaigns.desk import CampaignDesk
 from bench_service.jobs.driver import BenchDriver, TrueTriad
 from bench_service.jobs.errors import IllegalTransition, NotFound, NotReady
 from bench_service.jobs.job import Job, JobState
@@ -65,6 +66,7 @@ class BenchService:
         self.queues = QueueDesk(stores, planner.benches, self._wake)
         self._worker = worker
         self._free_bytes = free_bytes
+        self.campaigns = CampaignDesk(stores, planner, self.analyses, self.submit, self.cancel)
 
     def register(self) -> None:
         """Remember the bench and its units, and forget what crashed imports left."""
@@ -85,6 +87,7 @@ class BenchService:
         """
         if self._worker is not None:
             self._worker.begin([lambda: (self.planner.catalog, self.analyses.methods), *warm_up])
+            self.campaigns.conductor.begin()
 
     def ready(self) -> tuple[str, ...]:
         """Return once a job could start, with what a person should know all the same.
@@ -106,6 +109,7 @@ class BenchService:
 
     def stop(self) -> None:
         """End the service: the running job is left for the next start, the bench made safe."""
+        self.campaigns.conductor.stop()
         if self._worker is not None:
             self._worker.shut_down()
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench_service.jobs.audit import AuditTrail
+from bench_service.jobs.campaigns.store import CampaignStore
 from bench_service.jobs.corrections import CorrectionStore
 from bench_service.jobs.job import Event, Failure, Job, JobState
 from bench_service.jobs.live import LiveStore
@@ -215,6 +216,14 @@ class ResultStore(Protocol):
         self, *, job_id: str | None = None, unit: str | None = None, after: str | None = None, limit: int = 50
     ) -> Page[StoredResult]: ...
 
+    def of_verdicts(self, unit: str, name: str, *, simulated: bool, limit: int) -> tuple[StoredResult, ...]:
+        """The results of a procedure that gave a job of the unit its verdict, newest first; no second analyses."""
+        ...
+
+    def calibrations_of(self, results: Sequence[str]) -> tuple[str, ...]:
+        """Ids of the calibrations that results gave, in the order of the results."""
+        ...
+
     def of_recording(self, recording_id: str) -> tuple[str, ...]:
         """Ids of the results that used a recording."""
         ...
@@ -284,6 +293,7 @@ class Stores:
     recordings: RecordingStore
     results: ResultStore
     units: UnitStore
+    campaigns: CampaignStore
     corrections: CorrectionStore
     live: LiveStore
     audit: AuditTrail

@@ -22,6 +22,7 @@ from bench_service.persistence.result_rows import (
 )
 from bench_service.persistence.tables import (
     CalibrationRow,
+    JobRow,
     RecordingRow,
     ResultCalibrationRow,
     ResultRecordingRow,
@@ -83,6 +84,23 @@ class SqlResultStore:
         with self._database.read() as session:
             rows = page(session, query, ResultRow.id, after, limit, _itself)
             return Page(_results(session, rows.items), rows.next)
+
+    def of_verdicts(self, unit: str, name: str, *, simulated: bool, limit: int) -> tuple[StoredResult, ...]:
+        query = (
+            select(ResultRow)
+            .join(JobRow, JobRow.result_id == ResultRow.id)
+            .where(ResultRow.unit == unit, ResultRow.name == name, ResultRow.simulated == simulated)
+            .order_by(ResultRow.id.desc())
+            .limit(limit)
+        )
+        with self._database.read() as session:
+            return _results(session, session.scalars(query).all())
+
+    def calibrations_of(self, results: Sequence[str]) -> tuple[str, ...]:
+        query = select(CalibrationRow.result_id, CalibrationRow.id).where(CalibrationRow.result_id.in_(results))
+        with self._database.read() as session:
+            found = {result_id: made for result_id, made in session.execute(query)}  # noqa: C416  rows are not tuples
+        return tuple(found[result_id] for result_id in results if result_id in found)
 
     def of_recording(self, recording_id: str) -> tuple[str, ...]:
         query = (

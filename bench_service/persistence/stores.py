@@ -2,6 +2,7 @@
 
 from bench_service.jobs.store import Stores
 from bench_service.persistence.audit_store import SqlAuditTrail
+from bench_service.persistence.campaign_store import SqlCampaignStore
 from bench_service.persistence.correction_store import SqlCorrectionStore
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.job_store import SqlJobStore
@@ -35,6 +36,7 @@ def stores_of(database: Database) -> Stores:
         recordings=SqlRecordingStore(database),
         results=SqlResultStore(database),
         units=SqlUnitStore(database),
+        campaigns=SqlCampaignStore(database),
         corrections=SqlCorrectionStore(database),
         live=SqlLiveStore(database),
         audit=SqlAuditTrail(database),

@@ -40,6 +40,11 @@ def _coefficient_row(c: Coefficient, sources: Sequence[str]) -> tuple[str | floa
     return (label, unit, (c.estimate - zero) / size, *(part / size for part in parts))
 
 
+def triad_figures(t: TriadSummary) -> tuple[Figure, ...]:
+    """Everything that is drawn of a triad: its magnitudes, then its residuals."""
+    return (*magnitude_figures(t.magnitudes), residual_figure(t))
+
+
 def residual_figure(summary: TriadSummary) -> Figure:
     """Residuals of the three channels per orientation, error bars one expected standard deviation."""
     c = summary.calibration

@@ -176,15 +176,19 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
     return tuple(t.calibration for t in result.triads)
 
 
+def quantities(params: Params, context: Context) -> tuple[str, ...]:
+    """Its checks and its coefficients."""
+    checks = (" bias in run, δ/√3", " condition number", " residuals, p-value of chi-square")
+    return tuple(f"{triad}{n}" for triad in TRIAD_NAMES for n in (*checks, *(f".{c}" for c in COEFFICIENT_NAMES)))
+
+
 def report(result: Result) -> Report:
     """Coefficients, checks, residuals and magnitudes (thesis Tables 5.1-5.4, figures 5.6-5.12)."""
     magnitudes = [t.magnitudes for t in result.triads]
     tables = [pictures.coefficient_table(t) for t in result.triads]
     tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
     tables += [pictures.magnitude_table(magnitudes, "Magnitudes over the orientations")]
-    figures = [
-        f for t in result.triads for f in (*pictures.magnitude_figures(t.magnitudes), pictures.residual_figure(t))
-    ]
+    figures = [f for t in result.triads for f in pictures.triad_figures(t)]
     stations = [pictures.station_table(m) for m in magnitudes]
     thermal = [] if result.thermal is None else pictures.thermal_tables(result.thermal, magnitudes[0].labels)
     return Report(sections=(*tables, *thermal, *figures, *stations))
@@ -290,4 +294,5 @@ PROCEDURE = Procedure(
     report,
     calibrations,
     uses_corrections=lambda params: ("thermal",) if params.thermal_correction == "current" else (),
+    quantities=quantities,
 )

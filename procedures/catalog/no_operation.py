@@ -45,6 +45,22 @@ def report(result: Result) -> Report:
     return Report("Nothing was done.")
 
 
+def quantities(params: Params, context: Context) -> tuple[str, ...]:
+    """None: nothing is measured."""
+    return ()
+
+
 PROCEDURE = Procedure(
-    "no_operation", "No operation", "1.0.0", Params, Result, resolve, schedule, predict, acquire, analyse, report
+    "no_operation",
+    "No operation",
+    "1.0.0",
+    Params,
+    Result,
+    resolve,
+    schedule,
+    predict,
+    acquire,
+    analyse,
+    report,
+    quantities=quantities,
 )

@@ -35,6 +35,7 @@ class Params(NoiseParameters):
         3600.0, ge=1.0, le=604_800.0, description="switched off before each launch, the first too; the thesis: 1 h"
     )
     settle_s: float = Field(0.0, ge=0.0, le=86_400.0, description="from switching on to the first sample")
+    sample_rate_hz: float | None = Field(None, ge=1.0, le=10_000.0, description="None: the unit's own")
     outer_deg: float = Field(0.0, ge=-360.0, le=360.0)
     middle_deg: float = Field(0.0, ge=-360.0, le=360.0)
     inner_deg: float = Field(0.0, ge=-360.0, le=360.0)
@@ -53,7 +54,16 @@ def schedule(params: Params) -> tuple[Station, ...]:
     """One station a launch."""
     angles = TableAngles(params.outer_deg, params.middle_deg, params.inner_deg)
     return tuple(
-        Station(i, f"launch {i + 1}", angles, None, params.settle_s, params.duration_s, power_off_s=params.off_time_s)
+        Station(
+            i,
+            f"launch {i + 1}",
+            angles,
+            None,
+            params.settle_s,
+            params.duration_s,
+            power_off_s=params.off_time_s,
+            sample_rate_hz=params.sample_rate_hz,
+        )
         for i in range(params.launches)
     )
 
@@ -109,6 +119,13 @@ def learns(result: Result, unit: Unit, origin: str) -> Unit:
     return replace(unit, gyro=records["gyro"], accelerometer=records["accelerometer"], averaging_time_s=dwell)
 
 
+def quantities(params: Params, context: Context) -> tuple[str, ...]:
+    """Its checks: of channels in counts only that there is a noise."""
+    rates = [(c.name, c.rate_unit) for c in context.unit.channels if c.rate_unit in ("rad/s", "m/s^2")]
+    walks = [f"{name} random walk" for name, unit in rates if unit == "rad/s"]
+    return (*walks, *(f"{name} bias instability" for name, _ in rates)) if rates else ("noise processes observed",)
+
+
 def _origins(unit: Unit) -> str:
     return ", ".join(dict.fromkeys(r.noise_origin for r in (unit.gyro, unit.accelerometer) if r is not None))
 
@@ -126,4 +143,5 @@ PROCEDURE = Procedure(
     analyse,
     report,
     learns=learns,
+    quantities=quantities,
 )

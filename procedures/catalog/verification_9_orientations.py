@@ -117,6 +117,12 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     return Result(checks=checks, verdict=verdict(checks), warnings=warnings, triads=triads)
 
 
+def quantities(params: Params, context: Context) -> tuple[str, ...]:
+    """Its checks."""
+    checks = ("bias in run, δ/√3", "errors as predicted, p-value of chi-square")
+    return tuple(f"{triad} {c}" for triad in TRIAD_NAMES for c in checks)
+
+
 def report(result: Result) -> Report:
     """Checks, Tables 5.3 and 5.4, figures 5.6-5.12 of the thesis."""
     magnitudes = [t.magnitudes for t in result.triads]
@@ -191,4 +197,5 @@ PROCEDURE = Procedure(
     analyse,
     report,
     uses_calibration=True,
+    quantities=quantities,
 )

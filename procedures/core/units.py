@@ -53,3 +53,28 @@ DISPLAY = {
     "count": ("count", 1.0),
 }
 """SI unit -> (the unit people read, its size in SI)."""
+
+_SIZES: dict[str, dict[str, float]] = {
+    "rad/s": {"rad/s": 1.0, "deg/s": DEG, "deg/h": DEG_PER_HOUR},
+    "rad": {"rad": 1.0, "deg": DEG, "arcsec": ARCSEC},
+    "m/s^2": {"m/s^2": 1.0, "µg": MICRO_G},
+    "1": {"1": 1.0, "ppm": PPM, "%": 0.01},
+    "s": {"s": 1.0, "h": HOUR},
+    "rad/√s": {"rad/√s": 1.0, "deg/√h": DEG_PER_SQRT_HOUR},
+}
+"""SI unit -> the units of the same kind and their size in it; a unit that is not here is only of its own kind."""
+
+
+def converted(value: float, unit: str, wanted: str) -> float:
+    """A value in another unit of the same kind. Raises `ValueError` naming the units that would do."""
+    if unit == wanted:
+        return value
+    for sizes in _SIZES.values():
+        if unit in sizes and wanted in sizes:
+            return value * sizes[unit] / sizes[wanted]
+    raise ValueError(f"it is in {unit}: {', '.join(units_like(unit))} can be asked for, {wanted} cannot")
+
+
+def units_like(unit: str) -> tuple[str, ...]:
+    """The units that a value in this one can be said in."""
+    return next((tuple(sizes) for sizes in _SIZES.values() if unit in sizes), (unit,))

@@ -1,0 +1,218 @@
+"""``bench campaign`` and ``bench schedule``: acceptance in one command, with an exit code that a CI system can read."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+from bench_service.cli.client import call, connect, sentence
+from bench_service.cli.options import AsJson, Server, console, errors, parameter
+from bench_service.cli.refusal import Refused
+
+if TYPE_CHECKING:
+    import httpx
+
+campaigns = typer.Typer(no_args_is_help=True, help="Campaigns: procedures in order, with limits and a verdict.")
+schedules = typer.Typer(no_args_is_help=True, help="Schedules: campaigns that start by themselves.")
+
+Unit = Annotated[str, typer.Option(help="Serial of the unit")]
+Bench = Annotated[str | None, typer.Option(help="Bench, where there are several")]
+NO_ITEMS: list[str] = []
+
+
+@campaigns.command("run")
+def run_campaign(
+    context: typer.Context,
+    name: str,
+    unit: Unit,
+    bench: Bench = None,
+    seed: Annotated[int | None, typer.Option(help="Base of the steps' seeds on a simulated bench")] = None,
+    set_: Annotated[
+        list[str], typer.Option("--set", help="A parameter, step.name=JSON value; may be repeated")
+    ] = NO_ITEMS,
+    label: Annotated[list[str], typer.Option(help="name=text; may be repeated")] = NO_ITEMS,
+    key: Annotated[str | None, typer.Option(help="Idempotency key: repeated with it, the run goes on")] = None,
+    junit: Annotated[Path | None, typer.Option(dir_okay=False, help="Write JUnit XML to this file")] = None,
+    server: Server = None,
+    as_json: AsJson = False,
+) -> int:
+    """Run a campaign on a unit and wait for its verdict. Exit code: 0 pass, 1 fail, 2 error."""
+    from bench_service.cli.campaign_tables import run_table
+    from bench_service.cli.watching import exit_code, watch_campaign
+
+    body = {"unit": unit, "bench": bench, "seed": seed, "labels": _labels(label), "parameters": _step_parameters(set_)}
+    if junit is not None and not junit.absolute().parent.is_dir():
+        raise Refused(f"{junit} cannot be written: there is no folder {junit.parent}")
+    headers = {} if key is None else {"Idempotency-Key": key}
+    with connect(context.obj, server, drive=True) as client:
+        run = call(client, "POST", f"/api/v1/campaigns/{name}/runs", json=body, headers=headers)
+        run = watch_campaign(client, run, errors)
+        report = call(client, "GET", f"/api/v1/campaign-runs/{run['id']}/report")
+        if junit is not None:
+            _write_junit(client, run["id"], junit)
+    if as_json:
+        print(json.dumps(report, indent=2))
+    else:
+        _wide().print(run_table(run))
+        for warning in run["warnings"]:
+            console.print(warning, style="yellow", markup=False, soft_wrap=True)
+        why = f": {run['reason']}" if run["reason"] else ""
+        console.print(f"verdict {run['verdict']}, run {run['id']} {run['state']}{why}", markup=False, soft_wrap=True)
+    return exit_code(run["verdict"])
+
+
+@campaigns.command("list")
+def list_campaigns(context: typer.Context, server: Server = None, as_json: AsJson = False) -> None:
+    """Campaigns by name."""
+    from bench_service.cli.campaign_tables import campaign_table
+
+    with connect(context.obj, server, drive=False) as client:
+        items = _all(client, "/api/v1/campaigns")
+    _show(items, as_json, campaign_table)
+
+
+@campaigns.command("show")
+def show_campaign(context: typer.Context, name: str, server: Server = None) -> None:
+    """A campaign as JSON, fit to be changed and added under another name."""
+    with connect(context.obj, server, drive=False) as client:
+        console.print_json(json.dumps(call(client, "GET", f"/api/v1/campaigns/{name}")["campaign"]))
+
+
+@campaigns.command("add")
+def add_campaign(
+    context: typer.Context,
+    file: Annotated[
+        Path, typer.Argument(exists=True, dir_okay=False, help="JSON file, as `bench campaign show` prints")
+    ],
+    server: Server = None,
+) -> None:
+    """Store a campaign; what can never work is refused, what may not is warned of."""
+    with connect(context.obj, server, drive=False) as client:
+        headers = {"Content-Type": "application/json"}
+        made = call(client, "POST", "/api/v1/campaigns", content=file.read_bytes(), headers=headers)
+    for warning in made["warnings"]:
+        console.print(warning, style="yellow", markup=False, soft_wrap=True)
+    console.print(f"campaign {made['name']}, {made['duration_s'] / 3600:.1f} h of bench time", soft_wrap=True)
+
+
+@campaigns.command("runs")
+def list_runs(
+    context: typer.Context,
+    campaign: Annotated[str | None, typer.Option(help="Only runs of this campaign")] = None,
+    limit: Annotated[int, typer.Option(help="How many")] = 20,
+    server: Server = None,
+    as_json: AsJson = False,
+) -> None:
+    """Runs of campaigns, newest first."""
+    from bench_service.cli.campaign_tables import runs_table
+
+    query = {"limit": limit} | ({} if campaign is None else {"campaign": campaign})
+    with connect(context.obj, server, drive=False) as client:
+        items = call(client, "GET", "/api/v1/campaign-runs", params=query)["items"]
+    _show(items, as_json, runs_table)
+
+
+@schedules.command("add")
+def add_schedule(
+    context: typer.Context,
+    campaign: str,
+    unit: Unit,
+    cron: Annotated[str, typer.Option(help="minute hour day month weekday, such as '0 1 * * *'")],
+    time_zone: Annotated[str, typer.Option(help="IANA name, such as Europe/Kyiv")],
+    bench: Bench = None,
+    missed: Annotated[str, typer.Option(help="run_once or skip: a start that nothing was running to see")] = "run_once",
+    start_within_s: Annotated[float, typer.Option(help="A start that is later than this was missed")] = 300.0,
+    overlap: Annotated[str, typer.Option(help="skip or queue: a start while the previous run is open")] = "skip",
+    server: Server = None,
+) -> None:
+    """Start a campaign by itself, again and again."""
+    body = {
+        "campaign": campaign,
+        "unit": unit,
+        "cron": cron,
+        "time_zone": time_zone,
+        "bench": bench,
+        "missed": missed,
+        "start_within_s": start_within_s,
+        "overlap": overlap,
+    }
+    with connect(context.obj, server, drive=False) as client:
+        made = call(client, "POST", "/api/v1/schedules", json=body)
+    console.print(f"schedule {made['id']}, next start {made['next_at']}", soft_wrap=True)
+
+
+@schedules.command("list")
+def list_schedules(context: typer.Context, server: Server = None, as_json: AsJson = False) -> None:
+    """Schedules, newest first."""
+    from bench_service.cli.campaign_tables import schedule_table
+
+    with connect(context.obj, server, drive=False) as client:
+        items = _all(client, "/api/v1/schedules")
+    _show(items, as_json, schedule_table)
+
+
+@schedules.command("remove")
+def remove_schedule(context: typer.Context, schedule: str, server: Server = None) -> None:
+    """Forget a schedule; its runs stay."""
+    with connect(context.obj, server, drive=False) as client:
+        answer = client.delete(f"/api/v1/schedules/{schedule}")
+        if not answer.is_success:
+            raise Refused(sentence(answer))
+
+
+def _write_junit(client: "httpx.Client", run_id: str, file: Path) -> None:
+    """Whole or not at all: a CI system may be reading."""
+    answer = client.get(f"/api/v1/campaign-runs/{run_id}/report", params={"format": "junit"})
+    if not answer.is_success:
+        raise Refused(sentence(answer))
+    partial = file.with_name(file.name + ".part")
+    try:
+        partial.write_bytes(answer.content)
+        partial.replace(file)
+    except OSError as error:
+        raise Refused(f"{file} cannot be written: {error.strerror}; the run is {run_id}") from error
+
+
+def _step_parameters(texts: list[str]) -> dict[str, dict[str, Any]]:
+    """``step.name=value`` as step -> name -> value."""
+    found: dict[str, dict[str, Any]] = {}
+    for text in texts:
+        path, value = parameter(text)
+        step, dot, name = path.partition(".")
+        if not (step and dot and name):
+            raise Refused(f"--set {text}: expected step.name=value")
+        found.setdefault(step, {})[name] = value
+    return found
+
+
+def _labels(texts: list[str]) -> dict[str, str]:
+    pairs = [text.partition("=") for text in texts]
+    for name, equals, value in pairs:
+        if not (name and equals and value):
+            raise Refused(f"--label {name}{equals}{value}: expected name=text")
+    return {name: value for name, _, value in pairs}
+
+
+def _all(client: "httpx.Client", path: str) -> list[dict[str, Any]]:
+    """Every page of a list."""
+    items: list[dict[str, Any]] = []
+    query: dict[str, Any] = {"limit": 500}
+    while True:
+        page = call(client, "GET", path, params=query)
+        items += page["items"]
+        if page["next"] is None:
+            return items
+        query["after"] = page["next"]
+
+
+def _show(items: list[dict[str, Any]], as_json: bool, table: Any) -> None:
+    if as_json:
+        print(json.dumps(items, indent=2))
+    else:
+        _wide().print(table(items))
+
+
+def _wide() -> Console:
+    return Console(width=max(console.width, 140))

@@ -1,0 +1,61 @@
+"""Campaigns, runs and schedules as tables for a terminal."""
+
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+
+COLOURS = {"pass": "green", "fail": "red", "error": "yellow"}
+
+
+def run_table(run: dict[str, Any]) -> Table:
+    """A run step by step: what became of it, and which checks failed."""
+    table = _table(
+        "step", "does", "state", "verdict", "checks", "what to know", title=f"{run['campaign']} {run['unit']}"
+    )
+    for step in run["steps"]:
+        bad = [c["name"] for c in step["checks"] if not c["passed"]]
+        told = "; ".join(filter(None, [step["reason"], f"missed: {', '.join(bad)}" if bad else ""]))
+        passed = f"{len(step['checks']) - len(bad)}/{len(step['checks'])}"
+        table.add_row(step["name"], step["does"], step["state"], _verdict(step["verdict"]), passed, escape(told))
+    return table
+
+
+def campaign_table(items: list[dict[str, Any]]) -> Table:
+    """Campaigns with their steps."""
+    table = _table("campaign", "title", "steps", "")
+    for item in items:
+        steps = ", ".join(step["name"] for step in item["campaign"]["steps"])
+        table.add_row(item["name"], escape(item["campaign"]["title"]), steps, "shipped" if item["shipped"] else "")
+    return table
+
+
+def runs_table(items: list[dict[str, Any]]) -> Table:
+    """Runs, newest first."""
+    table = _table("run", "campaign", "unit", "state", "verdict", "asked for", "what to know")
+    for run in items:
+        told = escape(run["waiting"] or run["reason"])
+        row = (run["id"], run["campaign"], run["unit"], run["state"], _verdict(run["verdict"]))
+        table.add_row(*row, run["created_at"][:19].replace("T", " "), told)
+    return table
+
+
+def schedule_table(items: list[dict[str, Any]]) -> Table:
+    """Schedules with their next and last starts."""
+    table = _table("schedule", "campaign", "unit", "cron", "zone", "next, UTC", "last outcome")
+    for one in items:
+        next_at = (one["next_at"] or "off")[:16].replace("T", " ")
+        row = (one["id"], one["campaign"], one["unit"], escape(one["cron"]), one["time_zone"], next_at)
+        table.add_row(*row, escape(one["last_outcome"]))
+    return table
+
+
+def _table(*columns: str, title: str | None = None) -> Table:
+    table = Table(title=title)
+    for index, column in enumerate(columns):
+        table.add_column(column, no_wrap=index == 0)
+    return table
+
+
+def _verdict(verdict: str | None) -> str:
+    return "–" if verdict is None else f"[{COLOURS[verdict]}]{verdict}[/]"

@@ -1,0 +1,26 @@
+"""What several commands take and say in the same words."""
+
+import json
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from bench_service.cli.refusal import Refused
+
+console = Console()
+errors = Console(stderr=True)
+
+Server = Annotated[str | None, typer.Option(help="Address of a service; without it, work in this process")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables")]
+
+
+def parameter(text: str) -> tuple[str, Any]:
+    """``name=value`` with the value as JSON, or as plain text where it is none."""
+    name, separator, value = text.partition("=")
+    if not separator or not name:
+        raise Refused(f"--set {text}: expected name=value")
+    try:
+        return name, json.loads(value)
+    except json.JSONDecodeError:
+        return name, value

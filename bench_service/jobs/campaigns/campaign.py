@@ -1,0 +1,138 @@
+"""A campaign as data: procedures in order, with limits, stop rules, and a rule for the seeds of simulated benches.
+
+What can be refused by looking at the document alone is refused here; what needs the catalogue, in `examination`.
+"""
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+NAME = r"^[a-z0-9][a-z0-9_-]{0,63}$"
+TEXT = r"^[^\x00-\x08\x0b-\x1f]*$"
+QUANTITY = Field(
+    min_length=1,
+    max_length=200,
+    pattern=TEXT,
+    description="Name of a check or of a named estimate of the result (gyro.b_x), or a JSON pointer into its document",
+)
+Label = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f]+$")]
+Labels = dict[Label, Label]
+Name = Annotated[str, Field(pattern=NAME)]
+
+
+class Document(BaseModel):
+    """Base of a campaign's parts: unknown fields are refused, NaN and infinity too."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class StepLimit(Document):
+    """A requirement on one quantity of a step's result, added to the procedure's own checks; inclusive."""
+
+    quantity: str = QUANTITY
+    unit: str = Field(min_length=1, max_length=32, pattern=TEXT, description="of the limits; deg/h, m/s^2, ppm, 1, …")
+    minimum: float | None = None
+    maximum: float | None = None
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        if self.minimum is None and self.maximum is None:
+            raise ValueError("a limit needs a minimum, a maximum or both")
+        if self.minimum is not None and self.maximum is not None and self.minimum > self.maximum:
+            raise ValueError(f"nothing can pass: minimum {self.minimum:g} is above maximum {self.maximum:g}")
+        return self
+
+
+class TrendRule(Document):
+    """Hold a quantity to the control limits of the unit's earlier results of the same procedure and parameters."""
+
+    quantity: str = QUANTITY
+    outcome: Literal["warning", "fail"] = Field("warning", description="what a signal of the chart means")
+    at_least: int = Field(8, ge=2, le=500, description="earlier results; with fewer nothing is judged, and it is said")
+    last: int = Field(100, ge=2, le=500, description="how many of the earlier results the limits rest on at most")
+
+
+class Step(Document):
+    """One step: a procedure on the bench, or a method over what earlier steps gave."""
+
+    name: Name
+    procedure: Label | None = None
+    method: Label | None = Field(None, description="needs no bench; works on the results of earlier steps")
+    calibrations_of: tuple[Name, ...] = Field((), max_length=100, description="of a method: steps that calibrated")
+    recordings_of: tuple[Name, ...] = Field((), max_length=100, description="of a method: steps that recorded")
+    parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+    limits: tuple[StepLimit, ...] = Field((), max_length=200)
+    trends: tuple[TrendRule, ...] = Field((), max_length=50)
+    on_fail: Literal["stop", "continue"] = Field("continue", description="when the verdict is fail")
+    on_error: Literal["stop", "continue"] = Field("stop", description="when it gave no verdict, after all retries")
+    retries: int = Field(0, ge=0, le=10, description="how often an error is answered by a new job")
+    optional: bool = Field(False, description="left out, and named, where the catalogue has no such procedure")
+
+    @property
+    def does(self) -> str:
+        """Name of its procedure or method."""
+        return self.procedure or self.method or ""
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        if (self.procedure is None) == (self.method is None):
+            raise ValueError("a step has either a procedure or a method")
+        if self.procedure is not None and (self.calibrations_of or self.recordings_of):
+            raise ValueError("only a method works on the results of other steps")
+        if self.method is not None and not (self.calibrations_of or self.recordings_of):
+            raise ValueError("a method needs calibrations_of or recordings_of")
+        if self.method is not None and self.trends:
+            raise ValueError("trends are of procedures")
+        return self
+
+
+class Seeds(Document):
+    """Seed of a step on a simulated bench: the run's base + the step's number (from 0) + 1000 for every retry.
+
+    The run's base is what the run was asked for; else, by `rule`, always `base` (every night is the same night), or
+    drawn anew for every run.
+    """
+
+    rule: Literal["vary", "repeat"] = "vary"
+    base: int = Field(0, ge=0, lt=2**47)
+
+    @model_validator(mode="after")
+    def _used(self) -> Self:
+        if self.rule == "vary" and self.base:
+            raise ValueError(f"base = {self.base} is used by the rule repeat only")
+        return self
+
+
+class Campaign(Document):
+    """Steps in order, and when to stop before the last of them."""
+
+    name: Name
+    title: str = Field("", max_length=200, pattern=TEXT)
+    description: str = Field("", max_length=4000, pattern=TEXT)
+    steps: tuple[Step, ...] = Field(min_length=1, max_length=100)
+    max_errors: int | None = Field(None, ge=1, le=100, description="stop once so many steps ended in error")
+    window_h: float | None = Field(
+        None, gt=0.0, le=8760.0, description="stop so long after the start; a plan that takes longer is refused"
+    )
+    labels: Labels = Field(default_factory=Labels, max_length=20)
+    seeds: Seeds = Field(default_factory=lambda: Seeds.model_validate({}))
+    priority: int = Field(10, ge=1, le=1000, description="of its jobs; smaller runs first")
+
+    @model_validator(mode="after")
+    def _names(self) -> Self:
+        known: set[str] = set()
+        for index, step in enumerate(self.steps):
+            if step.name in known:
+                raise ValueError(f"steps.{index}.name = {step.name!r}: each step needs a name of its own")
+            for other in (*step.calibrations_of, *step.recordings_of):
+                if other not in known:
+                    raise ValueError(
+                        f"steps.{index} works on {other!r}: an earlier step is needed, "
+                        f"there is {', '.join(sorted(known)) or 'none'}"
+                    )
+            known.add(step.name)
+        return self
+
+    def step(self, name: str) -> Step:
+        """A step by name."""
+        return next(step for step in self.steps if step.name == name)

@@ -1,0 +1,114 @@
+"""A run as JUnit XML, for a CI system to read: the run is the document, a step a suite, a check a case.
+
+A check that missed its limit is a failure, a step without a verdict an error, a step left out is skipped. A step that
+has no check of its own still has one case, so that nothing is lost between the lines.
+"""
+
+import re
+from datetime import datetime
+from math import isfinite
+from typing import TYPE_CHECKING
+
+from bench_service.jobs.campaigns.run import ENDED, CampaignRun, StepRun, StepState
+from procedures.core.limits import Check, Verdict
+
+if TYPE_CHECKING:
+    from junitparser import TestCase, TestSuite
+
+NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that no XML 1.0 document can have."""
+
+DECLARATION = b"<?xml version='1.0' encoding='utf-8'?>\n"
+
+
+def document(run: CampaignRun) -> bytes:
+    """UTF-8, with its declaration. Of a run that is still open the open steps are errors: they gave no verdict yet."""
+    from junitparser import JUnitXml
+
+    whole = JUnitXml(f"{run.campaign.name} {run.unit}")
+    for step in run.steps:
+        whole.add_testsuite(_suite(run, step))
+    whole.update_statistics()
+    return DECLARATION + whole.tostring()
+
+
+def _suite(run: CampaignRun, step: StepRun) -> "TestSuite":
+    from junitparser import TestSuite
+
+    suite = TestSuite(step.name)
+    suite.timestamp = (step.started_at or run.created_at).strftime("%Y-%m-%dT%H:%M:%S")
+    suite.hostname = run.bench
+    properties = {
+        "campaign": run.campaign.name,
+        "campaign_run": run.id,
+        "unit": run.unit,
+        "does": step.does,
+        "job": step.job_id,
+        "result": step.result_id,
+        "seed": step.seed,
+        "simulated": str(run.simulated).lower(),
+        "verdict": step.verdict and step.verdict.value,
+    }
+    for name, value in properties.items():
+        if value is not None:
+            suite.add_property(name, _text(str(value)))
+    for case in _cases(run, step):
+        suite.add_testcase(case)
+    return suite
+
+
+def _cases(run: CampaignRun, step: StepRun) -> list["TestCase"]:
+    """A case a check, and one for the step itself where no check says what became of it."""
+    from junitparser import Error, Skipped
+
+    cases = [_checked(run, step, check) for check in step.checks]
+    verdict_is_said = bool(cases) and step.verdict is not Verdict.ERROR
+    if step.state in (StepState.SUCCEEDED, StepState.FAILED) and verdict_is_said:
+        cases[0].time = _seconds(step.started_at, step.finished_at)
+        return cases
+    whole = _case(run, step, step.name)
+    whole.time = _seconds(step.started_at, step.finished_at)
+    if step.state is StepState.SKIPPED:
+        whole.result = [Skipped(_text(step.reason))]
+    elif step.state not in ENDED:
+        whole.result = [Error(_text(f"not ended: {step.state.value} {run.waiting}".strip()), "NotEnded")]
+    elif step.verdict is Verdict.ERROR:
+        whole.result = [Error(_text(step.reason or "no verdict"), "Error")]
+    elif step.verdict is None:
+        whole.result = [Error(_text(step.reason or step.state.value), step.state.value.capitalize())]
+    return [*cases, whole]
+
+
+def _checked(run: CampaignRun, step: StepRun, check: Check) -> "TestCase":
+    from junitparser import Failure
+
+    case = _case(run, step, check.name)
+    if not check.passed:
+        failure = Failure(_text(_sentence(check)), "Limit")
+        failure.text = _text(check.note or _sentence(check))
+        case.result = [failure]
+    return case
+
+
+def _case(run: CampaignRun, step: StepRun, name: str) -> "TestCase":
+    from junitparser import TestCase
+
+    return TestCase(_text(name), f"{run.campaign.name}.{step.name}", 0.0)
+
+
+def _sentence(check: Check) -> str:
+    """The value beside its limit, as a person reads it."""
+    limit = check.limit
+    bounds = [f"≥ {limit.minimum:.6g}"] if limit.minimum is not None else []
+    bounds += [f"≤ {limit.maximum:.6g}"] if limit.maximum is not None else []
+    value = f"{check.value:.6g}" if isfinite(check.value) else "no finite number"
+    uncertainty = "" if check.standard_uncertainty is None else f" ± {check.standard_uncertainty:.2g}"
+    return f"{check.name} = {value}{uncertainty} {limit.unit}, limit {' and '.join(bounds)} {limit.unit}"
+
+
+def _seconds(begun: datetime | None, ended: datetime | None) -> float:
+    return 0.0 if begun is None or ended is None else (ended - begun).total_seconds()
+
+
+def _text(text: str) -> str:
+    return NOT_XML.sub("�", text)

@@ -1,0 +1,107 @@
+"""When a campaign starts by itself: a cron expression in a time zone, and the rules for starts that were missed.
+
+Where clocks are set forward, a start in the hour that is left out is made up at its end; where they are set back, a
+start at a fixed hour happens once, one of every hour (or with a step or range in minute or hour) in both hours. That is
+the rule of Debian's cron, and cronsim's.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from enum import StrEnum
+from zoneinfo import ZoneInfo
+
+from procedures.core.errors import BadParameter
+
+FIELDS = 5
+"""Minute, hour, day of month, month, day of week."""
+LOOK_BACK = timedelta(days=2)
+"""Of many missed starts the latest counts: it is looked for so far back first."""
+
+
+class Missed(StrEnum):
+    """What becomes of a start that could not happen in time, because nothing was running to see it."""
+
+    RUN_ONCE = "run_once"
+    """One run makes up for all that were missed."""
+    SKIP = "skip"
+    """The next one is waited for."""
+
+
+class Overlap(StrEnum):
+    """What becomes of a start while the schedule's previous run is open."""
+
+    SKIP = "skip"
+    QUEUE = "queue"
+    """The new run waits for the older one."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """A campaign on a unit, again and again."""
+
+    id: str
+    cron: str
+    time_zone: str
+    """IANA name, such as Europe/Kyiv."""
+    campaign: str
+    unit: str
+    created_at: datetime
+    bench: str | None = None
+    enabled: bool = True
+    missed: Missed = Missed.RUN_ONCE
+    start_within_s: float = 300.0
+    """A start that is later than this was missed."""
+    overlap: Overlap = Overlap.SKIP
+    labels: dict[str, str] = field(default_factory=dict[str, str])
+    next_at: datetime | None = None
+    """UTC; None while disabled."""
+    last_at: datetime | None = None
+    """The last planned time that was seen, whatever became of it."""
+    last_run: str | None = None
+    last_outcome: str = ""
+    """What became of it, in words."""
+
+
+def zone_of(name: str) -> ZoneInfo:
+    """Raises `BadParameter` for a name that is no time zone."""
+    try:
+        return ZoneInfo(name)
+    except (KeyError, ValueError, OSError):  # OSError: the name of a folder of zones
+        raise BadParameter("time_zone", name, "the IANA name of a time zone, such as Europe/Kyiv or UTC") from None
+
+
+def starts_after(cron: str, time_zone: str, moment: datetime) -> Iterator[datetime]:
+    """Every start after a moment, in UTC. Raises `BadParameter` for an expression or a zone that is none."""
+    from cronsim import CronSim, CronSimError
+
+    zone = zone_of(time_zone)
+    if len(cron.split()) != FIELDS:
+        raise BadParameter("cron", cron, "five fields: minute, hour, day of month, month, day of week")
+    try:
+        found = CronSim(cron, moment.astimezone(zone))
+    except CronSimError as error:
+        raise BadParameter("cron", cron, f"no cron expression that can ever be due: {error}") from None
+    return (start.astimezone(UTC) for start in found)
+
+
+def next_start(cron: str, time_zone: str, moment: datetime) -> datetime:
+    """The first start after a moment, in UTC. Raises `BadParameter` where there is none within 50 years."""
+    start = next(starts_after(cron, time_zone, moment), None)
+    if start is None:
+        raise BadParameter("cron", cron, "a time that comes: this one is not due within 50 years")
+    return start
+
+
+def latest_due(schedule: Schedule, at: datetime) -> datetime:
+    """The latest start that is not after `at`, of a schedule whose next start is not either."""
+    assert schedule.next_at is not None
+    latest = schedule.next_at
+    for begin in (max(schedule.next_at, at - LOOK_BACK), schedule.next_at):
+        for start in starts_after(schedule.cron, schedule.time_zone, begin):
+            if start > at:
+                break
+            latest = start
+        if latest > schedule.next_at or begin == schedule.next_at:
+            break
+    return latest

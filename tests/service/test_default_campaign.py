@@ -1,0 +1,142 @@
+"""The campaign that ships, scaled down, from one request to JUnit XML; and a golden unit's history."""
+
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from bench_service.drivers.simulated import SimulatedDriver
+from bench_service.jobs.campaigns.shipped import shipped
+from procedures import catalog
+from procedures.procedure import Context
+from tests.service.campaigns import SCALED_DOWN, SHORT, add, ended, named, start
+from tests.service.client import Client
+
+STEPS = ["static", "thermal", "calibration_1", "calibration_2", "calibration_3", "run_to_run", "verification"]
+
+
+@pytest.fixture(scope="module")
+def run(sqlite_client: Client) -> dict[str, Any]:
+    run_id = start(sqlite_client, "thesis_acceptance", seed=5, parameters=SCALED_DOWN)["id"]
+    return ended(sqlite_client, run_id, 110.0)
+
+
+@pytest.fixture(scope="module")
+def report(sqlite_client: Client, run: dict[str, Any]) -> dict[str, Any]:
+    return sqlite_client.http.get(f"/api/v1/campaign-runs/{run['id']}/report").json()
+
+
+def test_it_is_the_theses_campaign(sqlite_client: Client) -> None:
+    campaign = shipped()["thesis_acceptance"]
+    static = campaign.step("static").parameters
+    assert (static["launches"], static["duration_s"], static["sample_rate_hz"]) == (4, 6 * 3600.0, 100.0)
+    limits = campaign.step("run_to_run").parameters
+    assert limits["gyro_scale_run_to_run_ppm"] == 10.0  # thesis 4.3, 5.6
+    assert limits["accelerometer_bias_run_to_run_m_s2"] == 0.0005
+    answer = sqlite_client.http.post("/api/v1/campaigns/thesis_acceptance/preview", json={"unit": "SIM-0001"}).json()
+    hours = {step["name"]: step["duration_s"] / 3600.0 for step in answer["steps"]}
+    assert hours["static"] == pytest.approx(4 * 7.0, abs=0.01)
+    assert hours["calibration_1"] == pytest.approx(0.25, abs=0.01)
+    assert any("10 ppm cannot be resolved" in warning for warning in answer["warnings"])
+
+
+def test_every_step_says_what_became_of_it(run: dict[str, Any]) -> None:
+    assert [step["name"] for step in run["steps"]] == STEPS
+    assert run["state"] == "succeeded", run["reason"]
+    states = {step["name"]: step["state"] for step in run["steps"]}
+    if "thermal_cycle" not in catalog.discover():
+        assert states.pop("thermal") == "skipped"
+        assert "thermal_cycle" in next(w for w in run["warnings"] if w.startswith("step thermal"))
+    assert set(states.values()) == {"succeeded"}
+    verdicts = [step["verdict"] for step in run["steps"] if step["verdict"]]
+    assert run["verdict"] == ("fail" if "fail" in verdicts else "pass")
+    calibrations = [step for step in run["steps"] if step["name"].startswith("calibration")]
+    assert [step["seed"] for step in calibrations] == [7, 8, 9]  # the run's base and the number of the step
+
+
+def test_a_result_has_what_its_procedure_promised(sqlite_client: Client, run: dict[str, Any]) -> None:
+    """Limits are refused by these names before a campaign runs, so they must be the names that come out."""
+    service = sqlite_client.http
+    unit_and_bench = (SimulatedDriver("sim").mounted()[0], SimulatedDriver("sim").description)
+    for step in run["steps"]:
+        procedure = catalog.discover().get(step["does"])
+        if procedure is None or procedure.quantities is None or step["job"] is None:
+            continue
+        job = service.get(f"/api/v1/jobs/{step['job']}").json()
+        context = Context(*unit_and_bench)
+        promised = procedure.quantities(procedure.params.model_validate(job["parameters"]), context)
+        found = {check["name"] for check in step["checks"]}
+        assert found == {name for name in promised if name in found}
+        missing = [name for name in promised if name not in found and ".K" not in name and ".b_" not in name]
+        assert missing == [], step["name"]
+
+
+def test_the_report_leads_back_to_the_samples(
+    sqlite_client: Client, run: dict[str, Any], report: dict[str, Any]
+) -> None:
+    assert report["run"] == run
+    jobs = {one["step"]: one for one in report["lineage"]}
+    assert set(jobs) == {step["name"] for step in run["steps"] if step["state"] == "succeeded"}
+    static = jobs["static"]
+    ((recording, digest),) = static["recordings"]
+    stored = sqlite_client.http.get(f"/api/v1/recordings/{recording}").json()
+    assert (stored["content_hash"], stored["job"], stored["rate_hz"]) == (digest, static["job"], 100.0)
+    assert stored["count"] == 600 * 100
+    assert static["simulated"] is True
+    assert static["seed"] == 5
+    assert report["code_versions"] == [sqlite_client.http.get("/healthz").json()["code_version"]]
+    results = [jobs[f"calibration_{k}"]["result"] for k in (1, 2, 3)]
+    made = sqlite_client.http.get("/api/v1/units/SIM-0001/calibrations", params={"limit": 500}).json()["items"]
+    of_result = {c["result"]: c["id"] for c in made}
+    assert jobs["run_to_run"]["calibrations"] == [of_result[r] for r in results]
+    assert jobs["verification"]["calibrations"] == [of_result[results[-1]]]
+
+
+def test_the_junit_document_is_what_ci_systems_read(sqlite_client: Client, run: dict[str, Any]) -> None:
+    answer = sqlite_client.http.get(f"/api/v1/campaign-runs/{run['id']}/report", params={"format": "junit"})
+    assert answer.headers["content-type"] == "application/xml"
+    root = ElementTree.fromstring(answer.content)
+    assert (root.tag, root.get("name")) == ("testsuites", "thesis_acceptance SIM-0001")
+    suites = root.findall("testsuite")
+    assert [suite.get("name") for suite in suites] == STEPS
+    for suite, step in zip(suites, run["steps"], strict=True):
+        assert [child.tag for child in suite] == ["properties"] + ["testcase"] * len(suite.findall("testcase"))
+        cases = suite.findall("testcase")
+        names = [case.get("name") for case in cases]
+        assert names == ([c["name"] for c in step["checks"]] or [step["name"]])
+        failed = [case.get("name") for case in cases if case.find("failure") is not None]
+        assert failed == [c["name"] for c in step["checks"] if not c["passed"]]
+        skipped = [case for case in cases if case.find("skipped") is not None]
+        assert len(skipped) == (1 if step["state"] == "skipped" else 0)
+        told = {"tests": len(cases), "failures": len(failed), "errors": 0, "skipped": len(skipped)}
+        assert {name: int(suite.get(name) or 0) for name in told} == told
+        assert all(len(case) <= 1 and case.get("classname") and case.get("time") for case in cases)
+        properties = {p.get("name"): p.get("value") for p in suite.iter("property")}
+        assert properties["campaign_run"] == run["id"]
+        assert properties.get("job") == step["job"]
+    for name in ("tests", "failures", "errors", "skipped"):
+        assert int(root.get(name) or 0) == sum(int(suite.get(name) or 0) for suite in suites)
+
+
+def test_limits_and_history_of_a_golden_unit(sqlite_client: Client) -> None:
+    step = {
+        "procedure": "calibration_12_orientations",
+        "parameters": {**SHORT, "limits": {"gyro_bias_in_run_deg_h": 1.0}},
+        "limits": [{"quantity": "gyro.b_x", "unit": "deg/h", "minimum": -100.0, "maximum": 100.0}],
+        "trends": [{"quantity": "gyro.b_x", "at_least": 2, "outcome": "fail"}],
+    }
+    add(sqlite_client, named("golden", step, seeds={"rule": "repeat", "base": 9}))
+    runs = [ended(sqlite_client, start(sqlite_client, "golden", unit="RANDOM-3")["id"]) for _ in range(2)]
+    assert [run["verdict"] for run in runs] == ["pass"] * 2
+    names = [c["name"] for c in runs[-1]["steps"][0]["checks"]]
+    assert names[-1] == "gyro.b_x, campaign's limit"
+    assert "trend of gyro.b_x: 1 earlier results, 2 are needed to judge it" in runs[-1]["steps"][0]["warnings"]
+    query = {"quantity": "gyro.b_x", "procedure": "calibration_12_orientations"}
+    trend = sqlite_client.http.get("/api/v1/units/RANDOM-3/trend", params=query).json()
+    values = [p["value"] for p in trend["points"]]
+    assert values == [values[0]] * 2  # the same night twice
+    assert trend["limits"]["sigma"] == 0.0
+    assert sqlite_client.http.get("/units/RANDOM-3/trend", params=query).status_code == 200
+    other = ended(sqlite_client, start(sqlite_client, "golden", unit="RANDOM-3", seed=10)["id"])
+    assert other["verdict"] == "fail"  # a spread of zero notices every other night
+    assert [c["name"] for c in other["steps"][0]["checks"] if not c["passed"]] == ["gyro.b_x, trend"]

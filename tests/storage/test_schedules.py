@@ -1,0 +1,131 @@
+"""Schedules on both databases: on time, missed, overlapping; switched off and on; two processes at once."""
+
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from threading import Thread
+
+import pytest
+
+from bench_service.jobs.campaigns.run import CampaignRun, RunRequest
+from bench_service.jobs.campaigns.schedule import Missed, Overlap, Schedule
+from bench_service.jobs.campaigns.scheduler import Scheduler, ScheduleRequest
+from bench_service.jobs.errors import NotFound, NotMounted
+from bench_service.jobs.job import JobState
+from bench_service.jobs.store import Stores
+from procedures.core.limits import Verdict
+from tests.storage.campaigns import campaign, new_run
+
+NIGHTLY = ScheduleRequest("0 1 * * *", "Europe/Kyiv", "trial", "U-1")
+DUE = datetime(2031, 7, 1, 22, 0, tzinfo=UTC)  # 01:00 in Kyiv, in summer time
+OF = campaign({})
+
+
+def prepared(request: RunRequest) -> CampaignRun:
+    if request.unit == "gone":
+        raise NotMounted("bench 'sim' has no unit 'gone'")
+    return new_run(OF, unit=request.unit, labels=request.labels)
+
+
+@pytest.fixture
+def scheduler(stores: Stores) -> Scheduler:
+    return Scheduler(stores, lambda _: OF, prepared)
+
+
+def due(stores: Stores, scheduler: Scheduler, **changes: object) -> Schedule:
+    """A nightly schedule whose next start is `DUE`."""
+    made = scheduler.add(NIGHTLY)
+    schedule = replace(made, next_at=DUE, **changes)  # pyright: ignore[reportArgumentType]
+    assert stores.campaigns.save_schedule(schedule, made.next_at, None)
+    return schedule
+
+
+def runs(stores: Stores) -> list[CampaignRun]:
+    return list(stores.campaigns.runs(limit=100).items)
+
+
+def test_a_new_schedule_says_when_it_starts(scheduler: Scheduler, stores: Stores) -> None:
+    made = scheduler.add(NIGHTLY, key="k")
+    assert made.next_at is not None
+    assert made.next_at.astimezone(UTC).hour in (22, 23)
+    assert scheduler.add(NIGHTLY, key="k") == made == scheduler.get(made.id)
+    assert [s.id for s in scheduler.list().items] == [made.id]
+    assert stores.campaigns.due_schedules(made.next_at - timedelta(seconds=1)) == ()
+    assert [s.id for s in stores.campaigns.due_schedules(made.next_at)] == [made.id]
+
+
+def test_a_start_on_time(scheduler: Scheduler, stores: Stores) -> None:
+    schedule = due(stores, scheduler)
+    assert scheduler.fire(schedule, DUE + timedelta(seconds=2))
+    (run,) = runs(stores)
+    assert (run.schedule_id, run.planned_at, run.state) == (schedule.id, DUE, JobState.QUEUED)
+    after = scheduler.get(schedule.id)
+    assert (after.next_at, after.last_at) == (DUE + timedelta(days=1), DUE)
+    assert (after.last_run, after.last_outcome) == (run.id, "started")
+
+
+@pytest.mark.parametrize("nights", [0, 3])
+@pytest.mark.parametrize("missed", list(Missed))
+def test_a_missed_start(scheduler: Scheduler, stores: Stores, missed: Missed, nights: int) -> None:
+    schedule = due(stores, scheduler, missed=missed)
+    back = DUE + timedelta(days=nights, hours=5)
+    assert scheduler.fire(schedule, back)
+    planned = [run.planned_at for run in runs(stores)]
+    assert planned == ([DUE + timedelta(days=nights)] if missed is Missed.RUN_ONCE else [])
+    after = scheduler.get(schedule.id)
+    assert after.next_at == DUE + timedelta(days=nights + 1)
+    assert "missed by 5:00:0" in after.last_outcome
+
+
+def test_the_grace_is_inclusive(scheduler: Scheduler, stores: Stores) -> None:
+    for late, expected in ((60.0, 1), (60.5, 1)):
+        schedule = due(stores, scheduler, missed=Missed.SKIP, start_within_s=60.0)
+        assert scheduler.fire(schedule, DUE + timedelta(seconds=late))
+        assert len(runs(stores)) == expected
+
+
+@pytest.mark.parametrize("overlap", list(Overlap))
+def test_a_start_while_the_previous_run_is_open(scheduler: Scheduler, stores: Stores, overlap: Overlap) -> None:
+    schedule = due(stores, scheduler, overlap=overlap)
+    assert scheduler.fire(schedule, DUE)
+    assert scheduler.fire(scheduler.get(schedule.id), DUE + timedelta(days=1))
+    assert len(runs(stores)) == (2 if overlap is Overlap.QUEUE else 1)
+    if overlap is Overlap.SKIP:
+        assert runs(stores)[0].id in scheduler.get(schedule.id).last_outcome
+    ended = replace(runs(stores)[-1], state=JobState.SUCCEEDED, revision=2)
+    assert stores.campaigns.save_run(ended, 1)
+    assert scheduler.fire(scheduler.get(schedule.id), DUE + timedelta(days=2))
+    assert len(runs(stores)) == (3 if overlap is Overlap.QUEUE else 2)
+
+
+def test_a_night_that_cannot_begin_is_seen(scheduler: Scheduler, stores: Stores) -> None:
+    schedule = due(stores, scheduler, unit="gone")
+    assert scheduler.fire(schedule, DUE)
+    (run,) = runs(stores)
+    assert (run.state, run.verdict, run.schedule_id) == (JobState.FAILED, Verdict.ERROR, schedule.id)
+    assert "no unit 'gone'" in run.reason
+    assert "no unit 'gone'" in scheduler.get(schedule.id).last_outcome
+
+
+def test_of_several_processes_one_starts_it(scheduler: Scheduler, stores: Stores) -> None:
+    schedule = due(stores, scheduler)
+    threads = [Thread(target=scheduler.fire, args=(schedule, DUE)) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(runs(stores)) == 1
+
+
+def test_off_and_on_again(scheduler: Scheduler, stores: Stores) -> None:
+    schedule = due(stores, scheduler)
+    off = scheduler.enable(schedule.id, enabled=False)
+    assert (off.enabled, off.next_at) == (False, None)
+    assert stores.campaigns.due_schedules(DUE + timedelta(days=9)) == ()
+    assert not scheduler.fire(schedule, DUE)  # another process read it before
+    assert runs(stores) == []
+    on = scheduler.enable(schedule.id, enabled=True)
+    assert on.next_at is not None
+    scheduler.remove(schedule.id)
+    with pytest.raises(NotFound):
+        scheduler.get(schedule.id)
+    assert not scheduler.fire(schedule, DUE)
