@@ -1,7 +1,9 @@
 """Shared verbs over a bench: what several procedures do in the same way."""
 
 from collections.abc import AsyncGenerator, AsyncIterator, Sequence
+from contextlib import aclosing
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,7 @@ from procedures.analysis.thermal.profile_progress import (
     CASE,
     CHECK_S,
     CONVERTER,
+    DISCONNECTED_CODE,
     SENSORS,
     SET_POINT,
     ProfileProgress,
@@ -154,3 +157,46 @@ def _require_working(reading: ChamberReading) -> None:
         )
     if reading.door_open:
         raise DeviceFault("the chamber's door was opened during the run")
+
+
+async def record_current(bench: Bench, station: Station) -> Stream:
+    """A converter alone: on, the station's current on its inputs, soak at its temperature, settle, begin the recording.
+
+    The soak is over when the converter's *own* sensor says so, by the criterion of the station's profile, whose last
+    leg is the temperature. The current flows meanwhile, so that what it heats is steady too. Raises `SoakNotReached`,
+    `DeviceFault` (no such devices, chamber tripped or open, sensor disconnected), and as the devices do.
+    """
+    chamber, source, profile = bench.chamber, bench.current_source, station.profile
+    if chamber is None or source is None or profile is None or station.current_ma is None:
+        raise DeviceFault(f"station {station.label!r} needs a thermal chamber, a current source, and a soak")
+    await bench.supply.switch_on()
+    await source.set_current(station.current_ma)
+    await _soaked(bench, chamber, profile, station)
+    await bench.clock.sleep(station.settle_s)
+    return bench.imu.record(station.record_s, station)
+
+
+async def _soaked(bench: Bench, chamber: Chamber, profile: TemperatureProfile, station: Station) -> None:
+    """Drive a profile until the converter's own sensor has soaked; nothing of it is kept."""
+    progress = ProfileProgress(profile)
+    stream = bench.imu.record(profile.longest_s + CHECK_S, station)
+    names = [channel.name for channel in stream.channels]
+    if CONVERTER not in names:
+        raise MissingChannel(CONVERTER, names)
+    column, step, taken = names.index(CONVERTER), check_samples(stream.rate_hz), 0
+    sensor = stream.channels[column]
+    await _command(chamber, profile.legs[0])
+    async with aclosing(cast(AsyncGenerator[NDArray[np.int32], None], stream.blocks)) as blocks:
+        async for block in blocks:
+            reading = await chamber.read()
+            _require_working(reading)
+            first, taken = taken, taken + len(block)
+            for sample in range((first // step + 1) * step, taken + 1, step):
+                code = int(block[sample - first - 1, column])
+                if code == DISCONNECTED_CODE:
+                    raise DeviceFault(f"{CONVERTER} is disconnected: it sends code {DISCONNECTED_CODE}")
+                own_c = sensor.scale * (code - sensor.offset)
+                readings = [own_c] * len(SENSORS)
+                if await _advance(chamber, progress, sample / step * CHECK_S, readings, reading.air_c):
+                    return
+    raise SoakNotReached("the converter has not soaked in the time that the profile allows")
