@@ -18,7 +18,7 @@ from procedures.bench.imu import Stream
 from procedures.core.arrays import Array
 from procedures.core.recording import INCREMENTS, Channel, RawArray, Station
 
-LOOK_S = 0.05
+LOOK_S = 0.1
 """A block is looked at not sooner than this after the one before [s, real time]."""
 STRETCHES = 10
 
