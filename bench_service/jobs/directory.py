@@ -1,4 +1,4 @@
-"""The benches that there are: the one that this process drives, and all that workers of this database have registered."""
+"""The benches that there are: the one that this process drives, and all that workers have registered."""
 
 from collections.abc import Callable
 
