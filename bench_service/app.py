@@ -9,7 +9,18 @@ from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
-from bench_service.api import analyses, benches, errors, health, jobs, procedures, recordings, reservations, units
+from bench_service.api import (
+    analyses,
+    benches,
+    errors,
+    event_stream,
+    health,
+    jobs,
+    procedures,
+    recordings,
+    reservations,
+    units,
+)
 from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
@@ -18,6 +29,8 @@ from bench_service.jobs.code_version import code_version
 from bench_service.jobs.devices import BenchDevices
 from bench_service.jobs.directory import BenchDirectory
 from bench_service.jobs.dispatcher import Dispatcher, JobEngine
+from bench_service.jobs.event_hub import EventHub
+from bench_service.jobs.live import Heartbeat, LiveBoard
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.safety import SafetyDesk
@@ -47,16 +60,21 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     planner = Planner(stores, BenchDirectory(stores.units, driver, settings.bench_id, drawn_unit, holder))
     code = code_version()
     worker: Worker | None = None
+    board = LiveBoard(stores.live)
     if driver is not None:
         lease = acquire_lease(settings.database_url, settings.bench_id)
         closing.callback(lease.release)
         files = HostFiles(settings.devices_in(), settings.bench_id)
         files.begin_driving()
         closing.callback(files.end_driving)
-        runner = JobRunner(stores, planner, driver, code, lease.held, settings.retry_scale)
+        board = LiveBoard(stores.live, settings.bench_id)
+        heartbeat = Heartbeat(board, stores.live)
+        heartbeat.begin()
+        closing.callback(heartbeat.end)
+        runner = JobRunner(stores, planner, driver, code, lease.held, board, settings.retry_scale)
         worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease))
     safety = SafetyDesk(stores, partial(_devices, settings), partial(HostFiles, settings.devices_in()))
-    service = BenchService(stores, driver, planner, worker, code, safety, database.free_bytes)
+    service = BenchService(stores, driver, planner, worker, code, safety, board, database.free_bytes)
     closing.callback(service.stop)
     service.register()
     return service
@@ -108,6 +126,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.service = service
+    app.state.hub = EventHub(service.stores.jobs, service.live, event_stream.FRAMES)
     app.state.max_import_bytes = max_import_bytes
     for module in ROUTERS:
         app.include_router(module.router)

@@ -1,15 +1,37 @@
 """Shared verbs over a bench: what several procedures do in the same way."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from procedures.analysis.thermal.profile_progress import (
+    AIR,
+    CASE,
+    CHECK_S,
+    CONVERTER,
+    SENSORS,
+    SET_POINT,
+    ProfileProgress,
+    SensorWatch,
+    Standing,
+    check_samples,
+)
 from procedures.bench import Bench
+from procedures.bench.chamber import Chamber, ChamberReading
+from procedures.bench.errors import DeviceFault, SoakNotReached
 from procedures.bench.imu import Stream
-from procedures.core.recording import Station
+from procedures.core.errors import MissingChannel
+from procedures.core.recording import Channel, Quantity, Station
+from procedures.core.temperature_profile import ProfileLeg, TemperatureProfile
 from procedures.core.turn import Turn
+
+Blocks = AsyncIterator[NDArray[np.int32]]
+
+CHAMBER_SCALE_C = 0.001
+"""Of the channels that tell what the chamber said [°C a count]."""
+CHAMBER_CHANNELS = tuple(Channel(name, Quantity.TEMPERATURE, "degC", CHAMBER_SCALE_C) for name in (AIR, SET_POINT))
 
 
 async def record_station(bench: Bench, station: Station) -> Stream:
@@ -36,10 +58,99 @@ async def record_turn(bench: Bench, station: Station) -> Stream:
     return replace(stream, blocks=_turning(bench, station.turn, stream.blocks))
 
 
-async def _turning(
-    bench: Bench, turn: Turn, blocks: AsyncIterator[NDArray[np.int32]]
-) -> AsyncIterator[NDArray[np.int32]]:
+async def _turning(bench: Bench, turn: Turn, blocks: Blocks) -> Blocks:
     bench.turntable.command_turn(turn)
     async for block in blocks:
         yield block
     await bench.turntable.settle()
+
+
+async def record_profile(bench: Bench, station: Station, request: str) -> Stream:
+    """One launch in the chamber: off, set by hand as `request` says, off for `power_off_s`, on, record the profile.
+
+    While the unit is off the chamber goes to the profile's first temperature. While the stream is read the profile is
+    driven: each leg is commanded, and left when the *unit's* temperatures say that it has soaked. What the chamber says
+    of itself stands in two more channels, `CHAMBER_CHANNELS`, so that every soak can be judged again from the
+    recording. The stream ends with the last soak, at the latest after `record_s`.
+
+    Reading it may raise `SoakNotReached`, `DeviceFault` (chamber tripped or open, a temperature sensor disconnected or
+    stuck, the unit too hot or too cold), `OutOfRange`, `Disconnected`. Raises `DeviceFault` where the bench has no
+    chamber or nobody to set the unit, and as the devices do.
+    """
+    chamber, profile = bench.chamber, station.profile
+    if chamber is None or bench.operator is None or station.angles is None or profile is None:
+        raise DeviceFault(f"station {station.label!r} needs a thermal chamber, a person, an attitude and a profile")
+    await bench.supply.switch_off()
+    await bench.operator.set_by_hand(station.angles, request)
+    await _command(chamber, profile.legs[0])
+    await bench.clock.sleep(station.power_off_s)
+    await bench.supply.switch_on()
+    await bench.clock.sleep(station.settle_s)
+    stream = bench.imu.record(station.record_s, station)
+    columns = _columns(stream.channels)
+    driven = _driven(chamber, profile, stream, columns)
+    return replace(stream, channels=(*stream.channels, *CHAMBER_CHANNELS), blocks=driven)
+
+
+def _columns(channels: Sequence[Channel]) -> list[int]:
+    """Of the unit's temperature sensors. Raises `MissingChannel`."""
+    names = [channel.name for channel in channels]
+    for name in SENSORS:
+        if name not in names:
+            raise MissingChannel(name, names)
+    return [names.index(name) for name in SENSORS]
+
+
+async def _command(chamber: Chamber, leg: ProfileLeg) -> None:
+    await chamber.command(leg.target_c, leg.ramp_c_min)
+
+
+async def _driven(chamber: Chamber, profile: TemperatureProfile, stream: Stream, columns: list[int]) -> Blocks:
+    """The stream's blocks with what the chamber says beside them; each leg is commanded when the one before is done."""
+    progress, watch = ProfileProgress(profile), SensorWatch(profile)
+    sensors = [stream.channels[c] for c in columns]
+    step, taken = check_samples(stream.rate_hz), 0
+    await _command(chamber, profile.legs[0])
+    try:
+        async for block in stream.blocks:
+            reading = await chamber.read()
+            said = [round(value / CHAMBER_SCALE_C) for value in (reading.air_c, reading.set_point_c)]
+            yield np.column_stack([block, np.broadcast_to(np.array(said, dtype=np.int32), (len(block), 2))])
+            _require_working(reading)
+            first, taken = taken, taken + len(block)
+            for sample in range((first // step + 1) * step, taken + 1, step):
+                codes = block[sample - first - 1, columns].tolist()
+                temperatures = [c.scale * (code - c.offset) for c, code in zip(sensors, codes, strict=True)]
+                if (wrong := watch.step(codes, temperatures)) is not None:
+                    raise DeviceFault(wrong)
+                if await _advance(chamber, progress, sample / step * CHECK_S, temperatures, said[0] * CHAMBER_SCALE_C):
+                    return
+    finally:
+        if isinstance(stream.blocks, AsyncGenerator):
+            await stream.blocks.aclose()
+    raise SoakNotReached("the recording is over, and the profile is not")
+
+
+async def _advance(
+    chamber: Chamber, progress: ProfileProgress, t_s: float, temperatures: list[float], air_c: float
+) -> bool:
+    """Judge one reading, command the next leg where one is done; True at the profile's end."""
+    case, converter = temperatures[SENSORS.index(CASE)], temperatures[SENSORS.index(CONVERTER)]
+    standing = progress.step(t_s, case, converter, air_c)
+    if standing is Standing.LATE:
+        raise SoakNotReached(progress.why_late(air_c))
+    if standing is Standing.DONE:
+        if progress.leg is None:
+            return True
+        await _command(chamber, progress.leg)
+    return False
+
+
+def _require_working(reading: ChamberReading) -> None:
+    if reading.tripped:
+        raise DeviceFault(
+            f"the chamber's over-temperature limiter has tripped, the air was at {reading.air_c:.1f} °C: "
+            "a person must find out why and reset it"
+        )
+    if reading.door_open:
+        raise DeviceFault("the chamber's door was opened during the run")

@@ -5,6 +5,7 @@ Knows how clock, table, supply, unit, chamber and operator are wired; knows none
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,10 @@ from procedures.core.recording import Station
 from procedures.core.table_angles import TableAngles
 from simulators.chamber.device import SimChamber, Warmth
 from simulators.clock import SimClock, Wait
+from simulators.converter_bench import converter_alone, current_source
+from simulators.current_source.device import SimCurrentSource
 from simulators.imu.climate import Climate, Drift
+from simulators.imu.converter_link import ConverterLink
 from simulators.imu.device import SimImu
 from simulators.imu.sensor import TRIADS, Coefficients, launch_coefficients, station_means
 from simulators.operator.person import SimOperator
@@ -40,6 +44,8 @@ class WorldConfig:
     """Instead of the unit's own rate."""
     thermal: bool = False
     """Whether the unit stands in the chamber and feels its temperature; else it is warm through, at the reference."""
+    currents: bool = False
+    """Whether a converter alone stands in the chamber, a current source on its inputs, instead of the whole unit."""
     real_time_factor: float | None = None
     """Bench seconds per real second; None: as fast as it can."""
     wait: Wait | None = field(default=None, repr=False)
@@ -58,10 +64,11 @@ class SimulatedBench(Bench):
     config: WorldConfig = field(kw_only=True)
     clock: SimClock  # pyright: ignore[reportIncompatibleVariableOverride]
     turntable: SimTurntable  # pyright: ignore[reportIncompatibleVariableOverride]
-    imu: SimImu  # pyright: ignore[reportIncompatibleVariableOverride]
+    imu: SimImu | ConverterLink  # pyright: ignore[reportIncompatibleVariableOverride]
     supply: SimSupply  # pyright: ignore[reportIncompatibleVariableOverride]
     chamber: SimChamber | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
     operator: SimOperator = field(kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
+    current_source: SimCurrentSource | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def checkpoint(self) -> dict[str, Any]:
         """What `build` needs to go on from here, JSON-ready. Raises `DeviceFault` while the table moves."""
@@ -75,6 +82,7 @@ class SimulatedBench(Bench):
             "imu": self.imu.checkpoint(),
             "operator": self.operator.checkpoint(),
             "chamber": None if self.chamber is None else self.chamber.checkpoint(),
+            "current_source": None if self.current_source is None else self.current_source.checkpoint(),
         }
 
     def true_calibration(self) -> dict[str, tuple[Array, Array]]:
@@ -90,17 +98,24 @@ def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> S
     clock = SimClock(config.rate_hz, config.real_time_factor, config.wait)
     table = SimTurntable(config.bench, config.seed, clock)
     supply = SimSupply()
-    imu = SimImu(config.unit, config.seed, clock, supply.launch, config.thermal)
     chamber = _chamber(config, clock) if config.thermal else None
+    source = current_source(config.bench, config.seed) if config.currents else None
     door = (lambda _is_open: None) if chamber is None else chamber.set_door
     operator = SimOperator(config.bench.operator, config.seed, clock, supply.is_on, door, table.place)
-    if chamber is None:
-        supply.connect(imu.power_up, imu.power_down)
-        clock.connect(lambda ticks: imu.feel(table.advance(ticks)))
+    if source is None:
+        imu = _unit(config, clock, table, supply, chamber)
     else:
-        _connect_warm(clock, table, supply, imu, chamber)
+        imu = converter_alone(config.unit, clock, supply, chamber, source)
     bench = SimulatedBench(
-        config.bench.description, clock, table, imu, supply, chamber, operator=operator, config=config
+        config.bench.description,
+        clock,
+        table,
+        imu,
+        supply,
+        chamber,
+        operator=operator,
+        current_source=source,
+        config=config,
     )
     if checkpoint is not None:
         _resume(bench, checkpoint)
@@ -114,6 +129,19 @@ def _chamber(config: WorldConfig, clock: SimClock) -> SimChamber:
     return SimChamber(
         truth.chamber, config.unit.thermal, config.seed, config.rate_hz, clock.now_s, truth.chamber_faults, limits
     )
+
+
+def _unit(
+    config: WorldConfig, clock: SimClock, table: SimTurntable, supply: SimSupply, chamber: SimChamber | None
+) -> SimImu:
+    """A whole unit on the table."""
+    imu = SimImu(config.unit, config.seed, clock, supply.launch, config.thermal)
+    if chamber is None:
+        supply.connect(imu.power_up, imu.power_down)
+        clock.connect(lambda ticks: imu.feel(table.advance(ticks)))
+    else:
+        _connect_warm(clock, table, supply, imu, chamber)
+    return imu
 
 
 def _connect_warm(clock: SimClock, table: SimTurntable, supply: SimSupply, imu: SimImu, chamber: SimChamber) -> None:
@@ -139,7 +167,8 @@ def _connect_warm(clock: SimClock, table: SimTurntable, supply: SimSupply, imu: 
 def climate_of(chamber: SimChamber, warmth: Warmth, ticks: int) -> Climate:
     """What the temperatures of some ticks do to the unit: the last second's until the next one ends."""
     felt = chamber.response(np.concatenate([warmth.before_c[None], warmth.temperatures_c]))
-    lengths = np.diff([0, *warmth.end_ticks, ticks])
+    edges = (0, *warmth.end_ticks, ticks)
+    lengths = np.array([end - begin for begin, end in pairwise(edges)])
     gyro, gyro_added = None, felt.gyro_added_rad_s.T
     if np.any(gyro_added):
         same, none = np.ones_like(gyro_added), np.zeros_like(gyro_added)
@@ -153,9 +182,10 @@ def _resume(bench: SimulatedBench, checkpoint: Mapping[str, Any]) -> None:
     config = bench.config
     version = checkpoint["version"]
     warm = checkpoint.get("chamber") is not None
-    made_with = (version, checkpoint["seed"], checkpoint["rate_hz"], warm)
-    if made_with != (CHECKPOINT_VERSION, config.seed, config.rate_hz, config.thermal):
-        raise ValueError(f"the checkpoint was made with (version, seed, rate_hz, thermal) = {made_with!r}")
+    sourced = checkpoint.get("current_source") is not None
+    made_with = (version, checkpoint["seed"], checkpoint["rate_hz"], warm, sourced)
+    if made_with != (CHECKPOINT_VERSION, config.seed, config.rate_hz, config.thermal, config.currents):
+        raise ValueError(f"the checkpoint was made with (version, seed, rate_hz, thermal, currents) = {made_with!r}")
     bench.clock.ticks = int(checkpoint["ticks"])
     bench.turntable.resume(checkpoint["turntable"])
     bench.supply.resume(checkpoint["supply"])
@@ -163,6 +193,8 @@ def _resume(bench: SimulatedBench, checkpoint: Mapping[str, Any]) -> None:
     bench.operator.resume(checkpoint["operator"])
     if bench.chamber is not None:
         bench.chamber.resume(checkpoint["chamber"])
+    if bench.current_source is not None:
+        bench.current_source.resume(checkpoint["current_source"])
 
 
 def launch_coefficients_of(config: WorldConfig, launch: int = 1) -> dict[str, Coefficients]:

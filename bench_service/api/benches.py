@@ -9,8 +9,10 @@ from bench_service.api.dependencies import Service
 from bench_service.api.errors import problems
 from bench_service.api.requests import StopRequest
 from bench_service.jobs.devices import DeviceState
+from bench_service.jobs.live import BenchLive
 from bench_service.jobs.safety import Safety
 from bench_service.jobs.service import BenchService
+from bench_service.wall_clock import now
 from procedures.bench import BenchDescription
 
 router = APIRouter(prefix="/api/v1/benches", tags=["benches"])
@@ -77,6 +79,9 @@ class BenchView(BaseModel):
     stopped: str | None = Field(description="Why it is stopped")
     job: str | None = Field(description="The job that drives it")
     units: list[str] = Field(description="Units that it can test")
+    live: BenchLive | None = Field(description="The last that its driver said; null: it never had one")
+    driver_seen_at: datetime | None = Field(description="When that was")
+    driver_there: bool = Field(description="Whether a driver is there now, as far as can be known from here")
     safety: SafetyView
     driven_by: str | None = Field(description="Who drives it now: a worker's process; null: nobody, its jobs wait")
     queued: int = Field(description="How many jobs wait in its queue")
@@ -117,6 +122,7 @@ class Stopping(BaseModel):
 def _view(service: BenchService, bench_id: str) -> BenchView:
     description = service.benches.description(bench_id)
     running = service.running_job(bench_id)
+    live = service.live.of_bench(bench_id)
     stop = service.stores.units.bench_stop(bench_id)
     return BenchView(
         id=bench_id,
@@ -125,6 +131,9 @@ def _view(service: BenchService, bench_id: str) -> BenchView:
         stopped=None if stop is None else f"{stop.at.isoformat()}: {stop.reason}",
         job=None if running is None else running.id,
         units=[unit.serial for unit in service.benches.mounted(bench_id)],
+        live=live,
+        driver_seen_at=None if live is None else live.at,
+        driver_there=live is not None and live.there(now()),
         safety=SafetyView.of(service.safety.known(bench_id)),
         driven_by=service.benches.holder(bench_id),
         queued=service.stores.queue.lengths().get(bench_id, 0),

@@ -4,6 +4,7 @@ from typing import Annotated
 
 from fastapi import Depends, Header, Query, Request
 
+from bench_service.jobs.event_hub import EventHub
 from bench_service.jobs.service import BenchService
 
 
@@ -11,6 +12,11 @@ def _service(request: Request) -> BenchService:
     return request.app.state.service
 
 
+def _hub(request: Request) -> EventHub:
+    return request.app.state.hub
+
+
+Hub = Annotated[EventHub, Depends(_hub)]
 Service = Annotated[BenchService, Depends(_service)]
 IdempotencyKey = Annotated[
     str | None,

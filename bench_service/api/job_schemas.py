@@ -7,6 +7,7 @@ from pydantic import BaseModel, Field
 
 from bench_service.api.requests import Labels
 from bench_service.jobs.job import Event, Failure, Job, JobState
+from bench_service.jobs.live import LiveJob
 from bench_service.jobs.queue_desk import Standing
 from procedures.core.limits import Verdict
 
@@ -18,6 +19,12 @@ class Progress(BaseModel):
     stations: int
     fraction: float
     eta_s: float | None = Field(description="Bench time left, by the plan")
+    eta_wall_s: float | None = Field(
+        description="Real time left at the rate so far, without the analysis; null where it does not run, or its "
+        "driver is silent"
+    )
+    bench_time_s: float | None = Field(description="The bench's clock while the job runs, else null")
+    label: str | None = Field(description="The station that it works on while it runs, else null")
 
 
 class PlaceView(BaseModel):
@@ -65,19 +72,25 @@ class JobView(BaseModel):
     page: str = Field(description="Path of the page for an eye")
 
     @classmethod
-    def of(cls, job: Job, standing: Standing | None = None) -> "JobView":
-        """As HTTP says it; `standing` where it was asked for."""
+    def of(cls, job: Job, standing: Standing | None = None, live: LiveJob | None = None) -> "JobView":
+        """As HTTP says it; `standing` where it was asked for, `live` what its bench says of it while it runs."""
         place = None if standing is None else standing.place
         stations = len(job.stations)
         open_state = job.state in (JobState.QUEUED, JobState.RUNNING, JobState.PAUSED)
         fraction = 1.0 if job.state is JobState.SUCCEEDED else job.stations_done / stations if stations else 0.0
+        eta_s = job.duration_s * (1 - fraction) if open_state else None
+        if live is not None:
+            fraction, eta_s = max(fraction, live.fraction), live.eta_s
         return cls(
             **{name: getattr(job, name) for name in _SAME_IN_JOB},
             progress=Progress(
                 station=job.stations_done,
                 stations=stations,
                 fraction=fraction,
-                eta_s=job.duration_s * (1 - fraction) if open_state else None,
+                eta_s=eta_s,
+                eta_wall_s=None if live is None else live.eta_wall_s,
+                bench_time_s=None if live is None else live.bench_time_s,
+                label=None if live is None else live.label,
             ),
             queue=None if place is None else PlaceView(position=place.position, ahead=place.ahead),
             waiting=None if standing is None else standing.waiting,

@@ -3,33 +3,21 @@
 from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Query, Request, Response
+from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import StreamingResponse
-from starlette.concurrency import run_in_threadpool
 
-from bench_service.api.dependencies import After, IdempotencyKey, Limit, Service
+from bench_service.api import event_stream
+from bench_service.api.dependencies import After, Hub, IdempotencyKey, Limit, Service
 from bench_service.api.errors import made, problems
-from bench_service.api.job_schemas import EventView, JobPage, JobView
+from bench_service.api.job_schemas import JobPage, JobView
 from bench_service.api.requests import JobChange, JobSubmission, Reanalysis
 from bench_service.api.schemas import ResultPage, ResultView, Truth
-from bench_service.jobs.job import FINAL, Job, JobState
+from bench_service.jobs.event_hub import EventHub
+from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.request import JobRequest
 from bench_service.jobs.service import BenchService
-from bench_service.wall_clock import pause_async
 
 router = APIRouter(prefix="/api/v1/jobs", tags=["jobs"])
-
-WATCH_S = 0.1
-"""How often a listener's job is looked at for new events."""
-HEARTBEAT_S = 15.0
-"""A comment line at least this often, so that proxies keep the connection."""
-EVENT_STREAM: dict[int | str, dict[str, object]] = {
-    200: {
-        "description": "Server-sent events; `id` is the sequence, `event` the kind, `data` an EventView",
-        "content": {"text/event-stream": {"schema": {"type": "string"}}},
-    }
-}
-
 
 OF_A_JOB = (
     "read_job",
@@ -87,7 +75,7 @@ def submit(body: JobSubmission, service: Service, response: Response, key: Idemp
 
 
 def _view(service: BenchService, job: Job) -> JobView:
-    return JobView.of(job, service.queues.standing([job])[job.id])
+    return JobView.of(job, service.queues.standing([job])[job.id], service.live.of_job(job))
 
 
 @router.get("", responses=problems())
@@ -102,7 +90,8 @@ def list_jobs(
     """Jobs, newest first."""
     page = service.stores.jobs.list(state=state, procedure=procedure, unit=unit, after=after, limit=limit)
     standing = service.queues.standing(page.items)
-    return JobPage(items=[JobView.of(job, standing[job.id]) for job in page.items], next=page.next)
+    items = [JobView.of(job, standing[job.id], service.live.of_job(job)) for job in page.items]
+    return JobPage(items=items, next=page.next)
 
 
 @router.get("/{job_id}", responses=problems(404))
@@ -135,33 +124,26 @@ def resume(job_id: str, service: Service) -> JobView:
     return _view(service, service.resume(job_id))
 
 
-@router.get("/{job_id}/events", response_class=StreamingResponse, responses={**problems(404), **EVENT_STREAM})
+@router.get(
+    "/{job_id}/events",
+    response_class=StreamingResponse,
+    responses={**problems(404), **event_stream.DOCUMENTED},
+)
 async def events(
     job_id: str,
-    request: Request,
-    service: Service,
+    hub: Hub,
     last_event_id: Annotated[int, Header(alias="Last-Event-ID", ge=0, le=2**31)] = 0,
 ) -> StreamingResponse:
     """Everything that happens to the job as server-sent events, from after `Last-Event-ID`, until it has ended."""
-    await run_in_threadpool(service.stores.jobs.get, job_id)
-    return StreamingResponse(_watch(job_id, request, service, last_event_id), media_type="text/event-stream")
+    await hub.require(job_id)
+    told = _told(hub, job_id, last_event_id)
+    return StreamingResponse(told, media_type="text/event-stream", headers=event_stream.HEADERS)
 
 
-async def _watch(job_id: str, request: Request, service: BenchService, after: int) -> AsyncIterator[str]:
-    quiet_s = 0.0
-    while not await request.is_disconnected():
-        job = await run_in_threadpool(service.stores.jobs.get, job_id)
-        fresh = await run_in_threadpool(service.stores.jobs.events, job_id, after)
-        for event in fresh:
-            after = event.sequence
-            yield f"id: {event.sequence}\nevent: {event.kind}\ndata: {EventView.of(event).model_dump_json()}\n\n"
-        if not fresh and (job.state in FINAL or job.state is JobState.INTERRUPTED):
-            return
-        quiet_s = 0.0 if fresh else quiet_s + WATCH_S
-        if quiet_s >= HEARTBEAT_S:
-            quiet_s = 0.0
-            yield ": still here\n\n"
-        await pause_async(WATCH_S)
+async def _told(hub: EventHub, job_id: str, after: int) -> AsyncIterator[bytes]:
+    yield event_stream.HEAD
+    async for frame in hub.follow(job_id, after):
+        yield frame
 
 
 @router.get("/{job_id}/result", responses={**problems(404), 304: {"description": "Not modified"}})

@@ -103,6 +103,7 @@ class Lineage(BaseModel):
 
     recordings: list[dict[str, str]] = Field(description="id and content hash of each recording, in order")
     calibrations: list[str]
+    corrections: list[str] = Field(description="Ids of the correction sets that were applied")
     parameters: dict[str, Any]
     code_version: str
     simulated: bool
@@ -138,6 +139,7 @@ class ResultView(BaseModel):
             lineage=Lineage(
                 recordings=[{"id": i, "content_hash": h} for i, h in result.recordings],
                 calibrations=list(result.calibrations),
+                corrections=list(result.corrections),
                 parameters=result.parameters,
                 code_version=result.code_version,
                 simulated=result.simulated,
@@ -196,6 +198,8 @@ class UnitView(BaseModel):
     accelerometer: TriadRecord | None
     averaging_time_s: float
     calibration: str | None = Field(description="Id of the current calibration")
+    thermal_correction: str | None = Field(description="Id of the current correction of the kind `thermal`")
+    converter: str | None = Field(description="Id of the current correction of the kind `converter`")
 
     @classmethod
     def of(cls, unit: Unit) -> "UnitView":
@@ -207,6 +211,8 @@ class UnitView(BaseModel):
             accelerometer=unit.accelerometer,
             averaging_time_s=unit.averaging_time_s,
             calibration=unit.calibration_id,
+            thermal_correction=unit.thermal_correction_id,
+            converter=unit.converter_id,
         )
 
 

@@ -10,7 +10,7 @@ from bench_service.jobs.observed import ObservedBench
 from procedures.bench import Bench
 from procedures.bench.errors import OutOfRange
 
-READS = frozenset({"turntable.read_angles", "supply.is_on", "chamber.read"})
+READS = frozenset({"turntable.read_angles", "turntable.is_moving", "supply.is_on", "chamber.read"})
 """Verbs that change nothing: not noted."""
 
 

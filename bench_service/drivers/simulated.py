@@ -52,7 +52,7 @@ def _shipped_as(bench_id: str) -> BenchTruth:
 
 
 class SimulatedDriver:
-    """A bench whose table, unit and supply live in this process; its data are marked as simulated."""
+    """A bench whose table, unit, supply and chamber live in this process; its data are marked as simulated."""
 
     def __init__(
         self,
@@ -63,9 +63,11 @@ class SimulatedDriver:
         register: DeviceRegister | None = None,
         faults: FaultPlan | None = None,
     ) -> None:
-        """`register`: where the devices' state outlives this process; without one, nobody else can make them safe.
+        """Without a truth file a bench of any id is the shipped one under that id: a laboratory may have several.
 
-        Raises `Misconfigured` for a truth file that cannot be used, `NotMounted` for one of another bench."""
+        `register`: where the devices' state outlives this process; without one, nobody else can make them safe.
+        Raises `Misconfigured` for a truth file that cannot be used, `NotMounted` for one of another bench.
+        """
         self._bench = _shipped_as(bench_id) if bench_truth is None else _loaded(bench_truth, load_bench)
         self._unit = default_unit() if unit_truth is None else _loaded(unit_truth, load_unit)
         self._real_time_factor = real_time_factor
@@ -93,11 +95,18 @@ class SimulatedDriver:
         needs: BenchNeeds,
         job: str | None = None,
     ) -> Bench:
-        """A world with that unit on the table, at its beginning or at a checkpoint. Raises `DeviceBusy`."""
+        """A world with that unit on the table, at its beginning or at a checkpoint; with its chamber where needed.
+
+        Raises `NotMounted`, `DeviceBusy`, `DeviceFault` where the job reads temperatures and the bench has no chamber.
+        """
         from simulators.world import build  # with MuJoCo: not needed before a bench is opened
 
-        config = self._config(unit, 0 if seed is None else seed)
-        config = replace(config, sample_rate_hz=needs.sample_rate_hz, thermal=needs.temperatures)
+        config = replace(
+            self._config(unit, 0 if seed is None else seed),
+            sample_rate_hz=needs.sample_rate_hz,
+            thermal=needs.temperatures,
+            currents=needs.currents,
+        )
         bench = build(config, checkpoint)
         if self._register is None:
             return bench
@@ -118,7 +127,7 @@ class SimulatedDriver:
         return RegisteredDevices(self._register).make_safe(by)
 
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
-        """Bias and matrix of the job's launch, run-to-run changes included."""
+        """Bias and matrix of the job's launch at the unit's reference temperature, run-to-run changes included."""
         from simulators.world import launch_truth
 
         found = launch_truth(self._config(unit, seed))

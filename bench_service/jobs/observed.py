@@ -77,6 +77,10 @@ class ObservedTurntable(_Seen):
         with self._seen("turntable.read_angles"):
             return self._table.read_angles()
 
+    def is_moving(self) -> bool:
+        with self._seen("turntable.is_moving"):
+            return self._table.is_moving()
+
     async def make_safe(self) -> None:
         with self._seen("turntable.make_safe"):
             await self._table.make_safe()

@@ -11,12 +11,16 @@ from bench_service.jobs.directory import BenchDirectory
 from bench_service.jobs.errors import NotFound, NotMounted
 from bench_service.jobs.store import Stores
 from procedures import catalog
+from procedures.bench import BenchDescription
 from procedures.core.recording import Station
 from procedures.core.unit import Unit
 from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
 
 BYTES_PER_SAMPLE = 2
 """What a stored sample is allowed to weigh (design.md, budgets); a preview says what a plan may need at most."""
+
+TEMPERATURE_CHANNELS = 7
+"""Five sensors of the unit and two readings of the chamber, beside the triads where a station wants temperatures."""
 
 CONTEXT = TypeAdapter(Context)
 
@@ -76,19 +80,31 @@ class Planner:
         parameters = procedure.resolve(procedure.params.model_validate(requested), context)
         stations = procedure.schedule(parameters)
         violations = tuple(
-            f"station {s.index} ({s.label}): {sentence}"
-            for s in stations
-            if s.angles is not None
-            for sentence in context.bench.violations(s.angles, s.turn)
+            f"station {s.index} ({s.label}): {sentence}" for s in stations for sentence in _violations(s, context.bench)
         )
         prediction = procedure.predict(parameters, context)
-        samples = sum(round(s.record_s * context.unit.sample_rate_hz) for s in stations)
-        data_bytes = samples * len(context.unit.channels) * BYTES_PER_SAMPLE
+        data_bytes = sum(_samples(s, context.unit) for s in stations) * BYTES_PER_SAMPLE
         return Plan(procedure, parameters, context, stations, prediction, data_bytes, violations)
 
     def refreshed(self, context: Context) -> Context:
         """The same bench, and the unit as it is known now: its noise, and the calibration that is current."""
         return replace(context, unit=self._stores.units.unit(context.unit.serial))
+
+
+def _violations(station: Station, bench: BenchDescription) -> tuple[str, ...]:
+    """Limits of the bench that a station passes."""
+    if station.current_ma is not None:
+        return bench.current_violations(station.current_ma, station.profile)
+    return () if station.angles is None else bench.violations(station.angles, station.turn, station.profile)
+
+
+def _samples(station: Station, unit: Unit) -> int:
+    """Samples of all channels; of a profile as long as it is expected to take."""
+    if station.current_ma is not None:  # a converter alone: three channels and its own sensor, after it has soaked
+        return round(station.record_s * (station.sample_rate_hz or unit.sample_rate_hz)) * 4
+    seconds = station.record_s if station.profile is None else station.profile.expected_s()
+    channels = len(unit.channels) + TEMPERATURE_CHANNELS * station.temperatures
+    return round(seconds * (station.sample_rate_hz or unit.sample_rate_hz)) * channels
 
 
 def register(stores: Stores, unit: Unit) -> None:

@@ -8,6 +8,8 @@ from typing import Any
 from bench_service.jobs.driver import BenchDriver
 from bench_service.jobs.errors import ServiceError, StorageFailure
 from bench_service.jobs.job import FINAL, Failure, Job, JobState
+from bench_service.jobs.live import LiveBoard
+from bench_service.jobs.live_tap import LiveTap
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
 from bench_service.jobs.processes import ProcessIdentity
 from bench_service.jobs.queue import QueueEntry
@@ -49,10 +51,12 @@ class JobRunner:
         driver: BenchDriver,
         code_version: str,
         lease_held: Callable[[], bool],
+        live: LiveBoard | None = None,
         retry_scale: float = 1.0,
     ) -> None:
         """`lease_held`: whether this process still has the right to drive the bench; asked before every station.
 
+        `live`: where it is said what the bench does; None: nowhere.
         `retry_scale`: of the pauses before a retry; less than 1 where bench time is not real time.
         """
         self._stores = stores
@@ -60,6 +64,7 @@ class JobRunner:
         self._driver = driver
         self._code_version = code_version
         self._lease_held = lease_held
+        self._live = live
         self._retry_scale = retry_scale
         self._session: BenchSession | None = None
         self._ending = Event()
@@ -237,6 +242,7 @@ class JobRunner:
             bench,
             self._stores.recordings,
             lambda: self._stop_wanted(job.id),
+            None if self._live is None else LiveTap(job, bench, self._live),
         )
         return self._session
 

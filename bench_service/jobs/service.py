@@ -9,6 +9,7 @@ from bench_service.jobs.analyses import AnalysisDesk
 from bench_service.jobs.driver import BenchDriver, TrueTriad
 from bench_service.jobs.errors import IllegalTransition, NotFound, NotReady
 from bench_service.jobs.job import Job, JobState
+from bench_service.jobs.live import LiveBoard
 from bench_service.jobs.planning import CONTEXT, Plan, Planner, register
 from bench_service.jobs.queue_desk import QueueDesk
 from bench_service.jobs.request import JobRequest, fingerprint
@@ -39,6 +40,7 @@ class BenchService:
         worker: Worker | None,
         code_version: str,
         safety: SafetyDesk,
+        live: LiveBoard | None = None,
         free_bytes: Callable[[], int | None] = lambda: None,
     ) -> None:
         """`driver`: of this process's own bench; None: it plans and queues for benches that workers drive.
@@ -46,6 +48,7 @@ class BenchService:
         `free_bytes`: room on the database's disk, where that is known.
         """
         self.safety = safety
+        self.live = live or LiveBoard(stores.live)
         self.stores = stores
         self.driver = driver
         self.planner = planner

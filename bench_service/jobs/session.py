@@ -9,6 +9,8 @@ from contextlib import aclosing
 from typing import Any, TypeVar
 
 from bench_service.jobs.job import Job
+from bench_service.jobs.live import PUBLISH_S
+from bench_service.jobs.live_tap import LiveTap
 from bench_service.jobs.observed import ObservedBench
 from bench_service.jobs.store import RecordingStore
 from bench_service.jobs.stored import NewRecording
@@ -48,6 +50,7 @@ class BenchSession:
         bench: Bench,
         recordings: RecordingStore,
         stop_wanted: Callable[[], bool],
+        tap: LiveTap | None = None,
     ) -> None:
         self.job = job
         self._procedure = procedure
@@ -63,6 +66,9 @@ class BenchSession:
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._drive, name=f"bench {bench.description.id}", daemon=True)
         self._thread.start()
+        self._tap = tap
+        self._telling: asyncio.TimerHandle | None = None
+        self._told: asyncio.Task[None] | None = None
 
     def record(self, index: int) -> RecordingInfo:
         """Record one station and store it. Raises `BenchError`, `StorageFull`, `StorageFailure`, `ShuttingDown`.
@@ -88,6 +94,8 @@ class BenchSession:
 
         A thread that does not come back is left alone; it holds nothing that anybody needs.
         """
+        if self._tap is not None and self._lost is None:
+            asyncio.run_coroutine_threadsafe(self._stop_telling(self._tap), self._loop).result()
         self._bench.close()
         self._loop.call_soon_threadsafe(self._loop.stop)
         if self._lost is None:
@@ -140,6 +148,10 @@ class BenchSession:
 
     async def _record(self, index: int) -> RecordingInfo:
         station = self.job.stations[index]
+        if self._tap is not None:
+            self._tap.station(index)
+            if self._telling is None:
+                self._tell(self._tap)
         if self._streams is None or self._next != index:
             await self._close_streams()
             self._streams = self._procedure.acquire(self._bench, self.job.stations[index:])
@@ -164,9 +176,15 @@ class BenchSession:
                 launched_s=stream.launched_s,
             )
         )
+        tap, begins_s = self._tap, stream.start_s
+        if tap is not None:
+            tap.stream(stream)
         try:
             async for block in stream.blocks:
                 writer.write(block)
+                if tap is not None:
+                    tap.block(begins_s, block)
+                    begins_s += len(block) / stream.rate_hz
                 await asyncio.sleep(0)  # noqa: TID251  lets a cancel land; no time passes
             return writer.seal(self._bench.checkpoint())
         except BaseException:
@@ -178,6 +196,20 @@ class BenchSession:
             async with aclosing(self._streams):  # pyright: ignore[reportArgumentType]  an async generator
                 pass
         self._streams = None
+
+    def _tell(self, tap: LiveTap) -> None:
+        """Say what the bench does, now and every `PUBLISH_S`: between two steps of the procedure, in their thread."""
+        if self._told is None or self._told.done():
+            self._told = self._loop.create_task(tap.publish())
+        self._telling = self._loop.call_later(PUBLISH_S, self._tell, tap)
+
+    async def _stop_telling(self, tap: LiveTap) -> None:
+        if self._telling is not None:
+            self._telling.cancel()
+        if self._told is not None:
+            self._told.cancel()
+            await asyncio.wait([self._told])
+        tap.end()
 
     async def _make_safe(self) -> None:
         try:

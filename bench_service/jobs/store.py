@@ -3,7 +3,7 @@
 Every method is one transaction: it commits, or it raises and nothing of it remains.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Protocol
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bench_service.jobs.corrections import CorrectionStore
 from bench_service.jobs.job import Event, Failure, Job, JobState
+from bench_service.jobs.live import LiveStore
 from bench_service.jobs.queue import QueueStore
 from bench_service.jobs.reservation import ReservationStore
 from bench_service.jobs.stored import (
@@ -177,6 +178,14 @@ class JobStore(Protocol):
         """Events with a sequence greater than `after`, in order. Raises `NotFound`."""
         ...
 
+    def last_event(self, job_id: str) -> tuple[int, JobState]:
+        """Sequence of the newest event, and the state that goes with it, read at one moment. Raises `NotFound`."""
+        ...
+
+    def on_event(self, tell: Callable[[str], None]) -> None:
+        """From now on call `tell(job_id)` after each commit of this process that appended an event."""
+        ...
+
 
 class ResultStore(Protocol):
     """Results, the calibrations and corrections that come with them, and lineage."""
@@ -274,3 +283,4 @@ class Stores:
     results: ResultStore
     units: UnitStore
     corrections: CorrectionStore
+    live: LiveStore

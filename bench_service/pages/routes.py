@@ -9,6 +9,7 @@ from fastapi.templating import Jinja2Templates
 
 from bench_service.jobs.job import FINAL, Job, JobState
 from bench_service.jobs.service import BenchService
+from bench_service.pages.corrections import correction_table
 from bench_service.pages.figures import svg
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import TRIADS
@@ -141,7 +142,7 @@ def result_page(result_id: str, request: Request) -> HTMLResponse:
 
 @router.get("/units/{serial}")
 def unit_page(serial: str, request: Request) -> HTMLResponse:
-    """A unit: its record and its calibrations."""
+    """A unit: its record, its calibrations and its correction sets."""
     service = _service(request)
     unit = service.stores.units.unit(serial)
     return _page(
@@ -150,6 +151,7 @@ def unit_page(serial: str, request: Request) -> HTMLResponse:
         unit=unit,
         noise=_noise_rows(unit),
         calibrations=service.stores.results.calibrations(serial).items,
+        corrections=[(c, correction_table(c.correction)) for c in service.stores.corrections.list(serial).items],
         jobs=service.stores.jobs.list(unit=serial).items,
         names=COEFFICIENT_NAMES,
         display=DISPLAY,

@@ -9,7 +9,7 @@ import hashlib
 import json
 import shutil
 import sqlite3
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -25,6 +25,7 @@ from bench_service.jobs.errors import StorageFailure, StorageFull
 BUSY_S = 30.0
 """How long a writer waits for another one."""
 
+_NEWS = "news"
 _SQLITE_FULL = frozenset({sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_SHMSIZE})
 _POSTGRES_FULL = frozenset({"53100"})
 
@@ -39,6 +40,7 @@ class Database:
     def __init__(self, engine: Engine) -> None:
         self.engine = engine
         self._writing_engine = engine.execution_options(bench_write=True)
+        self._tell: list[Callable[[str], None]] = []
 
     @contextmanager
     def read(self) -> Generator[Session, None, None]:
@@ -49,8 +51,17 @@ class Database:
     @contextmanager
     def write(self) -> Generator[Session, None, None]:
         """A transaction that commits at the end, or leaves nothing behind. Raises `StorageFull`, `StorageFailure`."""
+        news: list[str] = []
         with storage_errors(), Session(self._writing_engine, expire_on_commit=False) as session, session.begin():
+            session.info[_NEWS] = news
             yield session
+        for subject in dict.fromkeys(news):
+            for tell in self._tell:
+                tell(subject)
+
+    def on_news(self, tell: Callable[[str], None]) -> None:
+        """From now on call `tell` after each commit with every subject that was announced in it; it may not raise."""
+        self._tell.append(tell)
 
     @contextmanager
     def write_connection(self) -> Generator[Connection, None, None]:
@@ -79,6 +90,11 @@ class Database:
     def dispose(self) -> None:
         """Close all connections."""
         self.engine.dispose()
+
+
+def announce(session: Session, subject: str) -> None:
+    """Once this writing transaction is committed, who wants to know is told of a subject: see `Database.on_news`."""
+    session.info[_NEWS].append(subject)
 
 
 def connect(database_url: str) -> Database:

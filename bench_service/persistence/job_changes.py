@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from bench_service.jobs.errors import IllegalTransition, NotFound
 from bench_service.jobs.job import LEGAL, Failure, JobState
+from bench_service.persistence.database import announce
 from bench_service.persistence.job_rows import failure_document
 from bench_service.persistence.tables import EventRow, JobRow
 from procedures.core.limits import Verdict
@@ -62,3 +63,4 @@ def append_event(session: Session, job_id: str, kind: str, at: datetime, data: d
     last = session.scalar(select(func.max(EventRow.sequence)).where(EventRow.job_id == job_id)) or 0
     session.add(EventRow(job_id=job_id, sequence=last + 1, at=at, kind=kind, data=data))
     session.flush()
+    announce(session, job_id)

@@ -4,6 +4,7 @@ Every change reads the job's row under a lock (`FOR UPDATE`; on SQLite the writi
 processes that want different ends for one job, one wins and the other is told `IllegalTransition`.
 """
 
+from collections.abc import Callable
 from datetime import datetime
 from typing import Any
 
@@ -178,3 +179,14 @@ class SqlJobStore:
             if not events and session.scalar(select(JobRow.id).where(JobRow.id == job_id)) is None:
                 raise NotFound("job", job_id)
         return events
+
+    def last_event(self, job_id: str) -> tuple[int, JobState]:
+        newest = select(func.max(EventRow.sequence)).where(EventRow.job_id == job_id).scalar_subquery()
+        with self._database.read() as session:
+            row = session.execute(select(newest, JobRow.state).where(JobRow.id == job_id)).one_or_none()
+        if row is None:
+            raise NotFound("job", job_id)
+        return row[0] or 0, JobState(row[1])
+
+    def on_event(self, tell: Callable[[str], None]) -> None:
+        self._database.on_news(tell)

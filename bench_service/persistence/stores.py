@@ -4,6 +4,7 @@ from bench_service.jobs.store import Stores
 from bench_service.persistence.correction_store import SqlCorrectionStore
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.job_store import SqlJobStore
+from bench_service.persistence.live_store import SqlLiveStore
 from bench_service.persistence.migration import upgrade_to_head
 from bench_service.persistence.queue_store import SqlQueueStore
 from bench_service.persistence.recording_store import SqlRecordingStore
@@ -33,4 +34,5 @@ def stores_of(database: Database) -> Stores:
         results=SqlResultStore(database),
         units=SqlUnitStore(database),
         corrections=SqlCorrectionStore(database),
+        live=SqlLiveStore(database),
     )

@@ -1,6 +1,7 @@
 """From the recordings of a multiposition calibration to the summary of a triad: means, fit, magnitudes, cross-check."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +14,12 @@ from procedures.analysis.calibration_summary import (
 from procedures.analysis.estimator import Weighting
 from procedures.analysis.multiposition import TriadFit, fit_triad
 from procedures.analysis.reference import INPUT_UNITS, reference_magnitude, reference_vectors
+from procedures.analysis.reference_temperature import (
+    ThermalShare,
+    bring_to_reference,
+    thermal_share,
+    thermal_warnings,
+)
 from procedures.analysis.scalar import fit_scalar, nominal_start, start_from_data
 from procedures.analysis.station_means import StationMeans, station_means
 from procedures.analysis.station_noise import triad_covariance
@@ -23,6 +30,7 @@ from procedures.core.errors import UnfitRecording
 from procedures.core.recording import Recording
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
+from procedures.core.thermal_correction import ThermalCorrection
 from procedures.core.unit import TriadRecord
 
 
@@ -37,16 +45,66 @@ def analyse_triad(
 ) -> TriadSummary:
     """Calibrate one triad from one recording a station. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
     means = station_means(recordings, triad)
+    return analyse_means(means, site, uncertainty, record, with_scalar, weighting)[0]
+
+
+def analyse_means(
+    means: StationMeans,
+    site: Site,
+    uncertainty: TableUncertainty,
+    record: TriadRecord | None,
+    with_scalar: bool = False,
+    weighting: Weighting = "noise_and_table",
+    more: Array | None = None,
+) -> tuple[TriadSummary, TriadFit]:
+    """Calibrate one triad from its station means; `more` is what else makes them uncertain beside noise, (3, n, n).
+
+    Raises `UnfitRecording`, `Undetermined`.
+    """
+    triad = means.triad
     angles = station_angles(means)
     vectors = reference_vectors(triad, angles, site)
     table = table_errors(angles, vectors, uncertainty, of_gravity=triad == "accelerometer")
     noise, known = noise_of_means(means, record)
+    noise = noise if more is None else noise + more
     unit = INPUT_UNITS[triad]
     fit = fit_triad(triad, means.output_unit, unit, vectors, means.outputs, noise, table, known, weighting)
     reference = reference_magnitude(triad, site)
     scalar = _scalar(means, reference, noise, known, fit) if with_scalar else None
     after = magnitudes(means.outputs, fit.calibration(), reference, means.labels, fit.magnitude_sd)
-    return triad_summary(fit, after, means.labels, scalar)
+    return triad_summary(fit, after, means.labels, scalar), fit
+
+
+@dataclass(frozen=True)
+class AccelerometerSettings:
+    """How accelerometers are calibrated."""
+
+    with_scalar: bool = False
+    weighting: Weighting = "noise_and_table"
+    correction: ThermalCorrection | None = None
+    """Brings their means to its reference temperatures first; None: they are taken as they are."""
+    lag_s: tuple[float, float] = (0.0, 0.0)
+    """Of case and converter sensor."""
+
+
+def analyse_accelerometers(
+    recordings: Sequence[Recording],
+    site: Site,
+    uncertainty: TableUncertainty,
+    record: TriadRecord | None,
+    settings: AccelerometerSettings,
+) -> tuple[TriadSummary, ThermalShare | None, tuple[str, ...]]:
+    """The accelerometers' summary; with a correction what that did to them, and what to know of its use.
+
+    Raises as `analyse_triad` and `bring_to_reference`.
+    """
+    means, correction = station_means(recordings, "accelerometer"), settings.correction
+    how = settings.with_scalar, settings.weighting
+    if correction is None:
+        return analyse_means(means, site, uncertainty, record, *how)[0], None, ()
+    brought = bring_to_reference(recordings, means, correction, settings.lag_s)
+    summary, fit = analyse_means(brought.means, site, uncertainty, record, *how, brought.covariance)
+    return summary, thermal_share(brought, correction, fit), thermal_warnings(brought, correction)
 
 
 def noise_of_means(means: StationMeans, record: TriadRecord | None) -> tuple[Array, bool]:

@@ -5,8 +5,10 @@ words.
 from collections.abc import Sequence
 
 from procedures.analysis.calibration_summary import Coefficient, TriadSummary
+from procedures.analysis.reference_temperature import ThermalShare
 from procedures.analysis.verification import Magnitudes
 from procedures.core import units
+from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.report import Figure, Series, Table
 
 WEIGHTS = {"noise_and_table": "the noise and the table's declared accuracy", "noise": "the noise alone"}
@@ -130,6 +132,27 @@ def scalar_table(summary: TriadSummary) -> Table | None:
     columns = ("parameter", "unit", "scalar", "± standard uncertainty", "linear", "difference, σ")
     note = f"From the magnitude alone; no angle of the table enters. Condition {summary.scalar.condition:.3g}."
     return Table(f"Scalar cross-check of the {summary.calibration.triad} triad", columns, rows, note)
+
+
+def thermal_tables(share: ThermalShare, labels: Sequence[str]) -> list[Table]:
+    """What the thermal correction did to the accelerometers' station means, and what it leaves uncertain."""
+    rows = zip(labels, share.case_c, share.converter_c, share.change_m_s2, strict=True)
+    regime = f", regime taken as {share.regime}" if share.regime else ""
+    parts = tuple((name, share.from_correction[name], share.from_sensors[name]) for name in COEFFICIENT_NAMES)
+    return [
+        Table(
+            "Accelerometer outputs brought to the reference temperatures",
+            ("orientation", "case, °C", "converter, °C", "added x, m/s^2", "added y, m/s^2", "added z, m/s^2"),
+            tuple((label, case, board, *change) for label, case, board, change in rows),
+            f"V₀ = Ṽ/K0 − B0, Ṽ by thesis 4.1 in the form {share.form.value}{regime}.",
+        ),
+        Table(
+            "What the thermal correction leaves uncertain",
+            ("coefficient", "from its coefficients", "from the temperature sensors"),
+            parts,
+            "Standard uncertainties, b in m/s²; they are a part of those of noise above.",
+        ),
+    ]
 
 
 def _stations(m: Magnitudes) -> tuple[float, ...]:

@@ -5,6 +5,7 @@ from typing import Any
 
 from procedures.bench.chamber import Chamber
 from procedures.bench.clock import Clock
+from procedures.bench.current_source import CurrentSource
 from procedures.bench.description import BenchDescription
 from procedures.bench.imu import Imu
 from procedures.bench.needs import BenchNeeds
@@ -12,7 +13,18 @@ from procedures.bench.operator import Operator
 from procedures.bench.supply import Supply
 from procedures.bench.turntable import Turntable
 
-__all__ = ["Bench", "BenchDescription", "BenchNeeds", "Chamber", "Clock", "Imu", "Operator", "Supply", "Turntable"]
+__all__ = [
+    "Bench",
+    "BenchDescription",
+    "BenchNeeds",
+    "Chamber",
+    "Clock",
+    "CurrentSource",
+    "Imu",
+    "Operator",
+    "Supply",
+    "Turntable",
+]
 
 
 @dataclass
@@ -26,10 +38,11 @@ class Bench:
     supply: Supply
     chamber: Chamber | None = None
     operator: Operator | None = None
-    _devices: tuple[str, ...] = field(default=("turntable", "chamber", "supply"), repr=False)
+    current_source: CurrentSource | None = None
+    _devices: tuple[str, ...] = field(default=("turntable", "chamber", "current_source", "supply"), repr=False)
 
     async def make_safe(self) -> None:
-        """Stop the table, lead the chamber to ambient, switch the unit off.
+        """Stop the table, lead the chamber to ambient, take the current away, switch the unit off.
 
         Every device is tried; raises an `ExceptionGroup` of what failed.
         """

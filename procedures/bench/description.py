@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 
 from procedures.bench.chamber import ChamberLimits
+from procedures.bench.current_source import CurrentSourceLimits
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
+from procedures.core.temperature_profile import TemperatureProfile
 from procedures.core.turn import AxisName, Turn
 
 
@@ -48,6 +50,8 @@ class BenchDescription:
     title: str = ""
     chamber: ChamberLimits | None = None
     """None: the bench has no thermal chamber."""
+    current_source: CurrentSourceLimits | None = None
+    """None: the bench has no precision current source."""
 
     @property
     def axis_motion(self) -> tuple[tuple[float, float], ...]:
@@ -58,8 +62,10 @@ class BenchDescription:
         """Limits of an axis by name."""
         return {"outer": self.outer, "middle": self.middle, "inner": self.inner}[name]
 
-    def violations(self, angles: TableAngles, turn: Turn | None = None) -> tuple[str, ...]:
-        """One sentence for each limit that the angles pass, or whole turns that begin at them."""
+    def violations(
+        self, angles: TableAngles, turn: Turn | None = None, profile: TemperatureProfile | None = None
+    ) -> tuple[str, ...]:
+        """One sentence for each limit that the angles pass, or whole turns that begin at them, or a profile."""
         demands = (
             ("outer", self.outer, angles.outer_deg),
             ("middle", self.middle, angles.middle_deg),
@@ -70,7 +76,22 @@ class BenchDescription:
             for name, limits, value in demands
             if not limits.minimum_deg <= value <= limits.maximum_deg
         )
-        return beyond if turn is None else beyond + self._turn_violations(angles, turn)
+        if turn is not None:
+            beyond += self._turn_violations(angles, turn)
+        return beyond if profile is None else beyond + self._profile_violations(profile)
+
+    def current_violations(self, current_ma: float, profile: TemperatureProfile | None) -> tuple[str, ...]:
+        """The same for a converter alone: a current on its inputs, a profile that it soaks by."""
+        found: tuple[str, ...] = () if profile is None else self._profile_violations(profile)
+        if self.current_source is None:
+            return (*found, f"bench {self.id} has no precision current source")
+        most = self.current_source.maximum_ma
+        return found if abs(current_ma) <= most else (*found, f"{current_ma:g} mA is outside {-most:g} … {most:g} mA")
+
+    def _profile_violations(self, profile: TemperatureProfile) -> tuple[str, ...]:
+        if self.chamber is None:
+            return (f"bench {self.id} has no thermal chamber",)
+        return profile.violations(self.chamber.minimum_c, self.chamber.maximum_c, self.chamber.ramp_c_min)
 
     def _turn_violations(self, angles: TableAngles, turn: Turn) -> tuple[str, ...]:
         limits = self.axis(turn.axis)

@@ -3,6 +3,7 @@
 BenchError
 ├── OutOfRange      a demand beyond a limit: refused before anything moves, never clamped
 ├── NotSettled      the table did not come to rest in time
+├── SoakNotReached  the unit's temperatures did not come to rest in time
 ├── NotPowered      a reading was asked of a unit that is switched off
 ├── DeviceFault     a device reports a fault; it is never reset by itself
 ├── Disconnected    a device does not answer
@@ -21,6 +22,10 @@ class OutOfRange(BenchError):
 
 class NotSettled(BenchError):
     """The table did not come to rest in time."""
+
+
+class SoakNotReached(BenchError):
+    """The chamber or the unit's temperatures did not come to rest in the time that a leg of a profile allows."""
 
 
 class NotPowered(BenchError):

@@ -33,6 +33,10 @@ class Turntable(Protocol):
         """Where the encoders say the axes are."""
         ...
 
+    def is_moving(self) -> bool:
+        """Whether the axes follow a demand, or settle after it; asked at any time, it disturbs nothing."""
+        ...
+
     async def make_safe(self) -> None:
         """Ramp down to rest and lock, whatever it was doing."""
         ...

@@ -2,7 +2,8 @@
 
 The unit is set to each orientation and rests there for the averaging time; least squares over the station means
 gives bias, scale factors and cross-couplings of gyros (from the Earth's rate) and accelerometers (from gravity). The
-weights allow for the unit's noise and the table's declared accuracy; weighting="noise" is the thesis's own.
+weights allow for the unit's noise and the table's declared accuracy; weighting="noise" is the thesis's own. With
+thermal_correction="current" the accelerometers' means are first brought to the reference temperatures (T 4.1).
 """
 
 from collections.abc import AsyncIterator, Sequence
@@ -13,7 +14,7 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis import calibration_report as pictures
-from procedures.analysis.calibration_analysis import analyse_triad
+from procedures.analysis.calibration_analysis import AccelerometerSettings, analyse_accelerometers, analyse_triad
 from procedures.analysis.calibration_plan import (
     TriadPlan,
     basis,
@@ -26,6 +27,7 @@ from procedures.analysis.calibration_plan import (
 from procedures.analysis.calibration_summary import TriadSummary, coefficient_unit
 from procedures.analysis.estimator import Weighting
 from procedures.analysis.reference import INPUT_UNITS, TRIAD_NAMES
+from procedures.analysis.reference_temperature import ThermalShare
 from procedures.analysis.scalar import require_scalar_determined
 from procedures.analysis.station_means import launch_warnings
 from procedures.analysis.station_plan import THESIS_ORIENTATIONS, windows
@@ -43,6 +45,14 @@ from procedures.procedure import Context, Outcome, Parameters, PredictedUncertai
 from procedures.site_parameters import TableParameters, declared_table
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
+Lag = Annotated[float, Field(ge=0.0, le=600.0)]
+LEAST_DWELL_S = 10.0
+"""What the temperatures of a station need: means, slopes, and their scatter."""
+
+
+_NOT_PREDICTED = (
+    "the predicted uncertainties are without the thermal correction's share, which depends on the temperatures to come"
+)
 
 
 class Limits(Parameters):
@@ -75,6 +85,11 @@ class Params(TableParameters):
         "angles as commanded (the thesis), their uncertainty added afterwards",
     )
     scalar_check: bool = Field(True, description="cross-check with the magnitude of gravity alone")
+    thermal_correction: Literal["none", "current"] = Field(
+        "none", description="current: the unit's thermal correction brings the accelerometers to its reference"
+    )
+    case_lag_s: Lag = Field(5.0, description="time constant of the case sensor; used by thermal_correction=current")
+    converter_lag_s: Lag = Field(5.0, description="the same of the converter's sensor")
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
 
@@ -82,11 +97,22 @@ class Result(Outcome):
     """Both triads' coefficients, how well they describe the stations, and the verdict."""
 
     triads: tuple[TriadSummary, ...]
+    thermal: ThermalShare | None = Field(
+        None, exclude_if=lambda share: share is None, description="of the accelerometers, where they were corrected"
+    )
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Dwell from the unit; site and table accuracy from the bench."""
-    return params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
+    """Dwell from the unit; site and table accuracy from the bench. Refuses a correction that the unit does not have."""
+    full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
+    if full.thermal_correction == "current":
+        if context.unit.thermal_correction is None:
+            raise BadParameter(
+                "thermal_correction", "current", f"none: unit {context.unit.serial} has no thermal correction yet"
+            )
+        if full.dwell_s is not None and full.dwell_s < LEAST_DWELL_S:
+            raise BadParameter("dwell_s", full.dwell_s, f"at least {LEAST_DWELL_S:g}: temperatures are read beside")
+    return full
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
@@ -95,7 +121,15 @@ def schedule(params: Params) -> tuple[Station, ...]:
     if params.dwell_s is None:
         raise BadParameter("dwell_s", None, "resolve the parameters first: the dwell comes from the unit")
     return tuple(
-        Station(i, f"β={beta:g} γ={gamma:g}", turn(beta, gamma), None, params.settle_s, params.dwell_s)
+        Station(
+            i,
+            f"β={beta:g} γ={gamma:g}",
+            turn(beta, gamma),
+            None,
+            params.settle_s,
+            params.dwell_s,
+            temperatures=params.thermal_correction == "current",
+        )
         for i, (beta, gamma) in enumerate(params.orientations)
     )
 
@@ -107,9 +141,10 @@ def predict(params: Params, context: Context) -> Prediction:
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     _require_scalar(params, plans[1])
     uncertainties = tuple(u for plan in plans for u in _predicted(plan))
+    thermal = (_NOT_PREDICTED,) if params.thermal_correction == "current" else ()
     duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1])
     rests_on = basis(plans) if uncertainties else ""
-    return Prediction(duration_s, uncertainties, _warnings(params, plans), rests_on)
+    return Prediction(duration_s, uncertainties, _warnings(params, plans) + thermal, rests_on)
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
@@ -124,21 +159,16 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     site, uncertainty = params.site(context), _uncertainty(params, context)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     _require_scalar(params, plans[1])
-    triads = tuple(
-        analyse_triad(
-            recordings,
-            triad,
-            site,
-            uncertainty,
-            context.unit.triad(triad),
-            params.scalar_check and triad == "accelerometer",
-            params.weighting,
-        )
-        for triad in TRIAD_NAMES
+    gyro, accelerometer = (context.unit.triad(triad) for triad in TRIAD_NAMES)
+    first = analyse_triad(recordings, "gyro", site, uncertainty, gyro, weighting=params.weighting)
+    correction = context.unit.thermal_correction if params.thermal_correction == "current" else None
+    settings = AccelerometerSettings(
+        params.scalar_check, params.weighting, correction, (params.case_lag_s, params.converter_lag_s)
     )
-    checks = tuple(c for t in triads for c in _checks(t, params.limits))
-    warnings = _warnings(params, plans) + launch_warnings(recordings)
-    return Result(checks=checks, verdict=verdict(checks), warnings=warnings, triads=triads)
+    second, share, doubts = analyse_accelerometers(recordings, site, uncertainty, accelerometer, settings)
+    checks = tuple(c for t in (first, second) for c in _checks(t, params.limits))
+    warnings = _warnings(params, plans) + launch_warnings(recordings) + doubts
+    return Result(checks=checks, verdict=verdict(checks), warnings=warnings, triads=(first, second), thermal=share)
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
@@ -156,7 +186,8 @@ def report(result: Result) -> Report:
         f for t in result.triads for f in (*pictures.magnitude_figures(t.magnitudes), pictures.residual_figure(t))
     ]
     stations = [pictures.station_table(m) for m in magnitudes]
-    return Report(sections=(*tables, *figures, *stations))
+    thermal = [] if result.thermal is None else pictures.thermal_tables(result.thermal, magnitudes[0].labels)
+    return Report(sections=(*tables, *thermal, *figures, *stations))
 
 
 def _uncertainty(params: Params, context: Context) -> TableUncertainty:
@@ -248,7 +279,7 @@ def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
 PROCEDURE = Procedure(
     "calibration_12_orientations",
     "Calibration in twelve orientations",
-    "1.1.0",
+    "1.2.0",
     Params,
     Result,
     resolve,
@@ -258,4 +289,5 @@ PROCEDURE = Procedure(
     analyse,
     report,
     calibrations,
+    uses_corrections=lambda params: ("thermal",) if params.thermal_correction == "current" else (),
 )

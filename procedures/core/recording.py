@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from procedures.core.arrays import Array
 from procedures.core.errors import MissingChannel
 from procedures.core.table_angles import TableAngles
+from procedures.core.temperature_profile import TemperatureProfile
 from procedures.core.turn import Turn
 
 RawArray = NDArray[np.int32] | NDArray[np.float64]
@@ -93,6 +94,10 @@ class Station:
     """Whether the unit's temperature sensors are recorded beside its triads."""
     sample_rate_hz: float | None = None
     """How often the unit is to send; None: its own rate. The same for all stations of a job."""
+    current_ma: float | None = None
+    """What a current source gives to the inputs of all three channels of a converter; None: there is a whole unit."""
+    profile: TemperatureProfile | None = None
+    """What the chamber goes through meanwhile; the recording ends with the last soak, `record_s` being the longest."""
 
 
 @dataclass(frozen=True)

@@ -114,6 +114,11 @@ class ThermalCorrection:
     """The converter's models that were taken out of the outputs before the fit (`core.converter.at_reference`), and so
     must be wherever the correction is used; None: it is for outputs as they are."""
 
+    @property
+    def scales(self) -> Array:
+        """K0 of each axis, (3,)."""
+        return np.array([axis.scale for axis in self.axes])
+
     def apply(self, output_m_s2: Array, case_c: Array, converter_c: Array, dynamic: ArrayLike) -> Array:
         """Corrected specific forces (n, 3) [m/s²] of nominal outputs (n, 3).
 

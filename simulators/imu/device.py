@@ -1,41 +1,18 @@
 """The unit's data link on a simulated bench: implements `procedures.bench.imu.Imu`."""
 
-from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from procedures.bench.errors import DeviceFault, NotPowered, OutOfRange
+from procedures.bench.errors import OutOfRange
 from procedures.bench.imu import Stream
 from procedures.core.recording import Channel, Station
 from simulators.clock import Motion, SimClock
 from simulators.imu.climate import Climate
-from simulators.imu.counter import Counts
 from simulators.imu.sensor import TRIADS, TriadSensor
+from simulators.imu.tape import Tapes
 from simulators.truth import UnitTruth, temperature_channels, unit_channels
-
-BLOCK_S = 10.0
-
-
-@dataclass
-class _Tape:
-    """Counts that a recording wants and has not handed on yet: of its first channels, as many as it has."""
-
-    columns: int
-    blocks: list[Counts] = field(default_factory=list)
-    held: int = 0
-    broken: bool = False
-
-    def put(self, counts: Counts) -> None:
-        self.blocks.append(counts if counts.shape[1] == self.columns else np.array(counts[:, : self.columns]))
-        self.held += len(counts)
-
-    def take(self, count: int) -> Counts:
-        whole = np.concatenate(self.blocks) if len(self.blocks) != 1 else self.blocks[0]
-        self.blocks = [whole[count:]] if len(whole) > count else []
-        self.held = len(whole) - count
-        return whole[:count]
 
 
 class SimImu:
@@ -49,12 +26,11 @@ class SimImu:
         self._thermal = thermal
         self._seed = seed
         self._clock = clock
-        self._launch = launch
         self._channels = unit_channels(truth)
         self._temperatures = temperature_channels(truth)
         self._sensors: dict[str, TriadSensor] = {}
         self._ticks = 0
-        self._tapes: list[_Tape] = []
+        self._tapes = Tapes(clock, launch)
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -74,14 +50,13 @@ class SimImu:
     def power_down(self) -> None:
         """End of the launch; recordings in progress find the unit gone."""
         self._sensors = {}
-        for tape in self._tapes:
-            tape.broken = True
+        self._tapes.stop()
 
     def feel(self, motion: Motion, climate: Climate | None = None) -> None:
         """Go through some motion, in some climate where the world has one; nothing happens while off."""
         if not self._sensors:
             return
-        width = max((tape.columns for tape in self._tapes), default=len(self._channels))
+        width = max((tape.columns for tape in self._tapes.running), default=len(self._channels))
         counts = np.empty((motion.ticks, width), dtype=np.int32)
         gyro, accelerometer = (None, None) if climate is None else (climate.gyro, climate.accelerometer)
         self._sensors["gyro"].feel(self._ticks, motion.ticks, motion.angle_rad, counts[:, :3].T, gyro)
@@ -91,7 +66,7 @@ class SimImu:
         if climate is not None and width > len(self._channels):
             counts[:, len(self._channels) :] = climate.codes_at_ticks()
         self._ticks += motion.ticks
-        for tape in self._tapes:
+        for tape in self._tapes.running:
             tape.put(counts)
 
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
@@ -99,7 +74,7 @@ class SimImu:
 
         A station that wants temperatures gets their channels after the six, in whole seconds, held at the sample rate.
         """
-        self._need_power()
+        self._tapes.need_power()
         if not 0.0 <= duration_s < float("inf"):
             raise OutOfRange(f"duration_s = {duration_s!r} must be finite and not negative")
         warm = station is not None and station.temperatures
@@ -112,35 +87,12 @@ class SimImu:
         samples = round(duration_s * self.rate_hz)
         start = self._clock.ticks
         launched_s = (start - self._ticks) / self.rate_hz
-        blocks = self._blocks(samples, start, len(channels))
+        blocks = self._tapes.blocks(samples, start, len(channels))
         return Stream(channels, self.rate_hz, start / self.rate_hz, blocks, station, launched_s)
-
-    async def _blocks(self, samples: int, start: int, columns: int) -> AsyncIterator[Counts]:
-        if self._clock.ticks != start:
-            raise DeviceFault("samples were lost: time passed between the recording's beginning and its first reading")
-        tape = _Tape(columns)
-        self._tapes.append(tape)
-        try:
-            while samples > 0:
-                block = min(samples, max(1, int(BLOCK_S * self.rate_hz)))
-                if tape.held < block:
-                    self._need_power(tape)
-                    await self._clock.pass_ticks(block - tape.held)
-                if tape.held < block:
-                    self._need_power(tape)
-                    raise DeviceFault("the unit stopped sending")
-                samples -= block
-                yield tape.take(block)
-        finally:
-            self._tapes.remove(tape)
-
-    def _need_power(self, tape: _Tape | None = None) -> None:
-        if self._launch() == 0 or (tape is not None and tape.broken):
-            raise NotPowered("the unit is switched off")
 
     def sensor(self, triad: str) -> TriadSensor:
         """A triad of the present launch. Raises `NotPowered`."""
-        self._need_power()
+        self._tapes.need_power()
         return self._sensors[triad]
 
     def checkpoint(self) -> dict[str, Any]:

@@ -12,11 +12,20 @@ from simulators.truth.files import (
 )
 from simulators.truth.population import random_table_truth, random_unit_truth
 from simulators.truth.ranges import Array, TruthError, Vector
-from simulators.truth.values import BenchTruth, OperatorTruth, SiteTruth, TableTruth, TriadTruth, UnitTruth
+from simulators.truth.values import (
+    BenchTruth,
+    CurrentSourceTruth,
+    OperatorTruth,
+    SiteTruth,
+    TableTruth,
+    TriadTruth,
+    UnitTruth,
+)
 
 __all__ = [
     "Array",
     "BenchTruth",
+    "CurrentSourceTruth",
     "KeyedBlocks",
     "OperatorTruth",
     "SiteTruth",

@@ -88,6 +88,20 @@ class OperatorTruth:
 
 
 @dataclass(frozen=True)
+class CurrentSourceTruth:
+    """The precision current source of the converter's bench. Ours: a calibrated laboratory source."""
+
+    gain_error_ppm: float = 4.0
+    zero_error_ma: float = 5e-5
+    noise_ma: float = 2e-4
+    """Standard deviation within one cycle of the converter."""
+
+    def __post_init__(self) -> None:
+        ranges = {"gain_error_ppm": (-1e5, 1e5), "zero_error_ma": (-1.0, 1.0), "noise_ma": (0.0, 1.0)}
+        check_fields("current_source_truth", self, ranges)
+
+
+@dataclass(frozen=True)
 class BenchTruth:
     """A bench: what is true of its site, table, chamber and operator, and what its laboratory declares of them.
 
@@ -100,6 +114,7 @@ class BenchTruth:
     chamber: ChamberTruth = field(default_factory=ChamberTruth)
     chamber_faults: tuple[ChamberFault, ...] = ()
     operator: OperatorTruth = field(default_factory=OperatorTruth)
+    current_source: CurrentSourceTruth = field(default_factory=CurrentSourceTruth)
 
     def __post_init__(self) -> None:
         declared, true = self.description.chamber, self.chamber

@@ -122,6 +122,10 @@ class SimTurntable:
         outer, middle, inner = encoders.tolist()
         return TableAngles(outer, middle, inner)
 
+    def is_moving(self) -> bool:
+        """Whether the axes are not at rest and held; see the port."""
+        return not self.locked
+
     def read_rates_deg_s(self) -> Array:
         """Rates of the axes, (3,): for tests and displays."""
         return self._plant.rates_rad_s / units.DEG

@@ -4,44 +4,19 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from bench_service.jobs.errors import IdempotencyConflict, NotFound
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import Idempotency, StoredResult
-from procedures.core.converter import ConverterModel, Normalised
 from procedures.core.errors import BadParameter
-from procedures.core.thermal_correction import AxisCorrection, Form, ThermalCorrection
+from procedures.core.thermal_correction import Form
 from procedures.core.unit import Unit
 from procedures.core.unit_correction import UnitCorrection
+from tests.correction_samples import converter, thermal
 from tests.storage.conftest import CHANNELS
 
 NewResult = Callable[..., StoredResult]
-
-
-def _normalised(rng: np.random.Generator, relative: bool) -> Normalised:
-    a, b, c = rng.normal(size=3).tolist()
-    rows = tuple(tuple(row) for row in rng.normal(size=(3, 3)).tolist())
-    return Normalised(relative, 20.25, a, (b, c), rows, 1e-300)
-
-
-def converter(seed: int) -> UnitCorrection:
-    rng = np.random.Generator(np.random.PCG64(seed))
-    x, y, z = (ConverterModel(_normalised(rng, True), _normalised(rng, False)) for _ in range(3))
-    return UnitCorrection("converter", (x, y, z))
-
-
-def thermal(seed: int, form: Form = Form.BOTH) -> UnitCorrection:
-    rng = np.random.Generator(np.random.PCG64(seed))
-
-    def axis() -> AxisCorrection:
-        a, b = rng.normal(size=(2, 4)).tolist()
-        covariance = tuple(tuple(row) for row in rng.normal(size=(8, 8)).tolist())
-        return AxisCorrection(1.17, -0.09, tuple(a), tuple(b), 20.1, 19.9, form, (1e-4, -1e-5), covariance)
-
-    first_stage = converter(seed + 1).converter if form is Form.SWITCHED else None
-    return UnitCorrection("thermal", ThermalCorrection("accelerometer", (axis(), axis(), axis()), first_stage))
 
 
 def test_a_correction_comes_back_to_the_last_bit(stores: Stores, new_result: NewResult) -> None:

@@ -7,13 +7,27 @@ by, and it is of the printed size. The spread about the soak's own mean stands b
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from procedures.analysis.thermal.runs import ThermalRun
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.thermal_correction import ThermalCorrection
+
+
+class Corrects(Protocol):
+    """What turns outputs and temperatures into specific forces: `ThermalCorrection`, or what it is compared with."""
+
+    @property
+    def scales(self) -> Array:
+        """K0 of each axis, (3,)."""
+        ...
+
+    def apply(self, output_m_s2: Array, case_c: Array, converter_c: Array, dynamic: ArrayLike) -> Array:
+        """Specific forces (n, 3) [m/s²]."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -64,14 +78,14 @@ class ThreeSigma:
     spread_after: Array
 
 
-def corrected(run: ThermalRun, correction: ThermalCorrection) -> Array:
+def corrected(run: ThermalRun, correction: Corrects) -> Array:
     """Specific forces of a run's cells, (n, 3) [m/s²]."""
     return correction.apply(run.output_m_s2, run.case_c, run.converter_c, run.dynamic)
 
 
-def three_sigma(run: ThermalRun, correction: ThermalCorrection, reference: Soak, at: Soak) -> ThreeSigma:
+def three_sigma(run: ThermalRun, correction: Corrects, reference: Soak, at: Soak) -> ThreeSigma:
     """3σ before and after at a soak, about what the run itself shows in its reference soak."""
-    before = run.output_m_s2 * np.array([axis.scale for axis in correction.axes])
+    before = run.output_m_s2 * correction.scales
     after = corrected(run, correction)
     own, zero = slice(at.start, at.stop), slice(reference.start, reference.stop)
     departures = [3.0 * np.sqrt(np.mean((v[own] - v[zero].mean(axis=0)) ** 2, axis=0)) for v in (before, after)]
@@ -90,7 +104,7 @@ class Magnitude:
     rms_dynamic_m_s2: float
 
 
-def magnitude(run: ThermalRun, correction: ThermalCorrection, gravity_m_s2: float) -> Magnitude:
+def magnitude(run: ThermalRun, correction: Corrects, gravity_m_s2: float) -> Magnitude:
     """|ĝ| − g over a run of the corrected triad."""
     errors = np.linalg.norm(corrected(run, correction), axis=1) - gravity_m_s2
     about = errors - np.mean(errors)

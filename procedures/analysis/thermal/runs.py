@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-from procedures.analysis.thermal.regime import RegimeSettings, regimes
+from procedures.analysis.thermal.regime import RegimeSettings, RegimeTrace, regimes
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 
@@ -68,6 +68,7 @@ def thermal_run(
     lag_s: Mapping[str, float] | None = None,
     settings: RegimeSettings | None = None,
     force_m_s2: tuple[float, float, float] | None = None,
+    trace: RegimeTrace | None = None,
 ) -> ThermalRun:
     """Cells of `cell_s` out of series of one interval `sample_s` [s]; the last samples, less than a cell, are left out.
 
@@ -79,6 +80,7 @@ def thermal_run(
     force_m_s2 : effective specific force along each axis where the mounting or cross-coupling make it differ from
         gravity along `up`: ``(K·f)_i/K_ii`` of a calibration. A horizontal axis that feels 0.05 m/s² of it mixes its
         scale's temperature dependence into its bias.
+    trace : regime of every sample where it was told already.
 
     Raises `BadParameter`, `UnfitRecording` (a value that is no number, a series of another length, no two cells).
     """
@@ -98,7 +100,7 @@ def thermal_run(
     count = length // samples
     if count < 2:
         raise UnfitRecording(f"{length} samples are less than two cells of {cell_s:g} s")
-    dynamic = regimes(series["case"], sample_s, settings).dynamic
+    dynamic = (trace or regimes(series["case"], sample_s, settings)).dynamic
 
     def cells(name: str) -> Array:
         values = np.asarray(series[name], dtype=np.float64)

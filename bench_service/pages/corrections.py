@@ -1,0 +1,46 @@
+"""A correction set as a table. Knows how people read it; not where it is kept."""
+
+from procedures.core.converter import ConverterTriad, Normalised
+from procedures.core.report import Cell, Table
+from procedures.core.thermal_correction import COEFFICIENTS, ThermalCorrection
+from procedures.core.unit_correction import UnitCorrection
+
+
+def correction_table(correction: UnitCorrection) -> Table:
+    """Coefficients of the three axes or channels, each with its standard uncertainty where it is known."""
+    if correction.thermal is not None:
+        return _thermal(correction.thermal)
+    return _converter(correction.converter or ())
+
+
+def _thermal(value: ThermalCorrection) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for name, axis in zip("xyz", value.axes, strict=True):
+        references = (axis.case_reference_c, axis.converter_reference_c)
+        rows.append((name, axis.form.value, axis.scale, axis.bias_m_s2, *axis.alpha, *axis.beta, *references))
+        if axis.covariance:
+            rows.append((None, "±", None, None, *axis.standard_uncertainties().tolist(), None, None))
+    stage = "after the converter's own models" if value.first_stage else "of outputs as they are"
+    columns = ("axis", "form", "K0", "B0, m/s^2", *COEFFICIENTS, "case reference, °C", "converter reference, °C")
+    return Table(f"Correction of the {value.triad} triad, {stage}", columns, tuple(rows))
+
+
+def _converter(models: ConverterTriad | tuple[()]) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for name, model in zip("xyz", models, strict=False):
+        for title, part in (("scale, codes/mA", model.scale), ("zero, codes", model.zero)):
+            rows += [(name, title, *_coefficients(part)), (None, "±", *_uncertainties(part))]
+    widest = max((len(row) for row in rows), default=2)
+    powers = tuple(f"a_{k}" for k in range(1, widest - 3))
+    padded = tuple((*row, *[None] * (widest - len(row))) for row in rows)
+    return Table(
+        "Models of the signal converter", ("channel", "of", "reference, °C", "at the reference", *powers), padded
+    )
+
+
+def _coefficients(part: Normalised) -> tuple[Cell, ...]:
+    return (part.reference_c, part.at_reference, *part.coefficients)
+
+
+def _uncertainties(part: Normalised) -> tuple[Cell, ...]:
+    return (None, *(max(row[i], 0.0) ** 0.5 for i, row in enumerate(part.covariance)))

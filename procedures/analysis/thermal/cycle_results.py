@@ -1,0 +1,206 @@
+"""What a thermal cycle tells, as plain JSON-ready numbers. SI but for °C; axes in the order x, y, z."""
+
+from dataclasses import dataclass
+
+from procedures.analysis.thermal.profile_progress import LegEvidence
+from procedures.core.thermal_correction import AxisCorrection, ThermalCorrection
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A run for the eye: means over `step_s`, all lists alike long."""
+
+    t_s: tuple[float, ...]
+    """Middles since the recording's beginning."""
+    dynamic: tuple[bool, ...]
+    """Whether any second of it was dynamic."""
+    sensors_c: tuple[tuple[float, ...], ...]
+    """Case, converter, gyros x, y, z."""
+    air_c: tuple[float, ...]
+    set_point_c: tuple[float, ...]
+    acceleration_c_s2: tuple[float, ...]
+    """The indicator's second derivative."""
+    before_m_s2: tuple[tuple[float, ...], ...]
+    """Outputs over K0 less those of the reference soak, x, y, z: what an uncorrected unit is wrong by."""
+    after_m_s2: tuple[tuple[float, ...], ...]
+    """The same of the corrected forces."""
+    magnitude_before_m_s2: tuple[float, ...]
+    """|ĝ| − g with K0 and B0 alone."""
+    magnitude_after_m_s2: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class LegRegime:
+    """What the indicator made of one leg of the profile."""
+
+    ramp_began_s: float | None
+    """When the chamber's set point began to move; None where it stood."""
+    ramp_ended_s: float | None
+    dynamic_s: float | None
+    """When the regime became dynamic; None where it was dynamic before the ramp began, or did not."""
+    static_s: float | None
+    """When it became static for the rest of the leg; None where it did not."""
+    onset_delay_s: float | None
+    chatter: int
+    """Changes to dynamic that no ramp explains."""
+
+
+@dataclass(frozen=True)
+class RunFound:
+    """One run: what was recorded of its temperatures, and what the indicator said."""
+
+    recording: str
+    name: str
+    up: int
+    duration_s: float
+    force_m_s2: Triple
+    """Effective force along each axis that the fit took as known."""
+    legs: tuple[LegEvidence, ...]
+    regimes: tuple[LegRegime, ...]
+    static_share: float
+    trace: Trace
+
+
+@dataclass(frozen=True)
+class AxisFound:
+    """One accelerometer's fit."""
+
+    correction: AxisCorrection
+    uncertainties: tuple[float, ...]
+    """Standard, of α1 … α4, β1 … β4."""
+    residual_sd_m_s2: tuple[float | None, float | None]
+    """Of the cells, static and dynamic."""
+    effective_samples: float
+    condition: float
+    bic: Triple
+    """Of orders 1, 2 and 3."""
+    p_values: tuple[float, float]
+    """F test of order 2 against 1, and of 3 against 2."""
+    preferred_order: int
+
+
+@dataclass(frozen=True)
+class SoakFound:
+    """One soak over the runs, root mean square over them (thesis table 4.5)."""
+
+    leg: int
+    target_c: float
+    case_c: float
+    runs: int
+    """In how many runs the unit was static long enough."""
+    before_m_s2: Triple
+    """3σ: three times the rms departure from the run's reference soak."""
+    after_m_s2: Triple
+    spread_before_m_s2: Triple
+    """3σ about the soak's own mean."""
+    spread_after_m_s2: Triple
+
+
+@dataclass(frozen=True)
+class FormFound:
+    """What one way to correct is worth on this cycle."""
+
+    form: str
+    """"both", "switched", "single", "normalised polynomial (C)", or "the unit's current correction"."""
+    worst_3_sigma_m_s2: Triple
+    """Over the soaks."""
+    magnitude_static_m_s2: float
+    magnitude_dynamic_m_s2: float
+    """Of |ĝ| about each run's mean, root mean square over the runs."""
+
+
+@dataclass(frozen=True)
+class CorrelationFound:
+    """How one channel of one run goes with a temperature."""
+
+    run: str
+    axis: str
+    r: float
+    effective_samples: float
+    slope: float
+    """[m/s² or rad/s a °C]."""
+    slope_sd: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class AccelerometerCorrelation:
+    """Thesis table 4.3: before and after."""
+
+    before: CorrelationFound
+    after: CorrelationFound
+
+
+@dataclass(frozen=True)
+class GyroTemperature:
+    """Is a gyro independent of its temperature? Three runs together (thesis table 4.6)."""
+
+    axis: str
+    runs: tuple[CorrelationFound, ...]
+    p_value: float
+    """Fisher's of the runs."""
+    slope_rad_s_c: float
+    slope_sd_rad_s_c: float
+    """Of the runs, weighted."""
+
+
+@dataclass(frozen=True)
+class GyroNoise:
+    """Noise of one gyro in one run (thesis table 4.7), beside what is known of the unit. None: not observed."""
+
+    run: str
+    axis: str
+    quantization: float | None
+    random_walk: float | None
+    bias_instability: float | None
+    uncertainties: tuple[float | None, float | None, float | None]
+    upper_limits: Triple
+    known: Triple | None
+
+
+@dataclass(frozen=True)
+class AllanFound:
+    """Allan deviations of one accelerometer in one run, of means over a second."""
+
+    run: str
+    axis: str
+    tau_s: tuple[float, ...]
+    before: tuple[float, ...]
+    after: tuple[float, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    """Interval of `after`."""
+    rise: float
+    """Largest ratio of a lower end to the upper end at any shorter time: above one the deviation surely rises."""
+
+
+@dataclass(frozen=True)
+class ThermalCycle:
+    """Everything."""
+
+    judged: str
+    """"fit": the correction of this cycle; "current": the unit's, which has not seen it."""
+    reference_c: tuple[float, float]
+    stage_one: bool
+    """Whether the converter's own model was taken out first."""
+    force_known: bool
+    """Whether the forces come from the unit's calibration."""
+    regime_delay_s: float
+    """The indicator's own."""
+    runs: tuple[RunFound, ...]
+    axes: tuple[AxisFound, AxisFound, AxisFound]
+    """Of the form that was fitted."""
+    correction: ThermalCorrection
+    """Fitted to this cycle."""
+    soaks: tuple[SoakFound, ...]
+    """By the judged correction."""
+    magnitude_m_s2: tuple[tuple[float, float], ...]
+    """Of each run: rms of |ĝ| about its mean, before and after."""
+    forms: tuple[FormFound, ...]
+    accelerometers: tuple[AccelerometerCorrelation, ...]
+    gyros: tuple[GyroTemperature, ...]
+    gyro_noise: tuple[GyroNoise, ...]
+    allan: tuple[AllanFound, ...]
+    warnings: tuple[str, ...]

@@ -1,0 +1,186 @@
+"""How far a unit has come along a temperature profile, reading by reading: the same steps live and on a recording.
+
+The bench feeds it while a run is recorded and acts on what it says; the analysis feeds it the recorded readings again
+and gets the very same legs and soaks, so that the evidence for each soak is in the raw data and nowhere else.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from procedures.core.errors import BadParameter
+from procedures.core.temperature_profile import MINUTE_S, ProfileLeg, TemperatureProfile
+
+CHECK_S = 10.0
+"""Readings are judged so often: the last sample of every such stretch of a recording."""
+CASE, CONVERTER = "temperature_case", "temperature_converter"
+SENSORS = (CASE, CONVERTER, "temperature_gyro_x", "temperature_gyro_y", "temperature_gyro_z")
+"""Channels of the unit's own temperature sensors."""
+AIR, SET_POINT = "chamber_air", "chamber_set_point"
+"""Channels of what the chamber said of itself, written beside the unit's."""
+DISCONNECTED_CODE = -32768
+"""The least of 16 bits: what the unit sends for a sensor that is not there."""
+STUCK_C = 5.0
+"""A sensor whose code stays the same while all others but one move by more than this is stuck."""
+
+
+def check_samples(rate_hz: float) -> int:
+    """Samples between two readings that are judged, at least one."""
+    return max(1, round(CHECK_S * rate_hz))
+
+
+class Standing(StrEnum):
+    """What a reading says of the present leg."""
+
+    UNDER_WAY = "under way"
+    DONE = "done"
+    LATE = "late"
+
+
+@dataclass(frozen=True)
+class LegEvidence:
+    """What was recorded of one leg; times since the recording's beginning [s]."""
+
+    target_c: float
+    ramp_c_min: float
+    began_s: float
+    reached_s: float | None
+    """When the chamber's air was first near the target."""
+    soaked_s: float | None
+    """When the criterion began to hold for good."""
+    ended_s: float
+    case_c: float
+    converter_c: float
+    """Means over the criterion's window at the end."""
+    case_slope_c_min: float
+    converter_slope_c_min: float
+    air_c: float
+    """The last reading."""
+
+
+class ProfileProgress:
+    """State along a profile. `leg` is the present one, None when all are done."""
+
+    def __init__(self, profile: TemperatureProfile) -> None:
+        self.profile = profile
+        self.evidence: list[LegEvidence] = []
+        """Of every leg that is done."""
+        self._began_s = 0.0
+        self._reached_s: float | None = None
+        self._soaked_s: float | None = None
+        length = max(3, round(profile.criterion.window_s / CHECK_S) + 1)
+        self._window: deque[tuple[float, float]] = deque(maxlen=length)
+        axis = CHECK_S / MINUTE_S * (np.arange(length) - 0.5 * (length - 1))
+        self._slope_of = axis / float(axis @ axis)
+
+    @property
+    def leg(self) -> ProfileLeg | None:
+        done = len(self.evidence)
+        return self.profile.legs[done] if done < len(self.profile.legs) else None
+
+    @property
+    def slopes_c_min(self) -> tuple[float, float]:
+        """Of case and converter over the window [°C/min]; not numbers until it has filled."""
+        if len(self._window) < len(self._slope_of):
+            return float("nan"), float("nan")
+        case, converter = (self._slope_of @ np.array(self._window)).tolist()
+        return case, converter
+
+    def step(self, t_s: float, case_c: float, converter_c: float, air_c: float) -> Standing:
+        """One more reading, `CHECK_S` after the one before, `t_s` since the recording began [s].
+
+        After `DONE` the next leg has begun, if there is one. Raises `BadParameter` where no leg is left.
+        """
+        leg = self.leg
+        if leg is None:
+            raise BadParameter("t_s", t_s, "no reading after the profile's end")
+        self._window.append((case_c, converter_c))
+        criterion = self.profile.criterion
+        there = abs(air_c - leg.target_c) <= criterion.air_within_c
+        if there and self._reached_s is None:
+            self._reached_s = t_s
+        slopes = self.slopes_c_min
+        if not (there and all(abs(slope) <= criterion.slope_c_min for slope in slopes)):
+            self._soaked_s = None
+        elif self._soaked_s is None:
+            self._soaked_s = t_s
+        since_s = t_s - self._began_s
+        soaked = self._soaked_s is not None and t_s - self._soaked_s >= leg.least_soak_s
+        if soaked and since_s >= leg.least_s:
+            self._end(leg, t_s, slopes, air_c)
+            return Standing.DONE
+        return Standing.LATE if since_s >= leg.longest_s else Standing.UNDER_WAY
+
+    def why_late(self, air_c: float) -> str:
+        """A sentence on what the present leg lacks."""
+        leg, criterion = self.leg, self.profile.criterion
+        if leg is None:
+            return "nothing is late"
+        number = f"leg {len(self.evidence) + 1} of {len(self.profile.legs)}, {leg.target_c:g} °C"
+        if self._reached_s is None:
+            what = f"the chamber's air is at {air_c:.1f} °C and has never come within {criterion.air_within_c:g} °C"
+        else:
+            case, converter = self.slopes_c_min
+            what = (
+                f"the unit still drifts by {case:+.3f} °C/min at its case and {converter:+.3f} °C/min at its converter "
+                f"(allowed: {criterion.slope_c_min:g}, for {leg.least_soak_s:g} s), the air is at {air_c:.1f} °C"
+            )
+        return f"{number}, is not soaked {leg.longest_s:g} s after it was begun: {what}"
+
+    def _end(self, leg: ProfileLeg, t_s: float, slopes: tuple[float, float], air_c: float) -> None:
+        case, converter = np.mean(np.array(self._window), axis=0).tolist()
+        self.evidence.append(
+            LegEvidence(
+                leg.target_c,
+                leg.ramp_c_min,
+                self._began_s,
+                self._reached_s,
+                self._soaked_s,
+                t_s,
+                case,
+                converter,
+                slopes[0],
+                slopes[1],
+                air_c,
+            )
+        )
+        self._began_s, self._reached_s, self._soaked_s = t_s, None, None
+
+
+class SensorWatch:
+    """Judges the unit's temperature sensors, reading by reading; plain arithmetic, for it runs thousands of times."""
+
+    def __init__(self, profile: TemperatureProfile) -> None:
+        low, high = profile.span_c
+        self._low, self._high = low - profile.unit_margin_c, high + profile.unit_margin_c
+        self._codes: list[int] = []
+        self._then: list[tuple[float, ...]] = []
+        """Of each sensor: what all of them read when its code last changed."""
+
+    def step(self, codes: Sequence[int], readings_c: Sequence[float]) -> str | None:
+        """A sentence where a sensor is disconnected, stuck, or reads what the unit must not be; else None.
+
+        Codes and readings [°C] in the order of `SENSORS`.
+        """
+        if DISCONNECTED_CODE in codes:
+            return f"{SENSORS[list(codes).index(DISCONNECTED_CODE)]} is disconnected: it sends code {DISCONNECTED_CODE}"
+        now = tuple(readings_c)
+        if not self._codes:
+            self._codes, self._then = list(codes), [now] * len(now)
+            self._low, self._high = min(self._low, *now), max(self._high, *now)
+        for i, name in enumerate(SENSORS):
+            if not self._low <= now[i] <= self._high:
+                return f"{name} reads {now[i]:.1f} °C, outside {self._low:.1f} … {self._high:.1f} °C"
+            if codes[i] != self._codes[i]:
+                self._codes[i], self._then[i] = codes[i], now
+                continue
+            moved = sorted(abs(b - a) for j, (a, b) in enumerate(zip(self._then[i], now, strict=True)) if j != i)
+            if moved[1] > STUCK_C:
+                return (
+                    f"{name} is stuck at {now[i]:.2f} °C: its code has not changed while the others moved by "
+                    f"{moved[1]:.1f} °C and more"
+                )
+        return None

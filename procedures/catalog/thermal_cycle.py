@@ -1,0 +1,300 @@
+"""Thermal cycle: three launches in the chamber with x, y and z up, from a profile to a correction and its judgement.
+
+Thesis 3.2 and 4.2, paper C. Each run is one launch of about twelve hours: the unit is set by hand, rests switched off,
+and is recorded with all its temperature sensors while the chamber goes through soaks and ramps. A leg ends when the
+*unit* has soaked, by the slopes of its own sensors. The profile, its times and its criterion are ours: the thesis shows
+its profile in a figure only.
+"""
+
+from collections.abc import AsyncIterator, Sequence
+from typing import Literal
+
+from pydantic import Field
+
+from procedures import steps
+from procedures.analysis.reference import site_with
+from procedures.analysis.thermal import cycle_figures, cycle_tables
+from procedures.analysis.thermal.cycle_analysis import KnownOfUnit, analyse_cycle
+from procedures.analysis.thermal.cycle_checks import CycleLimits, cycle_checks
+from procedures.analysis.thermal.cycle_results import ThermalCycle
+from procedures.analysis.thermal.cycle_runs import CycleSettings
+from procedures.analysis.thermal.cycle_series import read_cycle
+from procedures.analysis.thermal.regime import RegimeSettings
+from procedures.analysis.whole_turns_plan import UPRIGHT
+from procedures.bench import Bench
+from procedures.bench.imu import Stream
+from procedures.core import units
+from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.frames import specific_force_b
+from procedures.core.limits import verdict
+from procedures.core.recording import AXES, Recording, Station
+from procedures.core.report import Report
+from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
+from procedures.core.thermal_correction import Form
+from procedures.core.unit_correction import CorrectionKind, UnitCorrection
+from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
+
+LEAST_OFF_S = 3.0 * units.HOUR
+"""Thesis 4.2.1: at least three hours off between runs."""
+UPRIGHT_SHARE = 0.99
+"""Of gravity that an axis which is up feels at least."""
+
+
+class Leg(Parameters):
+    """A ramp to an air temperature and a soak there; times run from setting out."""
+
+    target_c: float = Field(ge=-100.0, le=200.0)
+    ramp_c_min: float = Field(1.0, ge=0.01, le=100.0, description="of the chamber's set point")
+    least_s: float = Field(0.0, ge=0.0, le=604_800.0, description="the leg is no shorter, however soon it has soaked")
+    least_soak_s: float = Field(600.0, ge=0.0, le=604_800.0, description="so long the criterion must hold")
+    longest_s: float = Field(14_400.0, ge=60.0, le=604_800.0, description="with no soak by then the job fails")
+
+
+def _leg(target_c: float, least_s: float) -> Leg:
+    return Leg(target_c=target_c, ramp_c_min=1.0, least_s=least_s, least_soak_s=600.0, longest_s=least_s + units.HOUR)
+
+
+DEFAULT_LEGS = (
+    _leg(20.0, 2160.0),
+    _leg(-40.0, 8460.0),
+    *(_leg(target, 5100.0) for target in (-20.0, 0.0, 20.0, 40.0, 60.0)),
+    _leg(20.0, 7080.0),
+)
+"""Twelve hours: by these least times a unit whose case takes some twenty minutes has soaked at every temperature."""
+
+
+class Soak(Parameters):
+    """When the unit counts as soaked: judged from its own case and converter sensors every ten seconds."""
+
+    slope_c_min: float = Field(0.1, ge=1e-4, le=100.0, description="most that either sensor may drift")
+    window_s: float = Field(300.0, ge=60.0, le=86_400.0, description="of the straight line whose slope that is")
+    air_within_c: float = Field(1.5, ge=0.01, le=100.0, description="chamber's air about the target")
+
+
+class Regime(Parameters):
+    """The indicator of T 3.18."""
+
+    memory_s: float = Field(120.0, ge=3.0, le=86_400.0)
+    enter_c_s2: float = Field(4.0e-6, gt=0.0, le=1.0)
+    release_c_s2: float = Field(2.5e-6, gt=0.0, le=1.0)
+    release_rate_c_s: float = Field(2.5e-3, gt=0.0, le=1e3)
+    hold_s: float = Field(300.0, ge=0.0, le=86_400.0)
+
+
+class Limits(Parameters):
+    """Requirements (thesis 4.3, 5.6; tests at the level of significance are ours)."""
+
+    three_sigma_m_s2: float = Field(0.0005, gt=0.0, le=100.0, description="of each axis after correction, worst soak")
+    magnitude_rms_m_s2: float = Field(0.0005, gt=0.0, le=100.0, description="of |ĝ| about its mean, worst run")
+    allan_rise: float = Field(
+        1.0, gt=0.0, le=1e6, description="least sure deviation at a longer time over the most at a shorter one"
+    )
+    gyro_random_walk_deg_sqrt_h: float = Field(0.003, gt=0.0, le=1e6)
+    gyro_bias_in_run_deg_h: float = Field(0.015, gt=0.0, le=1e6, description="bias instability in the cycle")
+
+
+class Params(Parameters):
+    """The profile, the analysis, and what to hold the unit to."""
+
+    legs: tuple[Leg, ...] = Field(DEFAULT_LEGS, min_length=1, max_length=100)
+    soak: Soak = Field(default_factory=lambda: Soak.model_validate({}))
+    unit_margin_c: float = Field(
+        30.0, ge=1.0, le=300.0, description="a sensor further outside the targets' span ends the job"
+    )
+    power_off_s: float = Field(10_800.0, ge=1.0, le=604_800.0, description="before each run, the first too")
+    sample_rate_hz: float = Field(100.0, ge=1.0, le=10_000.0)
+    cell_s: float = Field(60.0, ge=1.0, le=600.0, description="cells that the fits work on")
+    case_lag_s: float = Field(5.0, ge=0.0, le=600.0, description="time constant of the case sensor, by its data sheet")
+    converter_lag_s: float = Field(5.0, ge=0.0, le=600.0)
+    lag_sd_s: float = Field(0.05, ge=0.0, le=600.0, description="standard uncertainty of each time constant")
+    reference_case_c: float = Field(
+        20.0, ge=-100.0, le=200.0, description="reading of the case sensor at which the correction does nothing"
+    )
+    reference_converter_c: float = Field(20.0, ge=-100.0, le=200.0)
+    current_ma_per_g: float = Field(1.1, gt=0.0, le=1e3, description="of the accelerometers, for stage one")
+    regime: Regime = Field(default_factory=lambda: Regime.model_validate({}))
+    form: Form = Field(Form.BOTH, description="which terms of T 4.1 act in which regime")
+    correction: Literal["fit", "current"] = Field(
+        "fit",
+        description="fit: find a correction and judge it on the same cycle; current: judge the unit's current "
+        "correction on this cycle, which it has not seen",
+    )
+    gyro_noise: Literal["cycle", "unit"] = Field(
+        "cycle", description="noise that the gyros' dependence on temperature is tested against"
+    )
+    gyro_trim_s: float = Field(600.0, ge=0.0, le=86_400.0, description="start of a launch that gyros are not judged by")
+    level: float = Field(0.01, gt=0.0, le=0.2, description="chance that a sound set of gyros is said to depend")
+    confidence: float = Field(0.95, gt=0.5, lt=1.0, description="of the intervals")
+    gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9, description="None: the site's")
+    limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
+
+    def profile(self) -> TemperatureProfile:
+        """The same for the bench. Raises `BadParameter`."""
+        legs = tuple(ProfileLeg(**leg.model_dump()) for leg in self.legs)
+        return TemperatureProfile(legs, SoakCriterion(**self.soak.model_dump()), self.unit_margin_c)
+
+    def settings(self) -> CycleSettings:
+        """The same for the numerics. Raises `BadParameter`."""
+        return CycleSettings(
+            cell_s=self.cell_s,
+            case_lag_s=self.case_lag_s,
+            converter_lag_s=self.converter_lag_s,
+            lag_sd_s=self.lag_sd_s,
+            reference_c=(self.reference_case_c, self.reference_converter_c),
+            regime=RegimeSettings(**self.regime.model_dump()),
+            current_ma_per_g=self.current_ma_per_g,
+            gyro_trim_s=self.gyro_trim_s,
+            level=self.level,
+            confidence=self.confidence,
+        )
+
+
+class Result(Outcome):
+    """The correction, and what it and the gyros are worth over temperature."""
+
+    cycle: ThermalCycle
+
+
+def resolve(params: Params, context: Context) -> Params:
+    """Gravity of the site."""
+    return params.filled({"gravity_m_s2": context.bench.site.gravity_m_s2})
+
+
+def schedule(params: Params) -> tuple[Station, ...]:
+    """One station a run, x, y and z up; `record_s` is the longest that it may take."""
+    profile = params.profile()
+    return tuple(
+        Station(
+            i,
+            f"{axis} up",
+            UPRIGHT[axis],
+            record_s=profile.longest_s,
+            power_off_s=params.power_off_s,
+            temperatures=True,
+            sample_rate_hz=params.sample_rate_hz,
+            profile=profile,
+        )
+        for i, axis in enumerate(AXES)
+    )
+
+
+def predict(params: Params, context: Context) -> Prediction:
+    """Duration and what is known to be missing. Raises `BadParameter` where the cycle could give nothing."""
+    profile = params.profile()
+    params.settings()
+    _require_possible(params, context)
+    duration_s = len(AXES) * (params.power_off_s + profile.expected_s())
+    basis = (
+        "each soak begins with the end of its ramp, or when its least time is over; uncertainties of temperature "
+        "coefficients are not predicted: they rest on how the unit's own temperatures part on ramps, which the cycle "
+        "itself is to show"
+    )
+    return Prediction(duration_s, (), _warnings(params, context), basis)
+
+
+async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
+    """Off, set by hand, rest, on, record along the profile; run after run."""
+    for station in stations:
+        axis = station.label.split()[0]
+        request = f"Open the chamber, set the unit with its {axis} axis upwards and level, close the door."
+        yield await steps.record_profile(bench, station, request)
+
+
+def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
+    """Each run read once, block by block; then one fit over all of them, and the judgement."""
+    params = resolve(params, context)
+    _require_correction(params, context)
+    site = site_with(context.bench.site, None, params.gravity_m_s2, None, None)
+    series = [(r.info.id, read_cycle(r, _up(r, context))) for r in recordings]
+    unit = context.unit
+    calibration = unit.calibration("accelerometer")
+    known = KnownOfUnit(
+        unit.converter,
+        calibration if calibration is not None and calibration.output_unit == "m/s^2" else None,
+        unit.thermal_correction,
+        None if unit.gyro is None else unit.gyro.noise,
+    )
+    cycle = analyse_cycle(
+        series,
+        params.settings(),
+        params.form,
+        site.gravity_m_s2,
+        known,
+        judge_current=params.correction == "current",
+        noise_from_cycle=params.gyro_noise == "cycle",
+    )
+    checks = cycle_checks(cycle, CycleLimits(**params.limits.model_dump(), level=params.level))
+    return Result(checks=checks, verdict=verdict(checks), warnings=cycle.warnings, cycle=cycle)
+
+
+def corrections(result: Result) -> tuple[UnitCorrection, ...]:
+    """The correction that was fitted; none where the unit's own was judged."""
+    return (UnitCorrection("thermal", result.cycle.correction),) if result.cycle.judged == "fit" else ()
+
+
+def uses_corrections(params: Params) -> tuple[CorrectionKind, ...]:
+    """Stage one rests on the converter's models; the unit's own correction is judged, or shown beside the new one."""
+    return "converter", "thermal"
+
+
+def report(result: Result) -> Report:
+    """Tables 4.3 to 4.7 and figures 3.15 to 3.17 and 4.11 to 4.16 of the thesis, in our words."""
+    cycle = result.cycle
+    return Report(cycle_tables.summary(cycle), (*cycle_tables.tables(cycle), *cycle_figures.figures(cycle)))
+
+
+def _up(recording: Recording, context: Context) -> int:
+    """The axis that stood upwards, by the station's attitude."""
+    station = recording.info.station
+    if station is None or station.angles is None:
+        raise UnfitRecording(f"recording {recording.info.id}: nobody told how the unit stood")
+    force = specific_force_b([station.angles], context.bench.site)[0]
+    up = int(force.argmax())
+    if force[up] < UPRIGHT_SHARE * context.bench.site.gravity_m_s2:
+        raise UnfitRecording(f"recording {recording.info.id}: no axis of the unit stood upwards")
+    return up
+
+
+def _require_possible(params: Params, context: Context) -> None:
+    at = params.legs[0].target_c
+    for number, leg in enumerate(params.legs):
+        ramp_s = 60.0 * abs(leg.target_c - at) / leg.ramp_c_min
+        if ramp_s + leg.least_soak_s > leg.longest_s:
+            raise BadParameter(
+                f"legs.{number}.longest_s", leg.longest_s, f"at least {ramp_s + leg.least_soak_s:g}, its ramp and soak"
+            )
+        at = leg.target_c
+    if len({leg.target_c for leg in params.legs}) < 3:
+        raise BadParameter(
+            "legs", [leg.target_c for leg in params.legs], "three temperatures at least, for polynomials of order two"
+        )
+    _require_correction(params, context)
+
+
+def _require_correction(params: Params, context: Context) -> None:
+    if params.correction == "current" and context.unit.thermal_correction is None:
+        raise BadParameter("correction", "current", f"unit {context.unit.serial} has no thermal correction to judge")
+
+
+def _warnings(params: Params, context: Context) -> tuple[str, ...]:
+    found: list[str] = []
+    if params.power_off_s < LEAST_OFF_S:
+        found.append(
+            f"power_off_s = {params.power_off_s:g}: the unit may not be at rest; the thesis leaves it off for 3 h"
+        )
+    if context.unit.converter is None:
+        found.append("no model of the unit's signal converter is known: stage one will be left out")
+    if context.unit.calibration("accelerometer") is None:
+        found.append("the unit has no calibration: the forces will be those of an ideal, level seat")
+    if params.form is not Form.BOTH:
+        found.append(f"form {params.form.value!r} is an older model: it leaves what only both sensors together explain")
+    return tuple(found)
+
+
+PROCEDURE = Procedure(
+    *("thermal_cycle", "Thermal cycle", "1.0.0"),
+    *(Params, Result, resolve, schedule, predict, acquire, analyse, report),
+    uses_calibration=True,
+    corrections=corrections,
+    uses_corrections=uses_corrections,
+)

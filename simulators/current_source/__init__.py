@@ -1,0 +1,1 @@
+"""The precision current source of the converter's bench."""

@@ -1,0 +1,54 @@
+"""A precision current source: implements `procedures.bench.current_source.CurrentSource`."""
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from procedures.bench.current_source import CurrentSourceLimits
+from procedures.bench.errors import OutOfRange
+from simulators.truth import Array, CurrentSourceTruth, KeyedBlocks
+
+BLOCK_TICKS = 1000
+"""Random numbers are drawn for so many ticks at a time."""
+
+
+class SimCurrentSource:
+    """Gives ``I·(1 + gain error) + zero error + noise``, the noise anew each tick."""
+
+    def __init__(self, truth: CurrentSourceTruth, limits: CurrentSourceLimits, seed: int) -> None:
+        self.truth = truth
+        self._limits = limits
+        self._draws = KeyedBlocks(seed, "current source")
+        self._set_ma = 0.0
+
+    @property
+    def limits(self) -> CurrentSourceLimits:
+        return self._limits
+
+    async def set_current(self, current_ma: float) -> None:
+        """Give this current from now on; see the port."""
+        most = self._limits.maximum_ma
+        if not (isfinite(current_ma) and abs(current_ma) <= most):
+            raise OutOfRange(f"current_ma = {current_ma!r} is outside {-most:g} … {most:g}")
+        self._set_ma = current_ma
+
+    async def make_safe(self) -> None:
+        """No current."""
+        self._set_ma = 0.0
+
+    def currents_ma(self, first_tick: int, ticks: int) -> Array:
+        """What it truly gives during ticks of bench time, (ticks,); the same whatever the pieces."""
+        given = self._set_ma * (1.0 + 1e-6 * self.truth.gain_error_ppm) + self.truth.zero_error_ma
+        blocks = range(first_tick // BLOCK_TICKS, (first_tick + ticks - 1) // BLOCK_TICKS + 1)
+        noise = np.concatenate([self._draws.at(block).standard_normal(BLOCK_TICKS) for block in blocks])
+        skip = first_tick % BLOCK_TICKS
+        return given + self.truth.noise_ma * noise[skip : skip + ticks]
+
+    def checkpoint(self) -> dict[str, Any]:
+        """State to resume from."""
+        return {"set_ma": self._set_ma}
+
+    def resume(self, state: dict[str, Any]) -> None:
+        """Go on from a checkpoint."""
+        self._set_ma = float(state["set_ma"])

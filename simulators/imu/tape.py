@@ -1,0 +1,73 @@
+"""Counts between the sensors that make them and the recordings that want them."""
+
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from procedures.bench.errors import DeviceFault, NotPowered
+from simulators.clock import SimClock
+from simulators.imu.counter import Counts
+
+BLOCK_S = 10.0
+
+
+@dataclass
+class Tape:
+    """Counts that a recording wants and has not handed on yet: of its first channels, as many as it has."""
+
+    columns: int
+    blocks: list[Counts] = field(default_factory=list)
+    held: int = 0
+    broken: bool = False
+
+    def put(self, counts: Counts) -> None:
+        """The next counts, (ticks, channels)."""
+        self.blocks.append(counts if counts.shape[1] == self.columns else np.array(counts[:, : self.columns]))
+        self.held += len(counts)
+
+    def take(self, count: int) -> Counts:
+        """The oldest counts, at most so many ticks."""
+        whole = np.concatenate(self.blocks) if len(self.blocks) != 1 else self.blocks[0]
+        self.blocks = [whole[count:]] if len(whole) > count else []
+        self.held = len(whole) - count
+        return whole[:count]
+
+
+class Tapes:
+    """The recordings of one data link that are being made."""
+
+    def __init__(self, clock: SimClock, launch: Callable[[], int]) -> None:
+        """`launch` says which power-up this is, 0 while the unit is off."""
+        self._clock, self._launch = clock, launch
+        self.running: list[Tape] = []
+
+    def stop(self) -> None:
+        """The unit lost its power: what runs is broken."""
+        for tape in self.running:
+            tape.broken = True
+
+    def need_power(self, tape: Tape | None = None) -> None:
+        """Raises `NotPowered`, also for a recording through which the unit was switched off."""
+        if self._launch() == 0 or (tape is not None and tape.broken):
+            raise NotPowered("the unit is switched off")
+
+    async def blocks(self, samples: int, start: int, columns: int) -> AsyncIterator[Counts]:
+        """Blocks of a recording that began at tick `start`; time passes while they are read."""
+        if self._clock.ticks != start:
+            raise DeviceFault("samples were lost: time passed between the recording's beginning and its first reading")
+        tape = Tape(columns)
+        self.running.append(tape)
+        try:
+            while samples > 0:
+                block = min(samples, max(1, int(BLOCK_S * self._clock.rate_hz)))
+                if tape.held < block:
+                    self.need_power(tape)
+                    await self._clock.pass_ticks(block - tape.held)
+                if tape.held < block:
+                    self.need_power(tape)
+                    raise DeviceFault("the unit stopped sending")
+                samples -= block
+                yield tape.take(block)
+        finally:
+            self.running.remove(tape)

@@ -1,0 +1,79 @@
+"""Correction sets through REST and on the unit's page, on both databases."""
+
+import pytest
+
+from bench_service.persistence import open_stores
+from tests.correction_samples import converter, thermal
+from tests.service.client import Client
+from tests.service.page import page
+
+UNIT = "/api/v1/units/SIM-0001"
+
+
+@pytest.fixture(scope="module")
+def made(client: Client, database_url: str) -> list[dict]:
+    """Four correction sets of the unit, newest first, written beside the service by another process's means."""
+    job = client.wait(client.submit("no_operation")["id"])
+    stores, database = open_stores(database_url)
+    result = stores.results.get(job["result"])
+    try:
+        for seed in (1, 2):
+            copy = type(result)(**{**vars(result), "id": f"{result.id}-{seed}", "job_id": None})
+            stores.results.add(copy, corrections=[thermal(seed), converter(seed)])
+    finally:
+        database.dispose()
+    return client.http.get(f"{UNIT}/corrections").json()["items"]
+
+
+def test_the_history_is_paged_and_of_one_kind_where_asked(client: Client, made: list[dict]) -> None:
+    assert [(c["kind"], c["current"]) for c in made] == [
+        ("converter", True),
+        ("thermal", True),
+        ("converter", False),
+        ("thermal", False),
+    ]
+    first = client.http.get(f"{UNIT}/corrections", params={"kind": "thermal", "limit": 1}).json()
+    rest = client.http.get(f"{UNIT}/corrections", params={"kind": "thermal", "after": first["next"]}).json()
+    assert [*first["items"], *rest["items"]] == [made[1], made[3]]
+    assert first["items"][0]["converter"] is None
+    value = thermal(2).thermal
+    assert value is not None
+    assert first["items"][0]["thermal"]["axes"][0]["alpha"] == list(value.axes[0].alpha)
+    unit = client.http.get(UNIT).json()
+    assert (unit["thermal_correction"], unit["converter"]) == (made[1]["id"], made[0]["id"])
+
+
+def test_another_one_is_chosen_and_new_jobs_know_it(client: Client, made: list[dict]) -> None:
+    old, new = made[3], made[1]
+    key = {"Idempotency-Key": "choose the old one"}
+    chosen = client.http.post(f"{UNIT}/corrections/{old['id']}/current", headers=key)
+    assert (chosen.status_code, chosen.json()["current"]) == (200, True)
+    assert client.http.get(UNIT).json()["thermal_correction"] == old["id"]
+    assert not client.http.get(f"{UNIT}/corrections/{new['id']}").json()["current"]
+    assert client.http.post(f"{UNIT}/corrections/{new['id']}/current").json()["current"]
+    again = client.http.post(f"{UNIT}/corrections/{old['id']}/current", headers=key)
+    assert (again.status_code, again.json()["current"]) == (200, False), "what was chosen since stands"
+    other = client.http.post(f"{UNIT}/corrections/{new['id']}/current", headers=key)
+    assert other.status_code == 409
+    assert client.http.get(UNIT).json()["thermal_correction"] == new["id"]
+
+
+def test_what_does_not_exist_is_a_problem_that_says_so(client: Client, made: list[dict]) -> None:
+    for path in ("/api/v1/units/NOBODY/corrections", f"{UNIT}/corrections/none"):
+        answer = client.http.get(path)
+        assert (answer.status_code, answer.headers["content-type"]) == (404, "application/problem+json")
+    elsewhere = client.http.post(f"/api/v1/units/RANDOM-1/corrections/{made[0]['id']}/current")
+    assert elsewhere.status_code == 404
+    assert "RANDOM-1" in elsewhere.json()["detail"]
+    wrong = client.http.get(f"{UNIT}/corrections", params={"kind": "magnetic"})
+    assert wrong.status_code == 422
+    assert wrong.json()["errors"][0]["field"] == "kind"
+
+
+def test_the_units_page_shows_them(client: Client, made: list[dict]) -> None:
+    unit = page(client, "/units/SIM-0001")
+    for correction in made:
+        assert correction["id"] in unit.words
+        assert ("href", f"/results/{correction['result']}") in unit.attributes
+    assert unit.words.count("Make it current") == 2
+    assert "beta_4" in unit.words
