@@ -111,12 +111,12 @@ class RegisteredDevices:
     def make_safe(self, by: str) -> DeviceState:
         """Stop, lead to ambient, switch off. The simulated table of a dead process stops at once: where, is unknown."""
         state = self._register.read()
-        if state is None or state.safe:
-            return state or DeviceState()
+        if state is not None and state.safe:
+            return state
         link = self._register.open(by)
         try:
             link.note("turntable.make_safe", {}, table=AT_REST, angles_deg=None)
-            link.note("chamber.make_safe", {}, chamber_target_c=state.chamber_ambient_c)
+            link.note("chamber.make_safe", {}, chamber_target_c=link.state.chamber_ambient_c)
             link.note("supply.make_safe", {}, powered=False, fault="")
             return link.state
         finally:

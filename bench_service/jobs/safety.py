@@ -89,7 +89,12 @@ class SafetyDesk:
         Where that fails the bench is stopped: the service answers, but nothing moves until a person has looked.
         """
         state = self._devices(bench_id).device_state()
-        if state is None or state.safe:
+        if state is None:  # the first start on this host: from now on the devices are known here
+            failure = self._try(bench_id)
+            if failure is not None:
+                log.warning("bench %s: %s", bench_id, failure)
+            return
+        if state.safe:
             return
         deadline = monotonic_s() + START_S
         failure = self._try(bench_id)

@@ -73,13 +73,16 @@ def _noise_rows(unit: Unit) -> list[list[str]]:
 
 def _explanation(job: Job) -> str:
     """What a job's state means to the person in front of the bench."""
-    nothing = "The bench is safe: the table stands still, the unit is switched off."
+    nothing = "The bench was made safe first: the table at rest, the unit off."
     if job.state is JobState.PAUSED:
         return (
             f"Put aside. {nothing} Other jobs may use it; resumed, this one goes on with station {job.stations_done}."
         )
     if job.state is JobState.INTERRUPTED:
-        return f"The service could not go on with it. Its recordings are kept; resumed, it goes on. {nothing}"
+        return (
+            "The service could not go on with it. Its recordings are kept; resumed, it goes on. Whether the bench is "
+            "safe now, the bench's own page says."
+        )
     if job.state is JobState.RUNNING and job.cancel_requested:
         return "It is being cancelled: the bench is not free before it is safe."
     if job.state is JobState.RUNNING and job.pause_requested:
@@ -99,6 +102,7 @@ def home(request: Request) -> HTMLResponse:
             {
                 "bench": service.benches.description(bench_id),
                 "running": service.running_job(bench_id),
+                "safety": service.safety.known(bench_id),
                 "stop": service.stores.units.bench_stop(bench_id),
                 "driven": service.benches.driven(bench_id),
                 "queued": queued.get(bench_id, 0),

@@ -1,0 +1,236 @@
+"""The supervisor's judgement, look by look: with a database that does not answer, devices that do not obey, clocks that
+jump. Real files and real processes; `tests/end_to_end/test_supervisor.py` has it whole.
+"""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+
+from bench_service import wall_clock
+from bench_service.drivers.device_register import DeviceRegister
+from bench_service.drivers.registered import RegisteredDevices
+from bench_service.jobs.devices import DeviceState
+from bench_service.jobs.errors import BenchBusy, StorageFailure
+from bench_service.jobs.processes import Driving, ProcessIdentity
+from bench_service.jobs.supervisor import Supervisor
+from bench_service.wall_clock import monotonic_s, pause
+from procedures.bench.errors import DeviceFault
+from tests.service.test_safety import abandoned
+
+GONE = Driving(ProcessIdentity("nowhere", 1, "never"))
+
+
+class Books:
+    """A database that can be switched off."""
+
+    def __init__(self) -> None:
+        self.answers = True
+        self.is_stopped = False
+        self.said: list[str] = []
+        self.confirmed = ""
+
+    def _ask(self) -> None:
+        if not self.answers:
+            raise StorageFailure("the database failed: it is restarted")
+
+    def stopped(self) -> bool:
+        self._ask()
+        return self.is_stopped
+
+    def confirm_safe(self, by: str) -> None:
+        self._ask()
+        self.confirmed = by
+
+    def stop(self, reason: str) -> None:
+        self._ask()
+        self.is_stopped = True
+        self.said.append(f"stopped: {reason}")
+
+    def note(self, by: str, text: str, job: str | None) -> None:
+        self._ask()
+        self.said.append(f"{job}: {text}")
+
+
+class Watch:
+    """What the files of the host would say."""
+
+    def __init__(self, driving: Driving | None) -> None:
+        self.now = driving
+
+    def driving(self) -> Driving | None:
+        return self.now
+
+    def supervisor(self) -> ProcessIdentity | None:
+        return None
+
+
+class Lease:
+    def __init__(self) -> None:
+        self.taken = self.given_back = 0
+
+    def take(self) -> "Lease":
+        self.taken += 1
+        return self
+
+    def release(self) -> None:
+        self.given_back += 1
+
+
+@pytest.fixture
+def worker() -> Iterator[subprocess.Popen[bytes]]:
+    """A process that does nothing, until it is killed."""
+    with subprocess.Popen([sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE) as made:
+        yield made
+        made.kill()
+
+
+def identity(worker: subprocess.Popen[bytes]) -> ProcessIdentity:
+    return ProcessIdentity(ProcessIdentity.own().host, worker.pid, started(worker.pid))
+
+
+def started(pid: int) -> str:
+    from bench_service.jobs import processes
+
+    return processes._started(pid)
+
+
+def state(folder: Path) -> DeviceState:
+    found = DeviceRegister(folder, "sim").read()
+    assert found is not None
+    return found
+
+
+def test_the_lease_is_taken_the_bench_made_safe_the_lease_given_back_and_all_of_it_noted(tmp_path: Path) -> None:
+    devices, books, lease = RegisteredDevices(abandoned(tmp_path, "job-1")), Books(), Lease()
+    supervisor = Supervisor("sim", devices, Watch(GONE), books, lease.take)
+    assert supervisor.look(companion=True)
+    assert state(tmp_path).safe
+    assert (lease.taken, lease.given_back) == (1, 1)
+    assert supervisor.look(companion=True)
+    assert len(books.said) == 1
+    assert books.said[0].startswith("job-1: process 1 on nowhere is gone, and the table moves and the unit is on: made")
+
+
+@pytest.mark.parametrize("lease", ["never answers", "is held by a dead connection", "fails"])
+def test_a_database_that_does_not_answer_keeps_no_bench_from_being_safe(tmp_path: Path, lease: str) -> None:
+    """The devices' own link is exclusive on the host: after a moment it must do. What was done is noted later."""
+    devices, books = RegisteredDevices(abandoned(tmp_path, "job-1")), Books()
+    books.answers = False
+
+    def take() -> Lease:
+        if lease == "never answers":
+            pause(30)
+        if lease == "fails":
+            raise StorageFailure("no route")
+        raise BenchBusy("bench 'sim' is driven by 'bench sim process pid 1 on nowhere'")
+
+    supervisor = Supervisor("sim", devices, Watch(GONE), books, take)
+    begun = monotonic_s()
+    supervisor.look()
+    assert state(tmp_path).safe
+    assert monotonic_s() - begun < 2.0
+    supervisor.look()
+    assert books.said == []
+    books.answers = True
+    supervisor.look()
+    assert len(books.said) == 1
+
+
+def test_a_worker_that_lives_is_left_alone(tmp_path: Path, worker: subprocess.Popen[bytes]) -> None:
+    devices, lease = RegisteredDevices(abandoned(tmp_path)), Lease()
+    watch = Watch(Driving(identity(worker)))
+    supervisor = Supervisor("sim", devices, watch, Books(), lease.take)
+    assert supervisor.look(companion=True)
+    assert not state(tmp_path).safe
+    assert lease.taken == 0
+    worker.kill()  # and nobody waits for it: a zombie is dead
+    while watch.now is not None and watch.now.alive:
+        pause(0.01)
+    assert supervisor.look(companion=True)
+    assert state(tmp_path).safe
+
+
+def test_only_a_stop_that_is_not_answered_kills_and_only_the_process_that_is_meant(
+    tmp_path: Path, worker: subprocess.Popen[bytes]
+) -> None:
+    devices, books = RegisteredDevices(abandoned(tmp_path)), Books()
+    meant = Driving(identity(worker))
+    supervisor = Supervisor("sim", devices, Watch(meant), books, Lease().take, hung_s=0.3)
+    for _ in range(5):
+        supervisor.look()
+        pause(0.1)
+    assert worker.poll() is None, "killed without a stop"
+    books.is_stopped = True
+    pause(0.5)
+    supervisor.look()
+    assert worker.poll() is None, "killed before it could answer"
+    deadline = monotonic_s() + 10
+    while worker.poll() is None and monotonic_s() < deadline:
+        pause(0.1)
+        supervisor.look()
+    assert worker.poll() == -9
+    while meant.alive:
+        pause(0.01)
+    supervisor.look()
+    assert state(tmp_path).safe
+    supervisor.look()
+    assert "left a stop unanswered for 0.3 s (the table moves, the unit is on): killed" in books.said[0]
+    pause(0.5)
+    supervisor.look()
+    assert "the supervisor" in books.confirmed
+
+
+def test_devices_that_do_not_obey_stop_the_bench_once_and_are_tried_again(tmp_path: Path) -> None:
+    register, books = abandoned(tmp_path), Books()
+
+    class Jammed(RegisteredDevices):
+        tries = 0
+
+        def make_safe(self, by: str) -> DeviceState:
+            Jammed.tries += 1
+            if Jammed.tries < 3:
+                raise ExceptionGroup("not safe", [DeviceFault("the brake does not close")])
+            return super().make_safe(by)
+
+    supervisor = Supervisor("sim", Jammed(register), Watch(GONE), books, Lease().take)
+    deadline = monotonic_s() + 20
+    while not state(tmp_path).safe and monotonic_s() < deadline:
+        assert supervisor.look(companion=True), "left a bench that is not safe"
+        pause(0.05)
+    assert Jammed.tries == 3
+    supervisor.look()
+    assert [line for line in books.said if "stopped" in line] == [
+        "stopped: could not be made safe: the brake does not close"
+    ]
+    assert books.is_stopped, "a person must look, though it obeyed in the end"
+
+
+def test_a_companion_leaves_after_an_orderly_end_at_once_and_after_a_crash_when_it_has_lasted(tmp_path: Path) -> None:
+    register = abandoned(tmp_path)
+    devices = RegisteredDevices(register)
+    devices.make_safe("a test")
+    ended = Watch(Driving(GONE.process, ended=True))
+    assert not Supervisor("sim", devices, ended, Books(), Lease().take).look(companion=True)
+    crashed = Supervisor("sim", devices, Watch(GONE), Books(), Lease().take, linger_s=0.3)
+    assert crashed.look(companion=True)
+    pause(0.4)
+    assert not crashed.look(companion=True)
+    assert crashed.look(companion=False), "one that was started by itself stays"
+
+
+def test_a_wall_clock_that_jumps_changes_no_judgement(
+    tmp_path: Path, worker: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    devices, books = RegisteredDevices(abandoned(tmp_path)), Books()
+    books.is_stopped = True
+    supervisor = Supervisor("sim", devices, Watch(Driving(identity(worker))), books, Lease().take, hung_s=5.0)
+    real = wall_clock.now
+    for days in (400, -400, 0):
+        monkeypatch.setattr(wall_clock, "now", lambda days=days: real() + timedelta(days=days))
+        supervisor.look()
+        pause(0.1)
+    assert worker.poll() is None, "a jump of the clock was taken for ten seconds without an answer"
