@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Generator
 from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 
 import httpx
@@ -103,7 +104,7 @@ def test_two_apis_and_four_workers_share_a_database(start: Start) -> None:
     for bench in BENCHES:
         mine = sorted((job for job in done if job["bench"] == bench), key=lambda job: job["started_at"])
         assert len(mine) == JOBS // len(BENCHES)
-        assert all(a["finished_at"] <= b["started_at"] for a, b in zip(mine, mine[1:], strict=False)), bench
+        assert all(a["finished_at"] <= b["started_at"] for a, b in pairwise(mine)), bench
         turns = [(job["priority"], job["queued_at"], job["id"]) for job in mine]
         assert turns == sorted(turns), bench
     ran_s = [(moment(job["finished_at"]) - moment(job["started_at"])).total_seconds() for job in done]
