@@ -127,7 +127,7 @@ def pause(job_id: str, service: Service) -> JobView:
 
 @router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409))
 def resume(job_id: str, service: Service) -> JobView:
-    """Queue a paused, interrupted or failed job again, where that helps; it goes on with the stations that remain."""
+    """Queue a paused, interrupted or resumable failed job again; it goes on with the stations that remain."""
     return _view(service, service.resume(job_id))
 
 

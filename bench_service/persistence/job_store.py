@@ -149,7 +149,7 @@ class SqlJobStore:
                 why = "" if job.failure is None else f" ({job.failure.kind}: {job.failure.message})"
                 raise IllegalTransition(f"job {job_id} is {row.state}{why}; it cannot be resumed")
             move_job(session, row, JobState.QUEUED, at)
-            row.not_before = None
+            row.not_before, row.retries_left = None, row.retries
             if row.deadline_at is not None and row.deadline_at < at:  # it would fail again at once
                 append_event(session, job_id, "note", at, {"deadline_lifted": row.deadline_at.isoformat()})
                 row.deadline_at = None

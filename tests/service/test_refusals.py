@@ -382,7 +382,7 @@ def test_a_file_that_is_too_large_is_refused_with_the_setting_that_says_so(tmp_p
         assert client.stored()["recordings"] == []
         assert client.import_files(DESCRIPTION, HEAD + b"1,2\n" * 200).status_code == 201
         job = http.post("/api/v1/jobs", json=JOB)
-        assert_names(job, 503, "does not drive a bench")
+        assert_names(job, 404, "no bench is registered")
 
 
 # Analyses.

@@ -8,7 +8,7 @@ import pytest
 from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
 from bench_service.jobs.directory import BenchDirectory
 from bench_service.jobs.dispatcher import Unfinished
-from bench_service.jobs.errors import NotDriving
+from bench_service.jobs.errors import NotReady
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.request import JobRequest
@@ -109,8 +109,10 @@ def test_without_the_lease_no_station_is_begun(stores: Stores) -> None:
     assert outcome.failure is not None
     assert (outcome.failure.kind, outcome.failure.station) == ("LeaseLost", 0)
     assert runner.running_job() is None
-    runner.end_early(job.id, outcome)
-    assert stores.jobs.get(job.id).state is JobState.FAILED
+    again = runner.end_early(job.id, outcome)  # whoever has the lease goes on with it
+    assert (again.state, again.attempt, again.retries_left) == (JobState.QUEUED, 2, 0)
+    assert again.not_before is not None
+    assert stores.jobs.events(job.id)[-1].data["again_because"]["kind"] == "LeaseLost"
     assert stores.recordings.of_job(job.id) == ()
 
 
@@ -149,6 +151,6 @@ def test_an_engine_that_does_not_start_is_told_to_whoever_needs_it(stores: Store
     )
     service.register()
     service.begin()
-    with pytest.raises(NotDriving, match="did not start: no books"):
+    with pytest.raises(NotReady, match="did not start: no books"):
         service.ready()
     service.stop()
