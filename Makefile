@@ -3,6 +3,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
 VALIDATIONS := calibration allan noise conditioning whole_turns alignment without_bench thermal
+BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle campaign listeners)
 
 .DEFAULT_GOAL := help
 .PHONY: help run test bench check validate lock clean
@@ -31,7 +32,7 @@ validate: $(VENV)/.ready  ## Monte Carlo against theory over 1000 simulated unit
 	@held=0; for part in $(VALIDATIONS); do echo "== $$part"; $(BIN)/python -m tests.validation.$$part || held=1; done; exit $$held
 
 bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
-	@kept=0; for part in tests.benchmarks tests.benchmarks.allan tests.benchmarks.static tests.benchmarks.thermal; do $(BIN)/python -m $$part || kept=1; done; exit $$kept
+	@kept=0; for part in $(BENCHMARKS); do $(BIN)/python -m $$part || kept=1; done; exit $$kept
 
 lock: $(VENV)/.ready  ## compile requirements.lock anew
 	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev pyproject.toml -o requirements.lock

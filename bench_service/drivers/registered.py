@@ -12,6 +12,8 @@ from procedures.bench.errors import OutOfRange
 
 READS = frozenset({"turntable.read_angles", "turntable.is_moving", "supply.is_on", "chamber.read"})
 """Verbs that change nothing: not noted."""
+REMEMBERED = ("table", "powered", "chamber_target_c", "current_ma")
+"""What a demand changes as soon as it is made, and a refused one did not."""
 
 
 class RegisterObserver:
@@ -37,6 +39,8 @@ class RegisterObserver:
             changes = {"powered": True}
         elif verb == "chamber.command":
             changes = {"chamber_target_c": arguments["temperature_c"]}
+        elif verb == "current_source.set_current":
+            changes = {"current_ma": arguments["current_ma"]}
         self._link.note(verb, dict(arguments), **changes)
         if self._faults is not None:
             self._faults.strike(verb, arguments)
@@ -53,7 +57,7 @@ class RegisterObserver:
         if action == "make_safe":
             changes = {"fault": f"{device}: {failure}"}
         elif isinstance(failure, OutOfRange):
-            changes = {name: getattr(self._before, name) for name in ("table", "powered", "chamber_target_c")}
+            changes = {name: getattr(self._before, name) for name in REMEMBERED}
         self._note_quietly(f"{verb}.failed", {"error": f"{type(failure).__name__}: {failure}"}, changes)
 
     def asked(self, device: str) -> None:
@@ -73,6 +77,8 @@ class RegisterObserver:
             changes = {"powered": False}
         elif device == "chamber" and action == "make_safe":
             changes = {"chamber_target_c": self._link.state.chamber_ambient_c}
+        elif device == "current_source" and action == "make_safe":
+            changes = {"current_ma": 0.0}
         if action == "make_safe":
             self._not_safe.discard(device)
             if not self._not_safe:
@@ -89,7 +95,8 @@ class RegisteredBench(ObservedBench):
     """A bench with the devices' link: as long as it is open, nobody else commands them."""
 
     def __init__(self, bench: Bench, link: DeviceLink, faults: DeviceFaults | None = None) -> None:
-        devices = {"turntable", "supply"} | ({"chamber"} if bench.chamber is not None else set())
+        devices = {"turntable", "supply"}
+        devices |= {name for name in ("chamber", "current_source") if getattr(bench, name) is not None}
         super().__init__(bench, RegisterObserver(link, faults, frozenset(devices)))
         self._link = link
 
@@ -117,6 +124,7 @@ class RegisteredDevices:
         try:
             link.note("turntable.make_safe", {}, table=AT_REST, angles_deg=None)
             link.note("chamber.make_safe", {}, chamber_target_c=link.state.chamber_ambient_c)
+            link.note("current_source.make_safe", {}, current_ma=0.0)
             link.note("supply.make_safe", {}, powered=False, fault="")
             return link.state
         finally:

@@ -25,6 +25,8 @@ class DeviceState:
     """Where the chamber goes; None: there is none, or it was never commanded."""
     chamber_ambient_c: float | None = None
     """Where it goes when the bench is made safe."""
+    current_ma: float = 0.0
+    """What the precision current source was asked for."""
     fault: str = ""
     """Why the devices could not be made safe the last time that it was tried."""
     at: datetime | None = None
@@ -48,13 +50,15 @@ class DeviceState:
             found.append("the unit is on")
         if self.chamber_target_c not in (None, self.chamber_ambient_c):
             found.append(f"the chamber is led to {self.chamber_target_c:g} °C")
+        if self.current_ma != 0.0:
+            found.append(f"the current source gives {self.current_ma:g} mA")
         if self.fault:
             found.append(self.fault)
         return tuple(found)
 
     @property
     def safe(self) -> bool:
-        """Table at rest, unit off, chamber led to ambient, and no fault in the way."""
+        """Table at rest, unit off, chamber led to ambient, no current, and no fault in the way."""
         return not self.unsafe
 
 
@@ -66,7 +70,7 @@ class BenchDevices(Protocol):
         ...
 
     def make_safe(self, by: str) -> DeviceState:
-        """Stop the table, lead the chamber to ambient, switch the unit off; on a safe bench nothing is asked.
+        """Stop the table, lead the chamber to ambient, no current, the unit off; on a safe bench nothing is asked.
 
         Raises `DeviceBusy` where another process has the devices' link, `BenchError`, or an `ExceptionGroup` of what
         failed; then the state says it.

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from procedures.bench import Bench, Chamber, Imu, Operator, Supply, Turntable
 from procedures.bench.chamber import ChamberLimits, ChamberReading
+from procedures.bench.current_source import CurrentSource, CurrentSourceLimits
 from procedures.bench.imu import Stream
 from procedures.core.recording import Channel, Station
 from procedures.core.table_angles import TableAngles
@@ -134,6 +135,26 @@ class ObservedChamber(_Seen):
             await self._chamber.make_safe()
 
 
+class ObservedCurrentSource(_Seen):
+    """`CurrentSource`."""
+
+    def __init__(self, source: CurrentSource, observer: Observer) -> None:
+        super().__init__(observer)
+        self._source = source
+
+    @property
+    def limits(self) -> CurrentSourceLimits:
+        return self._source.limits
+
+    async def set_current(self, current_ma: float) -> None:
+        with self._seen("current_source.set_current", current_ma=current_ma):
+            await self._source.set_current(current_ma)
+
+    async def make_safe(self) -> None:
+        with self._seen("current_source.make_safe"):
+            await self._source.make_safe()
+
+
 class ObservedOperator(_Seen):
     """`Operator`."""
 
@@ -195,6 +216,7 @@ class ObservedBench(Bench):
             ObservedSupply(bench.supply, observer),
             None if bench.chamber is None else ObservedChamber(bench.chamber, observer),
             None if bench.operator is None else ObservedOperator(bench.operator, observer),
+            None if bench.current_source is None else ObservedCurrentSource(bench.current_source, observer),
         )
         self.inner = bench
 
