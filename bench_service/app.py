@@ -38,6 +38,7 @@ from bench_service.jobs.dispatcher import Dispatcher, JobEngine
 from bench_service.jobs.event_hub import EventHub
 from bench_service.jobs.live import Heartbeat, LiveBoard
 from bench_service.jobs.planning import Planner
+from bench_service.jobs.prompts import AskedOperator, Asking
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.safety import SafetyDesk
 from bench_service.jobs.service import BenchService
@@ -77,7 +78,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     threadpool_limits(1)  # our matrices have at most 72 rows: BLAS threads would only spin against the bench's own
     stores, database = open_stores(settings.database_url)
     closing.callback(database.dispose)
-    driver = _driver(settings) if drive else None
+    driver = _driver(settings, partial(AskedOperator, stores.prompts)) if drive else None
     holder = partial(lease_holder, database, settings.database_url)
     planner = Planner(stores, BenchDirectory(stores.units, driver, settings.bench_id, drawn_unit, holder))
     code = code_version()
@@ -109,12 +110,13 @@ def _devices(settings: Settings, bench_id: str) -> BenchDevices:
     return RegisteredDevices(DeviceRegister(settings.devices_in(), bench_id))
 
 
-def _driver(settings: Settings) -> SimulatedDriver:
+def _driver(settings: Settings, asking: Asking) -> SimulatedDriver:
     """The bench, with what its devices remember."""
     register = DeviceRegister(settings.devices_in(), settings.bench_id)
     faults = None if settings.device_faults is None else FaultPlan.parse(settings.device_faults)
     truths = settings.unit_truth, settings.bench_truth
-    return SimulatedDriver(settings.bench_id, *truths, settings.real_time_factor, register, faults)
+    asked = asking if settings.ask_operator else None
+    return SimulatedDriver(settings.bench_id, *truths, settings.real_time_factor, register, faults, asked)
 
 
 def _engine(settings: Settings, runner: JobRunner) -> JobEngine:

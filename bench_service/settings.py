@@ -35,6 +35,8 @@ class Settings(BaseModel):
     A folder of the bench's own host, the same for every process of that bench."""
     device_faults: str | None = None
     """For exercises: faults put into a simulated bench's devices (see `bench_service.drivers.device_faults`)."""
+    ask_operator: bool = False
+    """For exercises: whether a person is asked for what the simulated bench's operator else does by himself."""
     poll_s: float = Field(0.1, gt=0, le=10)
     """How often a worker looks for jobs that other processes queued; its own it sees at once."""
     drive: bool = True

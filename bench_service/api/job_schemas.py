@@ -34,6 +34,13 @@ class PlaceView(BaseModel):
     ahead: int = Field(description="Jobs that go before it as things stand, the running one included")
 
 
+class PromptView(BaseModel):
+    """What a person at the bench is asked to do; the job waits for the answer."""
+
+    text: str
+    asked_at: datetime
+
+
 class JobView(BaseModel):
     """A job."""
 
@@ -47,6 +54,7 @@ class JobView(BaseModel):
     progress: Progress
     priority: int
     attempt: int = Field(description="How often it was queued: once, and again at each resume")
+    prompt: PromptView | None = Field(description="What a person at the bench is asked; see `answer`")
     pause_requested: bool = Field(description="It pauses before its next station")
     queue: PlaceView | None = Field(description="Its place while it is queued")
     waiting: str | None = Field(description="Why it does not run now, as a sentence")

@@ -10,12 +10,14 @@ from bench_service.api import event_stream
 from bench_service.api.dependencies import After, Hub, IdempotencyKey, Limit, RequestedBy, Service
 from bench_service.api.errors import made, problems
 from bench_service.api.job_schemas import JobPage, JobView
-from bench_service.api.requests import JobChange, JobSubmission, Reanalysis
+from bench_service.api.requests import JobChange, JobSubmission, PromptAnswer, Reanalysis
 from bench_service.api.schemas import ResultPage, ResultView, Truth
 from bench_service.jobs.event_hub import EventHub
 from bench_service.jobs.job import Job, JobState
+from bench_service.jobs.prompts import Answer
 from bench_service.jobs.request import JobRequest
 from bench_service.jobs.service import BenchService
+from bench_service.wall_clock import now
 
 router = APIRouter(prefix="/api/v1/jobs", tags=["jobs"])
 
@@ -23,6 +25,7 @@ OF_A_JOB = (
     "read_job",
     "change_job",
     "cancel",
+    "answer",
     "pause",
     "resume",
     "events",
@@ -44,6 +47,7 @@ OF_A_JOB = (
             "read_job",
             "change_job",
             "cancel",
+            "answer",
             "pause",
             "resume",
             "events",
@@ -123,6 +127,13 @@ def cancel(job_id: str, service: Service) -> JobView:
 def pause(job_id: str, service: Service) -> JobView:
     """Put a job aside: a queued one at once, a running one before its next station. The bench is then safe and free."""
     return _view(service, service.pause(job_id))
+
+
+@router.post("/{job_id}/answer", status_code=202, responses=problems(404, 409))
+def answer(job_id: str, body: PromptAnswer, service: Service, requested_by: RequestedBy = None) -> JobView:
+    """Say that what the job asks of the person at the bench (`prompt`) is done, or refuse it."""
+    said = Answer(body.done, body.remark, requested_by or "")
+    return _view(service, service.stores.prompts.answer(job_id, said, now()))
 
 
 @router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409))

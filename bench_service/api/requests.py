@@ -37,6 +37,13 @@ class JobSubmission(PreviewRequest):
     deadline_at: AwareDatetime | None = Field(None, description="No station begins later; the job then fails")
 
 
+class PromptAnswer(Request):
+    """What the person at the bench says to what a job asks."""
+
+    done: bool = Field(description="It is done; false: it will not be, and the job ends cancelled")
+    remark: str = Field("", max_length=500, pattern=r"^[^\x00]*$")
+
+
 class AnalysisSubmission(Request):
     """A method and what it is to work on."""
 

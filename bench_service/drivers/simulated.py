@@ -12,6 +12,7 @@ from bench_service.drivers.registered import RegisteredBench, RegisteredDevices
 from bench_service.jobs.devices import DeviceState
 from bench_service.jobs.driver import TrueTriad
 from bench_service.jobs.errors import Misconfigured, NotMounted
+from bench_service.jobs.prompts import Asking
 from bench_service.wall_clock import pause_async
 from procedures.bench import Bench, BenchDescription, BenchNeeds
 from procedures.bench.errors import BenchError
@@ -62,12 +63,15 @@ class SimulatedDriver:
         real_time_factor: float | None = None,
         register: DeviceRegister | None = None,
         faults: FaultPlan | None = None,
+        asking: Asking | None = None,
     ) -> None:
         """Without a truth file a bench of any id is the shipped one under that id: a laboratory may have several.
 
         `register`: where the devices' state outlives this process; without one, nobody else can make them safe.
+        `asking`: a person is asked what else the simulated operator does at once.
         Raises `Misconfigured` for a truth file that cannot be used, `NotMounted` for one of another bench.
         """
+        self._asking = asking
         self._bench = _shipped_as(bench_id) if bench_truth is None else _loaded(bench_truth, load_bench)
         self._unit = default_unit() if unit_truth is None else _loaded(unit_truth, load_unit)
         self._real_time_factor = real_time_factor
@@ -107,7 +111,9 @@ class SimulatedDriver:
             thermal=needs.temperatures,
             currents=needs.currents,
         )
-        bench = build(config, checkpoint)
+        bench: Bench = build(config, checkpoint)
+        if self._asking is not None and job is not None:
+            bench.operator = self._asking(job, bench.operator)
         if self._register is None:
             return bench
         link = self._register.open(job=job)

@@ -16,6 +16,7 @@ from bench_service.jobs.campaigns.store import CampaignStore
 from bench_service.jobs.corrections import CorrectionStore
 from bench_service.jobs.job import Event, Failure, Job, JobState
 from bench_service.jobs.live import LiveStore
+from bench_service.jobs.prompts import PromptStore
 from bench_service.jobs.queue import QueueStore
 from bench_service.jobs.reservation import ReservationStore
 from bench_service.jobs.stored import (
@@ -147,10 +148,7 @@ class JobStore(Protocol):
         ...
 
     def request_cancel(self, job_id: str, at: datetime) -> Job:
-        """Ask a job to end: a queued one is cancelled at once, a running one at its next block.
-
-        Raises `IllegalTransition` for a job that has ended.
-        """
+        """A queued job is cancelled at once, a running one soon. Raises `IllegalTransition` for one that has ended."""
         ...
 
     def cancel_requested(self, job_id: str) -> bool: ...
@@ -296,5 +294,6 @@ class Stores:
     campaigns: CampaignStore
     corrections: CorrectionStore
     live: LiveStore
+    prompts: PromptStore
     audit: AuditTrail
     tallies: TallyStore

@@ -8,6 +8,7 @@ from bench_service.persistence.database import Database, connect
 from bench_service.persistence.job_store import SqlJobStore
 from bench_service.persistence.live_store import SqlLiveStore
 from bench_service.persistence.migration import upgrade_to_head
+from bench_service.persistence.prompt_store import SqlPromptStore
 from bench_service.persistence.queue_store import SqlQueueStore
 from bench_service.persistence.recording_store import SqlRecordingStore
 from bench_service.persistence.reservation_store import SqlReservationStore
@@ -39,6 +40,7 @@ def stores_of(database: Database) -> Stores:
         campaigns=SqlCampaignStore(database),
         corrections=SqlCorrectionStore(database),
         live=SqlLiveStore(database),
+        prompts=SqlPromptStore(database),
         audit=SqlAuditTrail(database),
         tallies=SqlTallyStore(database),
     )

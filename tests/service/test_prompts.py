@@ -1,0 +1,71 @@
+"""A person at the bench is asked over REST, and the job goes on when the work is done, or ends when it is refused."""
+
+import json
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+
+from bench_service.cli.client import connect
+from bench_service.settings import Settings
+from bench_service.wall_clock import monotonic_s, pause
+from tests.service.client import Client
+
+LEGS = [{"target_c": target, "ramp_c_min": 5.0, "least_s": 600.0} for target in (30.0, 25.0, 20.0)]
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Generator[Client]:
+    url = f"sqlite:///{Path(tmp_path_factory.mktemp('asked')) / 'bench.sqlite'}"
+    with connect(Settings(database_url=url, ask_operator=True), None, drive=True) as http:
+        yield Client(http)
+
+
+def asked(client: Client, job_id: str) -> dict:
+    deadline = monotonic_s() + 60.0
+    while (job := client.job(job_id))["prompt"] is None:
+        assert job["state"] in ("queued", "running")
+        assert monotonic_s() < deadline
+        pause(0.02)
+    return job
+
+
+def answer(client: Client, job_id: str, **body: object) -> int:
+    headers = {"X-Requested-By": "Olena"}
+    return client.http.post(f"/api/v1/jobs/{job_id}/answer", json=body, headers=headers).status_code
+
+
+def test_a_job_waits_for_the_person_and_a_refusal_ends_it_with_the_bench_safe(client: Client) -> None:
+    job = client.submit("thermal_cycle", parameters={"legs": LEGS, "power_off_s": 60.0}, seed=3)
+    first = asked(client, job["id"])
+    assert first["state"] == "running"
+    assert first["prompt"]["text"]
+    assert "a person at the bench is asked" in first["waiting"]
+    assert first["prompt"]["text"] in client.http.get(f"/jobs/{job['id']}").text.replace("&#39;", "'")
+    assert answer(client, job["id"], done="perhaps", remark=[]) == 422
+    assert answer(client, job["id"], done=True, remark="x axis up") == 202
+
+    while (again := asked(client, job["id"]))["progress"]["station"] == 0:  # the next run asks anew
+        pause(0.05)
+    assert again["progress"]["station"] == 1
+    assert answer(client, job["id"], done=False, remark="no time") == 202
+    ended = client.wait(job["id"])
+    assert ended["state"] == "cancelled"
+    assert ended["prompt"] is None
+    assert len(client.recordings(job["id"])) == 1
+    assert client.http.get("/api/v1/benches/sim").json()["safety"]["safe"] is True
+    assert answer(client, job["id"], done=True) == 409
+    lines = client.http.get(f"/api/v1/jobs/{job['id']}/events").text.splitlines()
+    found = [json.loads(line.removeprefix("data: ")) for line in lines if line.startswith("data: ")]
+    events = [(e["kind"], e["data"]) for e in found if "kind" in e]
+    assert ("answer", {"done": True, "remark": "x axis up", "by": "Olena"}) in events
+    assert ("answer", {"done": False, "remark": "no time", "by": "Olena"}) in events
+    assert sum(kind == "prompt" for kind, _ in events) == 2
+
+
+def test_a_cancel_ends_the_waiting(client: Client) -> None:
+    job = client.submit("thermal_cycle", parameters={"legs": LEGS, "power_off_s": 60.0}, seed=4)
+    asked(client, job["id"])
+    client.http.post(f"/api/v1/jobs/{job['id']}/cancel")
+    ended = client.wait(job["id"])
+    assert (ended["state"], ended["prompt"]) == ("cancelled", None)
