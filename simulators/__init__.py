@@ -9,14 +9,30 @@ Simulated
   run-to-run changes, start-up transient, self-heating, residue of the mechanical dither, angle random walk, bias
   instability, rate random walk, ramp, and a dithered integer counter whose phase is carried from the moment of
   power-up.
+* A thermal chamber (plant, controller, limiter, door, named faults) and the heat of the unit in it, which its power
+  brings too: accelerometer bias and scale, the signal converter, a gyro's perimeter control at fault, and the unit's
+  own temperature sensors with lag, offset, noise, steps and faults. Temperatures go in whole seconds: what a second's
+  end made of outputs and sensors holds until the next one's.
+* An operator who sets the unit by hand when asked, in minutes, in a seat that leans a little, anew each time.
 * A supply, and a clock: time passes only in ``clock.sleep`` and while a recording is read.
+
+Stated choices
+--------------
+* A job that reads no temperatures finds a unit that the laboratory has let warm through: it stands at its reference
+  temperature, the bench is opened without a chamber, and its truth (`launch_truth`) is that of the triads alone. Only a
+  job whose stations read temperatures opens the chamber; then the same triads drift with the temperatures of their
+  parts. A self-heating that a triad's truth may have besides is a function of time since power-up and comes on top.
+* `make_safe` sends the chamber to ambient and returns at once; the air would go there as bench time passes. After it
+  no bench time passes: the job is over, and the next one opens a world at its beginning, with everything at ambient.
+* The unit in the chamber's seat hangs on the table's kinematics: a setting by hand puts the axes at their angles, and
+  its lean stays through later moves of the table, until the next setting.
 
 Not simulated
 -------------
-Temperature on the bench (the physics of a chamber and of the unit in it are in `chamber`, not wired to the world yet),
-vibration, cogging, encoder steps, structural modes, supply noise, cross-axis acceleration terms, lever arms (the
-accelerometers stand where the three axes meet), latency and loss of data. Inertias are invented. The table is an ideal
-servo: how it settles says nothing of a real one.
+Temperature's part in run-to-run changes, cross terms and noise, gradients inside a lump of heat, humidity, vibration
+(the chamber's fan included), cogging, encoder steps, structural modes, supply noise, cross-axis acceleration terms,
+lever arms (the accelerometers stand where the three axes meet), latency and loss of data. Inertias are invented. The
+table is an ideal servo: how it settles says nothing of a real one.
 
 How truthful
 ------------
@@ -26,6 +42,6 @@ geometry: both know only the conventions written in `procedures`, and a third wi
 in the tests. Every random number is keyed by (seed, launch, channel, process, block), so the same seed gives the same
 bytes in whatever pieces they are read, and after a resume from a checkpoint.
 
-Layers: ``world`` > ``turntable`` | ``imu`` | ``supply`` | ``chamber`` > ``clock`` | ``truth``. The door is
-`simulators.world.build`.
+Layers: ``world`` > ``turntable`` | ``imu`` | ``supply`` | ``chamber`` | ``operator`` > ``clock`` | ``truth``. The door
+is `simulators.world.build`.
 """

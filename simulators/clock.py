@@ -43,12 +43,22 @@ def _let_others_run() -> Generator[None, None, None]:
 class SimClock:
     """Implements `procedures.bench.clock.Clock`. `connect` tells it what to move."""
 
-    def __init__(self, rate_hz: float, real_time_factor: float | None = None, wait: Wait | None = None) -> None:
-        """`real_time_factor`: bench seconds per real second, None: as fast as it can; `wait` waits real seconds."""
+    def __init__(
+        self,
+        rate_hz: float,
+        real_time_factor: float | None = None,
+        wait: Wait | None = None,
+        slice_s: float | None = None,
+    ) -> None:
+        """`real_time_factor`: bench seconds per real second, None: as fast as it can; `wait` waits real seconds.
+
+        `slice_s`: instead of `SLICE_S`.
+        """
         if real_time_factor is not None and (not 0.0 < real_time_factor < float("inf") or wait is None):
             raise ValueError(f"real_time_factor = {real_time_factor!r} must be above zero and comes with a `wait`")
         self.rate_hz = rate_hz
         self.ticks = 0
+        self._slice_s = slice_s
         self._factor = real_time_factor
         self._wait = wait
         self._advance: Callable[[int], None] = lambda _ticks: None
@@ -73,7 +83,9 @@ class SimClock:
 
     async def pass_ticks(self, ticks: int) -> None:
         """Let the world go on for whole ticks; between slices a cancellation can land."""
-        longest = SLICE_S if self._factor is None else min(SLICE_S, REAL_TIME_SLICE_S * self._factor)
+        longest = SLICE_S if self._slice_s is None else self._slice_s
+        if self._factor is not None:
+            longest = min(longest, REAL_TIME_SLICE_S * self._factor)
         longest_ticks = max(1, int(longest * self.rate_hz))
         await _let_others_run()
         while ticks > 0:

@@ -5,6 +5,7 @@ Knows how clock, table, supply, unit, chamber and operator are wired; knows none
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,8 @@ from simulators.turntable.kinematics import at_rest, attitude
 from simulators.turntable.profile import move_ticks
 
 CHECKPOINT_VERSION = 3
+WARM_SLICE_S = 60.0
+"""Slices and blocks of a world with a chamber: a thermal run is half a day, at few samples a second."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,8 @@ def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> S
 
     Raises `DeviceFault` where a chamber is wanted and the bench has none.
     """
-    clock = SimClock(config.rate_hz, config.real_time_factor, config.wait)
+    slice_s = WARM_SLICE_S if config.thermal and config.real_time_factor is None else None
+    clock = SimClock(config.rate_hz, config.real_time_factor, config.wait, slice_s)
     table = SimTurntable(config.bench, config.seed, clock)
     supply = SimSupply()
     chamber = _chamber(config, clock) if config.thermal else None
@@ -102,7 +106,7 @@ def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> S
     door = (lambda _is_open: None) if chamber is None else chamber.set_door
     operator = SimOperator(config.bench.operator, config.seed, clock, supply.is_on, door, table.place)
     if source is None:
-        imu = _unit(config, clock, table, supply, chamber)
+        imu = _unit(config, clock, table, supply, chamber, slice_s)
     else:
         imu = converter_alone(config.unit, clock, supply, chamber, source)
     bench = SimulatedBench(
@@ -131,10 +135,15 @@ def _chamber(config: WorldConfig, clock: SimClock) -> SimChamber:
 
 
 def _unit(
-    config: WorldConfig, clock: SimClock, table: SimTurntable, supply: SimSupply, chamber: SimChamber | None
+    config: WorldConfig,
+    clock: SimClock,
+    table: SimTurntable,
+    supply: SimSupply,
+    chamber: SimChamber | None,
+    slice_s: float | None,
 ) -> SimImu:
     """A whole unit on the table."""
-    imu = SimImu(config.unit, config.seed, clock, supply.launch, config.thermal)
+    imu = SimImu(config.unit, config.seed, clock, supply.launch, config.thermal, slice_s)
     if chamber is None:
         supply.connect(imu.power_up, imu.power_down)
         clock.connect(lambda ticks: imu.feel(table.advance(ticks)))
@@ -166,7 +175,8 @@ def _connect_warm(clock: SimClock, table: SimTurntable, supply: SimSupply, imu: 
 def climate_of(chamber: SimChamber, warmth: Warmth, ticks: int) -> Climate:
     """What the temperatures of some ticks do to the unit: the last second's until the next one ends."""
     felt = chamber.response(np.concatenate([warmth.before_c[None], warmth.temperatures_c]))
-    lengths = np.diff([0, *warmth.end_ticks, ticks])
+    edges = (0, *warmth.end_ticks, ticks)
+    lengths = np.array([end - begin for begin, end in pairwise(edges)])
     gyro, gyro_added = None, felt.gyro_added_rad_s.T
     if np.any(gyro_added):
         same, none = np.ones_like(gyro_added), np.zeros_like(gyro_added)

@@ -12,6 +12,7 @@ from bench_service.wall_clock import pause_async
 from procedures.bench import Bench, BenchDescription, BenchNeeds
 from procedures.core.unit import Unit
 from simulators.truth import (
+    BenchTruth,
     UnitTruth,
     declared_unit,
     default_bench,
@@ -39,8 +40,14 @@ def _loaded(path: Path, load: Callable[[Path], T]) -> T:
         raise Misconfigured(f"{path}: {error}") from error
 
 
+def _shipped_as(bench_id: str) -> BenchTruth:
+    """The shipped bench under another id; the unit on each of them is the same."""
+    shipped = default_bench()
+    return replace(shipped, description=replace(shipped.description, id=bench_id))
+
+
 class SimulatedDriver:
-    """A bench whose table, unit and supply live in this process; its data are marked as simulated."""
+    """A bench whose table, unit, supply and chamber live in this process; its data are marked as simulated."""
 
     def __init__(
         self,
@@ -49,8 +56,11 @@ class SimulatedDriver:
         bench_truth: Path | None = None,
         real_time_factor: float | None = None,
     ) -> None:
-        """Raises `Misconfigured` for a truth file that cannot be used, `NotMounted` for one of another bench."""
-        self._bench = default_bench() if bench_truth is None else _loaded(bench_truth, load_bench)
+        """Without a truth file a bench of any id is the shipped one under that id: a laboratory may have several.
+
+        Raises `Misconfigured` for a truth file that cannot be used, `NotMounted` for one of another bench.
+        """
+        self._bench = _shipped_as(bench_id) if bench_truth is None else _loaded(bench_truth, load_bench)
         self._unit = default_unit() if unit_truth is None else _loaded(unit_truth, load_unit)
         self._real_time_factor = real_time_factor
         if bench_id != self._bench.description.id:
@@ -68,7 +78,10 @@ class SimulatedDriver:
         return tuple(declared_unit(unit) for unit in units)
 
     def open(self, unit: str, seed: int | None, checkpoint: dict[str, Any] | None, needs: BenchNeeds) -> Bench:
-        """A world with that unit on the table, at its beginning or at a checkpoint."""
+        """A world with that unit on the table, at its beginning or at a checkpoint; with its chamber where needed.
+
+        Raises `NotMounted`, `DeviceFault` where the job reads temperatures and the bench has no chamber.
+        """
         from simulators.world import build  # with MuJoCo: not needed before a bench is opened
 
         config = self._config(unit, 0 if seed is None else seed)
@@ -78,7 +91,7 @@ class SimulatedDriver:
         return build(wanted, checkpoint)
 
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
-        """Bias and matrix of the job's launch, run-to-run changes included."""
+        """Bias and matrix of the job's launch at the unit's reference temperature, run-to-run changes included."""
         from simulators.world import launch_truth
 
         found = launch_truth(self._config(unit, seed))

@@ -18,7 +18,7 @@ from simulators.chamber.behaviour import Response, response
 from simulators.chamber.plant import STEP_S, ChamberPlant
 from simulators.chamber.thermometers import Codes, Thermometers
 from simulators.truth import Array
-from simulators.truth.thermal import ChamberFault, ChamberTruth, UnitThermalTruth
+from simulators.truth.thermal import NODES, ChamberFault, ChamberTruth, UnitThermalTruth
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class SimChamber:
         first = int(self._ticks / per_second + 1e-9)
         seconds = int((self._ticks + ticks) / per_second + 1e-9) - first
         before, codes_before = np.array(self.plant.state.temperatures_c), self.thermometers.sent
-        path = np.concatenate([before[None][:0], *self._pieces(first, seconds)])
+        path = self.plant.run(seconds) if not self.faults else np.concatenate(self._pieces(first, seconds))
         ends = tuple(round((first + k) * per_second) - self._ticks for k in range(1, seconds + 1))
         self._ticks += ticks
         return Warmth(path, self.thermometers.read(first, path), ends, before, codes_before)
@@ -121,7 +121,7 @@ class SimChamber:
         """Node temperatures of so many seconds, cut where something breaks."""
         cuts = {min(max(int(f.from_s / STEP_S) - first, 0), seconds) for f in self.faults}
         edges = sorted({0, seconds} | cuts)
-        pieces: list[Array] = []
+        pieces = [np.empty((0, len(NODES)))]
         for begin, end in pairwise(edges):
             self._break((first + begin) * STEP_S)
             pieces.append(self.plant.run(end - begin))

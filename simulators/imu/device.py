@@ -19,9 +19,18 @@ class SimImu:
     """A unit that counts from power-up to power-down, whether or not anybody reads it."""
 
     def __init__(
-        self, truth: UnitTruth, seed: int, clock: SimClock, launch: Callable[[], int], thermal: bool = False
+        self,
+        truth: UnitTruth,
+        seed: int,
+        clock: SimClock,
+        launch: Callable[[], int],
+        thermal: bool = False,
+        block_s: float | None = None,
     ) -> None:
-        """`launch` says which power-up this is, 0 while the unit is off; `thermal`: it will be told its climate."""
+        """`launch` says which power-up this is, 0 while the unit is off; `thermal`: it will be told its climate.
+
+        `block_s`: length of a recording's blocks instead of ten seconds.
+        """
         self.truth = truth
         self._thermal = thermal
         self._seed = seed
@@ -30,7 +39,7 @@ class SimImu:
         self._temperatures = temperature_channels(truth)
         self._sensors: dict[str, TriadSensor] = {}
         self._ticks = 0
-        self._tapes = Tapes(clock, launch)
+        self._tapes = Tapes(clock, launch, block_s)
 
     @property
     def channels(self) -> tuple[Channel, ...]:

@@ -37,9 +37,10 @@ class Tape:
 class Tapes:
     """The recordings of one data link that are being made."""
 
-    def __init__(self, clock: SimClock, launch: Callable[[], int]) -> None:
-        """`launch` says which power-up this is, 0 while the unit is off."""
+    def __init__(self, clock: SimClock, launch: Callable[[], int], block_s: float | None = None) -> None:
+        """`launch` says which power-up this is, 0 while the unit is off; `block_s` stands instead of `BLOCK_S`."""
         self._clock, self._launch = clock, launch
+        self._block_s = BLOCK_S if block_s is None else block_s
         self.running: list[Tape] = []
 
     def stop(self) -> None:
@@ -60,7 +61,7 @@ class Tapes:
         self.running.append(tape)
         try:
             while samples > 0:
-                block = min(samples, max(1, int(BLOCK_S * self._clock.rate_hz)))
+                block = min(samples, max(1, int(self._block_s * self._clock.rate_hz)))
                 if tape.held < block:
                     self.need_power(tape)
                     await self._clock.pass_ticks(block - tape.held)

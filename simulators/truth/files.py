@@ -1,8 +1,6 @@
 """Truth files: TOML in the units people read, each key with its unit, each refusal with field, value and range."""
 
-import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from importlib.resources import files
 from json import dumps
 from pathlib import Path
@@ -14,20 +12,28 @@ from procedures.bench.description import AxisLimits, BenchDescription, TableAccu
 from procedures.core import units
 from procedures.core.site import Site
 from simulators.truth.ranges import TruthError, within
-from simulators.truth.values import BenchTruth, SiteTruth, TableTruth, TriadTruth, UnitTruth
-
-Table = Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Key:
-    """One key of a triad's table: the attribute it fills, the size of its unit in SI, its range, its shape."""
-
-    attribute: str
-    size: float
-    low: float
-    high: float
-    shape: str = "vector"
+from simulators.truth.tables import (
+    Key,
+    Table,
+    check_keys,
+    keyed_lines,
+    read_changes,
+    read_document,
+    read_record,
+    read_value,
+    record_lines,
+)
+from simulators.truth.thermal import ChamberFault, ChamberTruth
+from simulators.truth.thermal_files import read_thermal, thermal_lines
+from simulators.truth.values import (
+    BenchTruth,
+    CurrentSourceTruth,
+    OperatorTruth,
+    SiteTruth,
+    TableTruth,
+    TriadTruth,
+    UnitTruth,
+)
 
 
 def _triad_keys(
@@ -77,36 +83,21 @@ KEYS: dict[str, dict[str, Key]] = {
 }
 
 
-def _only(where: str, table: Table, known: set[str], needed: set[str]) -> None:
-    for key in table:
-        if key not in known:
-            raise TruthError(f"{where}.{key} = {table[key]!r} is not known; known are {', '.join(sorted(known))}")
-    for key in sorted(needed - set(table)):
-        raise TruthError(f"{where}.{key} is missing")
-
-
-def _shaped(where: str, value: Any, key: Key) -> Any:
-    """A value of a key in SI, each number inside the key's range."""
-    if key.shape == "flag":
-        if not isinstance(value, bool):
-            raise TruthError(f"{where} = {value!r} must be true or false")
-        return value
-    if key.shape == "number":
-        return within(where, value, key.low, key.high) * key.size
-    length = 2 if key.shape == "pair" else 3
-    if not isinstance(value, list) or len(value) != length:
-        raise TruthError(f"{where} = {value!r} must be a list of {length}")
-    if key.shape == "matrix":
-        row = Key(key.attribute, key.size, key.low, key.high)
-        return tuple(_shaped(f"{where}[{i}]", item, row) for i, item in enumerate(value))
-    return tuple(within(f"{where}[{i}]", item, key.low, key.high) * key.size for i, item in enumerate(value))
+BENCH_TRUTHS = (
+    "site_truth",
+    "table_truth",
+    "chamber_truth",
+    "chamber_faults",
+    "operator_truth",
+    "current_source_truth",
+)
 
 
 def _triad(name: str, table: Table) -> TriadTruth:
     keys = KEYS[name]
     needed = {k for k, v in keys.items() if v.attribute in ("bias", "matrix", "quantization")}
-    _only(name, table, set(keys), needed)
-    values = {keys[k].attribute: _shaped(f"{name}.{k}", v, keys[k]) for k, v in table.items()}
+    check_keys(name, table, set(keys), needed)
+    values = {keys[k].attribute: read_value(f"{name}.{k}", v, keys[k]) for k, v in table.items()}
     try:
         return TriadTruth(**values)
     except TruthError as refusal:
@@ -115,44 +106,33 @@ def _triad(name: str, table: Table) -> TriadTruth:
 
 def parse_unit(text: str) -> UnitTruth:
     """A unit's truth from TOML text. Raises `TruthError`."""
-    document = _document(text)
-    _only("unit", document, {"serial", "sample_rate_hz", *KEYS}, {"serial", *KEYS})
+    document = read_document(text)
+    check_keys("unit", document, {"serial", "sample_rate_hz", "thermal", *KEYS}, {"serial", *KEYS})
     triads = {name: _triad(name, document[name]) for name in KEYS}
     rate = within("unit.sample_rate_hz", document.get("sample_rate_hz", 400.0), 1.0, 4000.0)
-    return UnitTruth(str(document["serial"]), triads["gyro"], triads["accelerometer"], rate)
-
-
-def _record(kind: type[Any], where: str, table: Any, needed: set[str]) -> Any:
-    """A flat record of numbers (and an id or title) from a table of the same names."""
-    if not isinstance(table, dict):
-        raise TruthError(f"{where} = {table!r} must be a table")
-    _only(where, table, {f.name for f in fields(kind)}, needed)
-    numbers = {k: within(f"{where}.{k}", v, -1e6, 1e6) for k, v in table.items()}
-    try:
-        return kind(**numbers)
-    except ValueError as refusal:
-        raise TruthError(str(refusal)) from refusal
+    thermal = read_thermal(document.get("thermal", {}))
+    return UnitTruth(str(document["serial"]), triads["gyro"], triads["accelerometer"], rate, thermal)
 
 
 def _description(table: Table) -> BenchDescription:
     axes = {"outer", "middle", "inner"}
-    _only(
+    check_keys(
         "description",
         table,
         {"id", "title", "site", "accuracy", "chamber", "current_source", *axes},
         {"id", "site", *axes},
     )
     outer, middle, inner = (_axis(f"description.{axis}", table[axis]) for axis in ("outer", "middle", "inner"))
-    site = _record(Site, "description.site", table["site"], {"latitude_deg", "gravity_m_s2"})
-    accuracy = _record(TableAccuracy, "description.accuracy", table.get("accuracy", {}), set())
+    site = read_record(Site, "description.site", table["site"], {"latitude_deg", "gravity_m_s2"})
+    accuracy = read_record(TableAccuracy, "description.accuracy", table.get("accuracy", {}), set())
     title = str(table.get("title", ""))
     chamber = None
     if "chamber" in table:
         needed = {f.name for f in fields(ChamberLimits)}
-        chamber = _record(ChamberLimits, "description.chamber", table["chamber"], needed)
+        chamber = read_record(ChamberLimits, "description.chamber", table["chamber"], needed)
     source = None
     if "current_source" in table:
-        source = _record(CurrentSourceLimits, "description.current_source", table["current_source"], {"maximum_ma"})
+        source = read_record(CurrentSourceLimits, "description.current_source", table["current_source"], {"maximum_ma"})
     return BenchDescription(
         str(table["id"]),
         site,
@@ -174,27 +154,42 @@ def _axis(where: str, table: Any) -> AxisLimits:
         raise TruthError(f"{where}.continuous = {continuous!r} must be true or false")
     numbers = {k: v for k, v in table.items() if k != "continuous"} if isinstance(table, dict) else table
     needed = {f.name for f in fields(AxisLimits)} - {"continuous"}
-    return replace(_record(AxisLimits, where, numbers, needed), continuous=continuous)
+    return replace(read_record(AxisLimits, where, numbers, needed), continuous=continuous)
 
 
 def parse_bench(text: str) -> BenchTruth:
-    """A bench's truth from TOML text. Without `site_truth` the declared site is the true one. Raises `TruthError`."""
-    document = _document(text)
-    _only("bench", document, {"description", "site_truth", "table_truth"}, {"description"})
+    """A bench's truth from TOML text. Raises `TruthError`.
+
+    Without `site_truth` the declared site is the true one; chamber and operator are as in the code where nothing is
+    said of them. A `description` without a chamber is a bench without one.
+    """
+    document = read_document(text)
+    check_keys("bench", document, {"description", *BENCH_TRUTHS}, {"description"})
     description = _description(document["description"])
-    table = _record(TableTruth, "table_truth", document.get("table_truth", {}), set())
+    table = read_record(TableTruth, "table_truth", document.get("table_truth", {}), set())
     declared = description.site
     site = SiteTruth(declared.latitude_deg, declared.gravity_m_s2, declared.earth_rate_rad_s)
     if "site_truth" in document:
-        site = _record(SiteTruth, "site_truth", document["site_truth"], {"latitude_deg", "gravity_m_s2"})
-    return BenchTruth(site, table, description)
+        site = read_record(SiteTruth, "site_truth", document["site_truth"], {"latitude_deg", "gravity_m_s2"})
+    chamber = read_changes(ChamberTruth(), "chamber_truth", document.get("chamber_truth", {}))
+    operator = read_changes(OperatorTruth(), "operator_truth", document.get("operator_truth", {}))
+    source = read_changes(CurrentSourceTruth(), "current_source_truth", document.get("current_source_truth", {}))
+    faults = _faults(document.get("chamber_faults", []))
+    return BenchTruth(site, table, description, chamber, faults, operator, source)
 
 
-def _document(text: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as refusal:
-        raise TruthError(f"not a TOML file: {refusal}") from refusal
+def _faults(tables: Any) -> tuple[ChamberFault, ...]:
+    """Named faults of the chamber, each with the moment of bench time from which it is there."""
+    if not isinstance(tables, list):
+        raise TruthError(f"chamber_faults = {tables!r} must be a list of tables")
+    found: list[ChamberFault] = []
+    for index, table in enumerate(tables):
+        where = f"chamber_faults[{index}]"
+        if not isinstance(table, dict):
+            raise TruthError(f"{where} = {table!r} must be a table")
+        check_keys(where, table, {"name", "from_s"}, {"name", "from_s"})
+        found.append(ChamberFault(str(table["name"]), within(f"{where}.from_s", table["from_s"], 0.0, 1e9)))
+    return tuple(found)
 
 
 def load_unit(path: Path) -> UnitTruth:
@@ -225,8 +220,8 @@ def save_unit(truth: UnitTruth, path: Path) -> None:
     """Write a unit's truth; what `load_unit` reads back agrees to the last digit or two (units are converted)."""
     lines = [f"serial = {dumps(truth.serial)}", f"sample_rate_hz = {truth.sample_rate_hz!r}"]
     for name, keys in KEYS.items():
-        lines += ["", f"[{name}]"]
-        lines += [f"{k} = {_text(getattr(truth.triad(name), v.attribute), v.size)}" for k, v in keys.items()]
+        lines += keyed_lines(name, truth.triad(name), keys)
+    lines += thermal_lines(truth.thermal)
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -241,21 +236,15 @@ def save_bench(truth: BenchTruth, path: Path) -> None:
         "description.inner": described.inner,
         "description.accuracy": described.accuracy,
         **({} if described.chamber is None else {"description.chamber": described.chamber}),
+        **({} if described.current_source is None else {"description.current_source": described.current_source}),
         "site_truth": truth.site,
         "table_truth": truth.table,
+        "chamber_truth": truth.chamber,
+        "operator_truth": truth.operator,
+        "current_source_truth": truth.current_source,
     }
     for name, record in sections.items():
-        lines += ["", f"[{name}]", *(f"{f.name} = {_written(getattr(record, f.name))}" for f in fields(record))]
+        lines += record_lines(name, record)
+    for fault in truth.chamber_faults:
+        lines += ["", "[[chamber_faults]]", f"name = {dumps(fault.name)}", f"from_s = {fault.from_s!r}"]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _written(value: float | bool) -> str:
-    return str(value).lower() if isinstance(value, bool) else repr(float(value))
-
-
-def _text(value: Any, size: float) -> str:
-    if isinstance(value, bool):
-        return dumps(value)
-    if isinstance(value, tuple):
-        return "[" + ", ".join(_text(item, size) for item in value) + "]"
-    return repr(float(value) / size)
