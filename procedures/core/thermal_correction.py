@@ -112,7 +112,8 @@ class ThermalCorrection:
     axes: tuple[AxisCorrection, AxisCorrection, AxisCorrection]
     first_stage: ConverterTriad | None = None
     """The converter's models that were taken out of the outputs before the fit (`core.converter.at_reference`), and so
-    must be wherever the correction is used; None: it is for outputs as they are."""
+    must be wherever the correction is used; None: it is for outputs as they are. The reference of the whole is
+    then these models' for the converter's own drift, and the axes' for the rest: best the same."""
 
     @property
     def scales(self) -> Array:

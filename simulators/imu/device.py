@@ -29,7 +29,7 @@ class SimImu:
     ) -> None:
         """`launch` says which power-up this is, 0 while the unit is off; `thermal`: it will be told its climate.
 
-        `block_s`: length of a recording's blocks instead of `BLOCK_S`.
+        `block_s`: length of a recording's blocks instead of ten seconds.
         """
         self.truth = truth
         self._thermal = thermal

@@ -25,7 +25,15 @@ from simulators.truth.tables import (
 )
 from simulators.truth.thermal import ChamberFault, ChamberTruth
 from simulators.truth.thermal_files import read_thermal, thermal_lines
-from simulators.truth.values import BenchTruth, OperatorTruth, SiteTruth, TableTruth, TriadTruth, UnitTruth
+from simulators.truth.values import (
+    BenchTruth,
+    CurrentSourceTruth,
+    OperatorTruth,
+    SiteTruth,
+    TableTruth,
+    TriadTruth,
+    UnitTruth,
+)
 
 
 def _triad_keys(
@@ -75,7 +83,14 @@ KEYS: dict[str, dict[str, Key]] = {
 }
 
 
-BENCH_TRUTHS = ("site_truth", "table_truth", "chamber_truth", "chamber_faults", "operator_truth")
+BENCH_TRUTHS = (
+    "site_truth",
+    "table_truth",
+    "chamber_truth",
+    "chamber_faults",
+    "operator_truth",
+    "current_source_truth",
+)
 
 
 def _triad(name: str, table: Table) -> TriadTruth:
@@ -158,7 +173,9 @@ def parse_bench(text: str) -> BenchTruth:
         site = read_record(SiteTruth, "site_truth", document["site_truth"], {"latitude_deg", "gravity_m_s2"})
     chamber = read_changes(ChamberTruth(), "chamber_truth", document.get("chamber_truth", {}))
     operator = read_changes(OperatorTruth(), "operator_truth", document.get("operator_truth", {}))
-    return BenchTruth(site, table, description, chamber, _faults(document.get("chamber_faults", [])), operator)
+    source = read_changes(CurrentSourceTruth(), "current_source_truth", document.get("current_source_truth", {}))
+    faults = _faults(document.get("chamber_faults", []))
+    return BenchTruth(site, table, description, chamber, faults, operator, source)
 
 
 def _faults(tables: Any) -> tuple[ChamberFault, ...]:
@@ -219,10 +236,12 @@ def save_bench(truth: BenchTruth, path: Path) -> None:
         "description.inner": described.inner,
         "description.accuracy": described.accuracy,
         **({} if described.chamber is None else {"description.chamber": described.chamber}),
+        **({} if described.current_source is None else {"description.current_source": described.current_source}),
         "site_truth": truth.site,
         "table_truth": truth.table,
         "chamber_truth": truth.chamber,
         "operator_truth": truth.operator,
+        "current_source_truth": truth.current_source,
     }
     for name, record in sections.items():
         lines += record_lines(name, record)
