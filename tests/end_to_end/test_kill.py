@@ -26,7 +26,7 @@ class Process:
             "BENCH_REAL_TIME_FACTOR": "400",  # a station of about 75 s takes 0.2 s: time to hit one
         }
         self.log = folder / "service.log"
-        self.client = httpx.Client(base_url=f"{ADDRESS}:{port}", timeout=10)
+        self.client = httpx.Client(base_url=f"{ADDRESS}:{port}", timeout=60)
         self.start()
 
     def start(self) -> None:

@@ -39,7 +39,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Generator[str]:
 
 @pytest.fixture(scope="module")
 def document(address: str) -> dict[str, Any]:
-    return httpx.get(f"{address}/openapi.json").json()
+    return httpx.get(f"{address}/openapi.json", timeout=60).json()
 
 
 def operations(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
