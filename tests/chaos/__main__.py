@@ -25,7 +25,7 @@ def main() -> int:
         expected = twins(folder / "undisturbed")
         kept = True
         for kind in ("sqlite", "postgres") if given.database == "both" else (given.database,):
-            finding = storm(kind, folder / kind, given.kills, given.seed, expected)
+            finding = storm(kind, folder / kind, given.kills, given.seed, expected, given.minutes * 60)
             print(f"== {kind}, seed {given.seed}", *finding.figures, sep="\n")
             print(*(f"NOT KEPT: {violation}" for violation in finding.violations), sep="\n")
             print("every promise was kept" if not finding.violations else f"{len(finding.violations)} findings")

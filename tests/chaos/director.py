@@ -10,7 +10,7 @@ from pathlib import Path
 import httpx
 
 from tests.chaos.databases import OwnPostgres, SqliteFile
-from tests.chaos.load import SEEDS, SHORT, Clients
+from tests.chaos.load import SHORT, Clients
 from tests.chaos.processes import Ledger, Program, Topology, end_all
 from tests.chaos.witnesses import DatabaseWitness, DeviceWitness, Listener, is_safe, register
 
@@ -68,7 +68,7 @@ def disasters(seed: int, topology: Topology, restarts: bool) -> list[Disaster]:
             chance.choice(("any", "moving", "moving")),
             chance.choice(("fast", "immediate")),
             chance.uniform(0.0, 0.5),
-            chance.random() < 0.8,
+            chance.random() < 0.6,
         )
         for _ in range(5000)
     ]
@@ -101,7 +101,9 @@ class Run:
 class Director:
     """Brings disasters upon a service until a number of its processes have been killed."""
 
-    def __init__(self, database: SqliteFile | OwnPostgres, folder: Path, kills: int, seed: int) -> None:
+    def __init__(self, database: SqliteFile | OwnPostgres, folder: Path, kills: int, seed: int, most_s: float) -> None:
+        """`most_s`: after this time nothing more is killed, whatever was reached [s]."""
+        self._most_s = most_s
         self._database = database
         self._kills = kills
         settings = {**SETTINGS, "BENCH_DEVICE_FAULTS": FAULTS % seed}
@@ -119,7 +121,7 @@ class Director:
             self._begin()
             for thread in (*witnesses, run.clients):
                 thread.start()
-            while run.kills < self._kills:
+            while run.kills < self._kills and time.monotonic() < begun + self._most_s:
                 self._listen()
                 self._bring(next(self._disasters))
             run.clients.submit_no_more()
@@ -141,7 +143,7 @@ class Director:
             self._until(lambda: _answers(http), START_S, "the service answers")
             self._until(lambda: all(map(self.topology.drives, self.topology.benches)), START_S, "benches are driven")
             body = {"procedure": "calibration_12_orientations", "unit": "SIM-0001", "parameters": SHORT, "retries": 5}
-            more = {"bench": self.topology.benches[0], "seed": SEEDS[0]}
+            more = {"bench": self.topology.benches[0], "seed": 1}
             answer = http.post("/api/v1/jobs", json={**body, **more})
             assert answer.status_code == 202, answer.text
             job = f"/api/v1/jobs/{answer.json()['id']}"
@@ -173,7 +175,7 @@ class Director:
                 if not topology.supervisor(each):
                     topology.supervise(each)
         if disaster.patient:
-            self._until(lambda: topology.drives(bench) and topology.supervisor(bench) > 0, RETURN_S, f"{bench} is back")
+            self._until(lambda: topology.drives(bench), RETURN_S, f"bench {bench} is driven again")
 
     def _kill(self, disaster: Disaster) -> None:
         topology = self.topology

@@ -12,21 +12,19 @@ from typing import Any
 import httpx
 
 FINAL = ("succeeded", "failed", "cancelled")
-OPEN_JOBS = 3
+OPEN_JOBS = 2
 """How many jobs of a bench wait or run at any time, as long as the load lasts."""
 LOST_ANSWERS = 0.2
 """Of the submissions, how many clients hang up before the answer."""
 
 SHORT = {"dwell_s": 5.0, "settle_s": 0.5}
-RECIPES: tuple[tuple[str, dict[str, Any], int], ...] = (
-    ("calibration_12_orientations", SHORT, 4),
-    ("verification_9_orientations", SHORT, 3),
-    ("static_run", {"launches": 2, "duration_s": 1000.0, "off_time_s": 10.0, "settle_s": 0.0}, 1),
-    ("no_operation", {}, 2),
+RECIPES: tuple[tuple[str, dict[str, Any], tuple[int, ...], int], ...] = (
+    ("calibration_12_orientations", SHORT, (1, 2), 4),
+    ("verification_9_orientations", SHORT, (1,), 3),
+    ("static_run", {"launches": 2, "duration_s": 1000.0, "off_time_s": 10.0, "settle_s": 0.0}, (1,), 1),
+    ("no_operation", {}, (1,), 2),
 )
-"""Procedure, parameters, and how often it is chosen."""
-SEEDS = (1, 2)
-"""Few, so that an undisturbed twin of every job can be run."""
+"""Procedure, parameters, seeds (few, so that an undisturbed twin of every job can be run), how often it is chosen."""
 
 
 @dataclass
@@ -112,13 +110,13 @@ class Clients(Thread):
 
     def _drawn(self, bench: str) -> Asked:
         chance, number = self._chance, len(self.jobs)
-        procedure, parameters, _ = chance.choices(RECIPES, [weight for _, _, weight in RECIPES])[0]
+        procedure, parameters, seeds, _ = chance.choices(RECIPES, [weight for *_, weight in RECIPES])[0]
         body = {
             "procedure": procedure,
             "unit": "SIM-0001",
             "bench": bench,
             "parameters": parameters,
-            "seed": chance.choice(SEEDS),
+            "seed": chance.choice(seeds),
             "priority": chance.choice((5, 10, 10, 20)),
             "retries": 5,
             "labels": {"chaos": str(number)},

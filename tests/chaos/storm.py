@@ -21,11 +21,11 @@ class Finding:
     kills: int
 
 
-def storm(kind: str, folder: Path, kills: int, seed: int, twins: Twins) -> Finding:
+def storm(kind: str, folder: Path, kills: int, seed: int, twins: Twins, most_s: float = 3600.0) -> Finding:
     """Kill processes of a service on one kind of database, in a new folder, and check what is left."""
     folder.mkdir(parents=True)
     with database(kind, folder) as made:
-        run = Director(made, folder, kills, seed).direct()
+        run = Director(made, folder, kills, seed, most_s).direct()
         books = Books(engine(made.url))
         return Finding(tuple(violations(run, books, twins)), tuple(figures(run, books)), run.kills)
 

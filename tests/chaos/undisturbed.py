@@ -10,7 +10,7 @@ import httpx
 from tests.chaos.books import Books, twin_key
 from tests.chaos.databases import engine
 from tests.chaos.director import START_S
-from tests.chaos.load import RECIPES, SEEDS
+from tests.chaos.load import RECIPES
 from tests.chaos.processes import Ledger, Topology, end_all
 
 
@@ -23,8 +23,8 @@ def twins(folder: Path) -> dict[str, dict[int, str]]:
         topology.start()
         with httpx.Client(base_url=f"http://127.0.0.1:{topology.ports[0]}", timeout=60, trust_env=False) as http:
             _wait(lambda: _says(http, "/healthz"))
-            for procedure, parameters, _ in RECIPES:
-                for seed in SEEDS:
+            for procedure, parameters, seeds, _ in RECIPES:
+                for seed in seeds:
                     body = {"procedure": procedure, "unit": "SIM-0001", "parameters": parameters, "seed": seed}
                     answer = http.post("/api/v1/jobs", json=body)
                     assert answer.status_code == 202, answer.text
