@@ -26,7 +26,8 @@ def twins(folder: Path) -> dict[str, dict[int, str]]:
             for procedure, parameters, seeds, _ in RECIPES:
                 for seed in seeds:
                     body = {"procedure": procedure, "unit": "SIM-0001", "parameters": parameters, "seed": seed}
-                    answer = http.post("/api/v1/jobs", json=body)
+                    labels = {"chaos": str(len(asked))}
+                    answer = http.post("/api/v1/jobs", json={**body, "labels": labels})
                     assert answer.status_code == 202, answer.text
                     job = asked[twin_key(procedure, parameters, seed)] = answer.json()["id"]
                     _wait(lambda path=f"/api/v1/jobs/{job}": _ended_well(http.get(path).json()))
