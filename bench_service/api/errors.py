@@ -1,6 +1,7 @@
 """One table from errors to status codes, and problem+json (RFC 9457) for all of them."""
 
 import math
+from asyncio import CancelledError
 from collections.abc import Sequence
 from http import HTTPStatus
 from typing import Any
@@ -10,7 +11,7 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, Field, ValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from bench_service.jobs.errors import (
     AlreadyReserved,
@@ -103,6 +104,32 @@ def install(app: FastAPI) -> None:
         app.add_exception_handler(error, _on_known)
     app.add_exception_handler(Exception, _on_unknown)
     app.add_middleware(RefuseNul)
+    app.add_middleware(AnswerAtTheEnd)
+
+
+class AnswerAtTheEnd:
+    """A request that is still at work when the server has waited long enough for its end is told so, and may be
+    repeated: what it asked for may be done or not, which its `Idempotency-Key` sorts out.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        begun = False
+
+        async def sent(message: Message) -> None:
+            nonlocal begun
+            begun = True
+            await send(message)
+
+        try:
+            await self._app(scope, receive, sent)
+        except CancelledError:
+            if scope["type"] != "http" or begun:
+                raise
+            text = "the service is ending, and this request had not ended: ask again, with the same Idempotency-Key"
+            await respond(Request(scope), 503, text, "Ending")(scope, receive, send)
 
 
 class RefuseNul:

@@ -1,0 +1,209 @@
+"""Those who look on while the storm lasts, and only from outside: at the devices, at the database, at the events.
+
+Nothing of the service's own code is used: registers, locks and tables are read as they lie there.
+"""
+
+import json
+import time
+import zlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+import httpx
+import sqlalchemy as sa
+
+from tests.chaos.databases import engine
+from tests.chaos.processes import living
+
+LOCKS = Path("/proc/locks")
+
+
+class Witness(Thread):
+    """Looks again and again until it is told to end."""
+
+    def __init__(self, name: str, every_s: float) -> None:
+        super().__init__(name=name, daemon=True)
+        self._every_s = every_s
+        self._ending = Event()
+
+    def run(self) -> None:
+        while not self._ending.wait(self._every_s):
+            self.look()
+
+    def look(self) -> None:
+        raise NotImplementedError
+
+    def end(self) -> None:
+        self._ending.set()
+        self.join()
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What a bench's devices were seen to be, from one moment [s, Unix time] to the next sight."""
+
+    at: float
+    safe: bool
+    by: str
+
+
+def register(path: Path) -> dict[str, Any] | None:
+    """The devices' register: a checksum, and a JSON document with the state."""
+    try:
+        checksum, _, body = path.read_bytes().partition(b" ")
+    except OSError:
+        return None
+    body = body.rstrip()
+    return json.loads(body) if checksum == b"%08x" % zlib.crc32(body) else None
+
+
+def is_safe(state: dict[str, Any]) -> bool:
+    """Table at rest, unit without power, chamber led nowhere but to ambient, no fault."""
+    chamber = state["chamber_target_c"] in (None, state["chamber_ambient_c"])
+    return state["table"] == "at rest" and not state["powered"] and chamber and not state["fault"]
+
+
+def lock_holders(path: Path) -> list[int]:
+    """Which processes hold a lock on a file, by the kernel's own list; those that wait for one are not in it."""
+    inode = str(path.stat().st_ino)
+    fields = [line.split() for line in LOCKS.read_text().splitlines() if "->" not in line]
+    return [int(field[4]) for field in fields if field[1] == "FLOCK" and field[5].rpartition(":")[2] == inode]
+
+
+class DeviceWitness(Witness):
+    """When each bench was safe, by its register; and that its link's lock was held by the one who said so."""
+
+    def __init__(self, folder: Path, benches: tuple[str, ...]) -> None:
+        super().__init__("devices", 0.01)
+        self.sights: dict[str, list[Sight]] = {bench: [] for bench in benches}
+        self.locks_seen = 0
+        self.wrong: list[str] = []
+        self._files = {bench: folder / f"bench-{bench}.devices" for bench in benches}
+
+    def look(self) -> None:
+        for bench, path in self._files.items():
+            state, at = register(path), time.time()
+            if state is None:
+                continue
+            sights = self.sights[bench]
+            if not sights or sights[-1].safe != is_safe(state):
+                sights.append(Sight(at, is_safe(state), state["by"]))
+            if LOCKS.exists():
+                self._look_at_lock(bench, path, state)
+
+    def _look_at_lock(self, bench: str, path: Path, before: dict[str, Any]) -> None:
+        holders = lock_holders(path)
+        if len(holders) > 1:
+            self.wrong.append(f"bench {bench}: the devices' link is held by processes {holders} at once")
+        if self._contradiction(path, before, holders):
+            time.sleep(0.1)  # a process that is being killed has given up its files, and is not gone yet
+            holders = lock_holders(path)
+            if self._contradiction(path, before, holders):
+                self.wrong.append(f"bench {bench}: {before['by']!r} commands while the lock is held by {holders}")
+
+    def _contradiction(self, path: Path, before: dict[str, Any], holders: list[int]) -> bool:
+        """Whether a living master of the link, before and after, was not the one who held its lock."""
+        after = register(path)
+        if after is None or not (before["linked"] and after["linked"]) or before["openings"] != after["openings"]:
+            return False
+        master = master_of(before)
+        if not living(master):
+            return False
+        self.locks_seen += 1
+        return holders != [master]
+
+    def safe_after(self, bench: str, at: float) -> tuple[bool, float | None]:
+        """Whether the bench was safe at a moment, and how long it then took until it was [s]; None: never."""
+        before = [sight for sight in self.sights[bench] if sight.at <= at]
+        if not before or before[-1].safe:
+            return True, 0.0
+        later = next((sight.at for sight in self.sights[bench] if sight.at > at and sight.safe), None)
+        return False, None if later is None else later - at
+
+
+def master_of(state: dict[str, Any]) -> int:
+    """The number of the process that has the link, in words like "the supervisor, process 4711 on host"."""
+    return int(state["by"].partition("process ")[2].partition(" ")[0] or 0)
+
+
+@dataclass
+class Seen:
+    """What was read as committed while the storm lasted."""
+
+    complete: dict[str, str] = field(default_factory=dict)
+    """Of sealed recordings: id and content hash."""
+    chunks: dict[tuple[str, int], str] = field(default_factory=dict)
+    """Of sealed recordings: recording and number, and the payload's hash."""
+    stations: dict[tuple[str, int], str] = field(default_factory=dict)
+    """Of events that said a station is done: job and sequence, and the recording's content hash."""
+
+
+class DatabaseWitness(Witness):
+    """What was once committed, read by SQL."""
+
+    def __init__(self, database_url: str) -> None:
+        super().__init__("database", 0.4)
+        self.seen = Seen()
+        self.looks = 0
+        self._engine = engine(database_url)
+
+    def look(self) -> None:
+        try:
+            with self._engine.connect() as connection:
+                self._read(connection)
+        except sa.exc.SQLAlchemyError:
+            return
+        self.looks += 1
+
+    def _read(self, connection: sa.Connection) -> None:
+        sealed = connection.execute(sa.text("SELECT id, content_hash FROM recordings WHERE state = 'complete'"))
+        fresh = {row[0]: row[1] for row in sealed if row[0] not in self.seen.complete}
+        for recording, content in fresh.items():
+            query = sa.text("SELECT number, sha256 FROM chunks WHERE recording_id = :id")
+            for number, sha in connection.execute(query, {"id": recording}):
+                self.seen.chunks[recording, number] = sha
+            self.seen.complete[recording] = content
+        done = connection.execute(sa.text("SELECT job_id, sequence, data FROM events WHERE kind = 'station'"))
+        for job, sequence, data in done:
+            document = json.loads(data) if isinstance(data, str) else data
+            if "hash" in document:
+                self.seen.stations[job, sequence] = document["hash"]
+
+
+class Listener(Witness):
+    """A client of one job's server-sent events, who comes back with `Last-Event-ID` to whichever process answers."""
+
+    def __init__(self, ports: tuple[int, ...], job: str) -> None:
+        super().__init__(f"listener of {job}", 0.2)
+        self.job = job
+        self.heard: list[tuple[int, str, Any]] = []
+        self.connections = 0
+        self._ports = ports
+
+    def look(self) -> None:
+        """Listen until the connection ends, or a little while: then leave, and come back."""
+        last = self.heard[-1][0] if self.heard else 0
+        port = self._ports[self.connections % len(self._ports)]
+        self.connections += 1
+        address = f"http://127.0.0.1:{port}/api/v1/jobs/{self.job}/events"
+        until = time.monotonic() + 2.0
+        try:
+            with httpx.stream(
+                "GET", address, headers={"Last-Event-ID": str(last)}, timeout=3, trust_env=False
+            ) as answer:
+                frame: dict[str, str] = {}
+                for line in answer.iter_lines():
+                    if line:
+                        name, _, value = line.partition(": ")
+                        frame[name] = value
+                        continue
+                    if "id" in frame:
+                        said = json.loads(frame["data"])
+                        self.heard.append((int(frame["id"]), frame["event"], said["data"]))
+                    frame = {}
+                    if time.monotonic() > until or self._ending.is_set():
+                        return
+        except (httpx.HTTPError, OSError):
+            return
