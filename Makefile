@@ -3,10 +3,10 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
 VALIDATIONS := calibration allan noise conditioning whole_turns alignment without_bench thermal
-BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle campaign listeners)
+BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue campaign listeners)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test bench check validate lock clean
+.PHONY: help run test bench chaos check validate lock clean
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -24,6 +24,9 @@ run: $(VENV)/.ready  ## calibrate and verify the simulated unit, then keep servi
 
 test: $(VENV)/.ready  ## the whole test suite
 	@$(BIN)/python -m pytest -n 2 --dist worksteal
+
+chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books
+	@$(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both
 
 check: $(VENV)/.ready  ## format, lint, types, import contracts
 	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/lint-imports --no-cache && $(BIN)/basedpyright

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from types import FrameType
 
 from bench_service.app import open_service
+from bench_service.cli.logs import set_up
 from bench_service.cli.supervising import accompanied
 from bench_service.settings import Settings
 
@@ -16,6 +17,7 @@ def work(settings: Settings, say: Callable[[str], object]) -> None:
 
     Raises what `open_service` raises, `BenchBusy` first of all, and `NotDriving` where the engine does not start.
     """
+    set_up(settings, "info")
     ending = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:

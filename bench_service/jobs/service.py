@@ -117,7 +117,7 @@ class BenchService:
         """Plan, store and queue a job. Raises what `Planner.plan` raises, `BadParameter` for an axis limit."""
         plan = self.planner.plan(request.procedure, request.unit, request.parameters, request.bench)
         if plan.violations:
-            raise BadParameter("stations", plan.violations[0], "beyond an axis limit of the bench")
+            raise BadParameter("stations", plan.violations[0], "beyond a limit of the bench")
         if request.seed is not None and not plan.context.bench.simulated:
             raise BadParameter("seed", request.seed, "only a simulated bench has one")
         if request.reservation is not None:

@@ -111,7 +111,6 @@ class Params(Parameters):
         20.0, ge=-100.0, le=200.0, description="reading of the case sensor at which the correction does nothing"
     )
     reference_converter_c: float = Field(20.0, ge=-100.0, le=200.0)
-    current_ma_per_g: float = Field(1.1, gt=0.0, le=1e3, description="of the accelerometers, for stage one")
     regime: Regime = Field(default_factory=lambda: Regime.model_validate({}))
     form: Form = Field(Form.BOTH, description="which terms of T 4.1 act in which regime")
     correction: Literal["fit", "current"] = Field(
@@ -142,7 +141,6 @@ class Params(Parameters):
             lag_sd_s=self.lag_sd_s,
             reference_c=(self.reference_case_c, self.reference_converter_c),
             regime=RegimeSettings(**self.regime.model_dump()),
-            current_ma_per_g=self.current_ma_per_g,
             gyro_trim_s=self.gyro_trim_s,
             level=self.level,
             confidence=self.confidence,

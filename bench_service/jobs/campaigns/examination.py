@@ -106,7 +106,7 @@ class Examiner:
                 raise BadParameter(f"{where}.parameters", step.does, str(error)) from error
             return self._without_calibration(step, where, unit, bench, progress, strict, error)
         if plan.violations:
-            raise BadParameter(f"{where}.parameters", plan.violations[0], "beyond an axis limit of the bench")
+            raise BadParameter(f"{where}.parameters", plan.violations[0], "beyond a limit of the bench")
         return self._planned(step, where, plan, progress)
 
     def _planned(self, step: Step, where: str, plan: Plan, progress: _Progress) -> StepPlan:

@@ -34,6 +34,8 @@ SINGLE_REGIME_SHARE = 0.02
 WORSE = 1.5
 """A dynamic regime that the fit explains so many times worse than the static one has heat where no sensor is. Tried on
 the rig: 0.8 to 1.0 where every term acts at a sensor, 2.4 to 2.8 where some act at a block without one."""
+SAME_REFERENCE_C = 0.05
+"""The converter drifts some 1e-4 m/s² a °C: a smaller difference is below every claim."""
 REFERENCE_WITHIN_C = 8.0
 """A reference soak further from the reference than this is told."""
 
@@ -65,17 +67,20 @@ def analyse_cycle(
     `noise_from_cycle`: gyros are tested against the noise that the cycle itself shows, not against the known one.
     Raises `BadParameter`, `Undetermined`, `UnfitRecording`.
     """
-    warnings = _unknowns(known)
-    runs = [prepare(s, settings, gravity_m_s2, known.converter) for _, s in series]
+    converter = _first_stage(known, judge_current)
+    warnings = [*_unknowns(known, converter), *_two_references(converter, settings)]
+    runs = [prepare(s, settings, gravity_m_s2, converter) for _, s in series]
     if known.calibration is not None:
         runs, doubts = with_forces(runs, settings, known.calibration)
         warnings += doubts
     cells = [run.cells for run in runs]
     lags = (settings.lag_sd_s, settings.lag_sd_s)
-    correction, fits = fit_correction(cells, settings.reference_c, form, lags)
+    fitted, fits = fit_correction(cells, settings.reference_c, form, lags)
+    correction = replace(fitted, first_stage=converter)
     judged = known.correction if judge_current and known.correction is not None else correction
     soaked = [soaks_of(run, judged.axes[0].case_reference_c) for run in runs]
-    forms, refused = _forms(runs, soaked, correction, settings, gravity_m_s2, known.correction)
+    comparable = known.correction if known.correction and known.correction.first_stage == converter else None
+    forms, refused = _forms(runs, soaked, correction, settings, gravity_m_s2, comparable)
     plain = _plain(judged)
     found_runs = tuple(
         _run(recording, run, judged, plain, soak, settings, gravity_m_s2)
@@ -85,7 +90,7 @@ def analyse_cycle(
     return ThermalCycle(
         judged="current" if judged is not correction else "fit",
         reference_c=settings.reference_c,
-        stage_one=known.converter is not None,
+        stage_one=converter is not None,
         force_known=known.calibration is not None,
         regime_delay_s=settings.regime.delay_s,
         runs=found_runs,
@@ -102,9 +107,29 @@ def analyse_cycle(
     )
 
 
-def _unknowns(known: KnownOfUnit) -> list[str]:
+def _first_stage(known: KnownOfUnit, judge_current: bool) -> ConverterTriad | None:
+    """The converter's models to take out first: those that go with the correction that is judged."""
+    if judge_current and known.correction is not None:
+        return known.correction.first_stage
+    return known.converter
+
+
+def _two_references(converter: ConverterTriad | None, settings: CycleSettings) -> list[str]:
+    """A sentence where the two stages refer to different readings of the converter's sensor."""
+    if converter is None:
+        return []
+    first, second = converter[0].scale.reference_c, settings.reference_c[1]
+    if abs(first - second) < SAME_REFERENCE_C:
+        return []
+    return [
+        f"stage one refers to {first:g} °C of the converter's sensor, the correction to {second:g} °C: the reference is "
+        "then of two temperatures; set reference_converter_c to stage one's"
+    ]
+
+
+def _unknowns(known: KnownOfUnit, converter: ConverterTriad | None) -> list[str]:
     warnings: list[str] = []
-    if known.converter is None:
+    if converter is None:
         warnings.append(
             "no model of the unit's signal converter is known: stage one was left out, and the terms of the "
             "converter's sensor hold the converter's own drift beside the accelerometers'"

@@ -1,7 +1,6 @@
 """From second means to what the fits see: stage one, lags, regimes, and the force that each accelerometer felt.
 
-Stage one takes the converter's own drift out of nominal outputs: with ``N = K0·Fc(t)·I + N0 + Fs(t)`` (paper C) and
-``V = I/k`` at the reference, k the accelerometer's current a m/s², ``V₁ = (V − Fs(t)/(K0·k))/Fc(t)``.
+Stage one takes the converter's own drift out of nominal outputs first (paper C; `core.converter.at_reference`).
 """
 
 from collections.abc import Sequence
@@ -15,9 +14,8 @@ from procedures.analysis.thermal.fit import fit_correction
 from procedures.analysis.thermal.judgement import nearest, soaks
 from procedures.analysis.thermal.regime import RegimeSettings, RegimeTrace, regimes
 from procedures.analysis.thermal.runs import ThermalRun, thermal_run, without_lag
-from procedures.core import units
 from procedures.core.arrays import Array
-from procedures.core.converter import ConverterTriad
+from procedures.core.converter import ConverterTriad, at_reference
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.thermal_correction import ThermalCorrection
 
@@ -39,8 +37,6 @@ class CycleSettings:
     reference_c: tuple[float, float] = (20.0, 20.0)
     """Readings of case and converter sensor at which the correction changes nothing but K0 and B0."""
     regime: RegimeSettings = field(default_factory=RegimeSettings)
-    current_ma_per_g: float = 1.1
-    """Accelerometer's current (thesis table 1.3)."""
     gyro_trim_s: float = 600.0
     """Start of each launch that the gyros' noise is not judged by (thesis 4.1.1)."""
     level: float = 0.01
@@ -73,16 +69,6 @@ class PreparedRun:
         return self.trace.dynamic
 
 
-def stage_one(output_m_s2: Array, converter_c: Array, models: ConverterTriad, current_ma_per_g: float) -> Array:
-    """Nominal outputs (n, 3) with the converter's drift against its own temperature (n,) [°C] taken out."""
-    ma_per_nominal = current_ma_per_g / units.STANDARD_GRAVITY
-    columns: list[Array] = []
-    for axis, model in enumerate(models):
-        zero = model.zero.function(converter_c) / (model.scale.at_reference * ma_per_nominal)
-        columns.append((output_m_s2[:, axis] - zero) / model.scale.function(converter_c))
-    return np.column_stack(columns)
-
-
 def prepare(
     series: CycleSeries, settings: CycleSettings, gravity_m_s2: float, converter: ConverterTriad | None
 ) -> PreparedRun:
@@ -94,7 +80,7 @@ def prepare(
     board = without_lag(series.converter_c, series.sample_s, settings.converter_lag_s)
     output = series.output_m_s2
     if converter is not None:
-        output = stage_one(output, board, converter, settings.current_ma_per_g)
+        output = at_reference(output, board, converter)
     trace = regimes(series.case_c, series.sample_s, settings.regime)
     cells = thermal_run(
         series.up,
