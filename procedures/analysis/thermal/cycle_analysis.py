@@ -122,8 +122,8 @@ def _two_references(converter: ConverterTriad | None, settings: CycleSettings) -
     if abs(first - second) < SAME_REFERENCE_C:
         return []
     return [
-        f"stage one refers to {first:g} °C of the converter's sensor, the correction to {second:g} °C: the reference is "
-        "then of two temperatures; set reference_converter_c to stage one's"
+        f"stage one refers to {first:g} °C of the converter's sensor, the correction to {second:g} °C: the reference "
+        "is then of two temperatures; set reference_converter_c to stage one's"
     ]
 
 
