@@ -217,7 +217,9 @@ class Director:
         while self.run.clients.open and time.monotonic() < end:
             self.topology.start()
             time.sleep(0.1)
-        time.sleep(3.0)  # listeners hear the last, witnesses see it
+        while any(listener.is_alive() for listener in self.run.listeners) and time.monotonic() < end:
+            time.sleep(0.1)  # they hear the last
+        time.sleep(1.0)  # witnesses see it
         return not self.run.clients.open
 
     def _until(self, reached: Callable[[], object], seconds: float, what: str) -> None:
