@@ -109,7 +109,7 @@ def install(app: FastAPI) -> None:
 
 class AnswerAtTheEnd:
     """A request that is still at work when the server has waited long enough for its end is told so, and may be
-    repeated: what it asked for may be done or not, which its `Idempotency-Key` sorts out.
+    repeated: what it asked for may be done or not, which its `Idempotency-Key` sorts out. A stream ends, unfinished.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -126,8 +126,10 @@ class AnswerAtTheEnd:
         try:
             await self._app(scope, receive, sent)
         except CancelledError:
-            if scope["type"] != "http" or begun:
+            if scope["type"] != "http":
                 raise
+            if begun:  # a stream, cut here: the server closes its connection, and the client sees that it is not whole
+                return
             text = "the service is ending, and this request had not ended: ask again, with the same Idempotency-Key"
             await respond(Request(scope), 503, text, "Ending")(scope, receive, send)
 

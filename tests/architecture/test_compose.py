@@ -6,12 +6,11 @@ The same processes, without containers, are run and killed by `tests.chaos`.
 from pathlib import Path
 from typing import Any
 
-import click
 import pytest
 import typer
 import yaml
 
-from bench_service.cli.commands import app
+from bench_service.cli.commands import app, run_command_line
 from bench_service.jobs.engine import SHUT_DOWN_S
 from bench_service.settings import Settings
 
@@ -21,11 +20,10 @@ OURS = {name: service for name, service in SERVICES.items() if name != "database
 
 
 def parsed(command: list[str]) -> tuple[str, dict[str, Any]]:
-    """Name and options of a command, as the command line itself reads them. Raises `click.UsageError`."""
+    """Name and options of a command, as the command line itself reads them. Raises a usage error."""
     assert command[0] == "bench"
-    group = typer.main.get_command(app)
-    assert isinstance(group, click.Group)
-    context = click.Context(group)
+    group: Any = typer.main.get_command(app)
+    context = group.make_context("bench", list(command[1:]), resilient_parsing=True)
     name, found, rest = group.resolve_command(context, command[1:])
     assert name is not None
     assert found is not None
@@ -34,7 +32,7 @@ def parsed(command: list[str]) -> tuple[str, dict[str, Any]]:
 
 def of_bench(command: str) -> dict[str, dict[str, Any]]:
     """The services that run a command, by their bench."""
-    found = {}
+    found: dict[str, dict[str, Any]] = {}
     for service in OURS.values():
         name, options = parsed(service["command"])
         if name == command:
@@ -52,11 +50,9 @@ def test_commands_and_settings_are_those_that_there_are(name: str) -> None:
     assert service["depends_on"]["database"]["condition"] == "service_healthy"
 
 
-def test_a_command_that_there_is_not_is_found() -> None:
-    with pytest.raises(click.UsageError):
-        parsed(["bench", "work"])
-    with pytest.raises(click.UsageError):
-        parsed(["bench", "worker", "--name", "east"])
+@pytest.mark.parametrize("wrong", [["work"], ["worker", "--name", "east"], ["worker", "--bench"]])
+def test_a_command_that_there_is_not_would_be_found(wrong: list[str]) -> None:
+    assert run_command_line(Settings(), wrong) == 2
 
 
 def test_two_benches_have_a_worker_each_and_a_supervisor_that_outlives_it() -> None:

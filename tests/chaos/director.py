@@ -18,7 +18,7 @@ START_S = 120.0
 """How long the first start may take [s], with the migration of an empty database, on a loaded machine."""
 RETURN_S = 60.0
 """How long a process that was started again may take to drive its bench [s]."""
-BUSY_S = 4.0
+BUSY_S = 12.0
 """How long a disaster waits for a moment at which it hurts [s]; then it comes at any."""
 DRAIN_S = 240.0
 """How long the jobs may take to end after the last disaster [s]."""
@@ -65,10 +65,10 @@ def disasters(seed: int, topology: Topology, restarts: bool) -> list[Disaster]:
             chance.choice(topology.benches),
             chance.randrange(len(topology.apis)),
             chance.uniform(0.0, 1.0),
-            chance.choice(("any", "moving", "moving")),
+            chance.choice(("any", "moving", "moving", "moving")),
             chance.choice(("fast", "immediate")),
             chance.uniform(0.0, 0.5),
-            chance.random() < 0.6,
+            chance.random() < 0.7,
         )
         for _ in range(5000)
     ]
@@ -108,6 +108,7 @@ class Director:
         self._kills = kills
         settings = {**SETTINGS, "BENCH_DEVICE_FAULTS": FAULTS % seed}
         self.topology = Topology(Ledger(), folder, database.url, settings)
+        self._starting = False
         self._disasters = iter(disasters(seed, self.topology, database.restarts))
         clients = Clients(self.topology.ports, self.topology.benches, seed, 3 * kills + 20)
         devices = DeviceWitness(folder, self.topology.benches)
@@ -153,7 +154,7 @@ class Director:
     def _bring(self, disaster: Disaster) -> None:
         topology, bench = self.topology, disaster.bench
         time.sleep(disaster.after_s)
-        if disaster.aim == "moving":
+        if disaster.aim == "moving" and not self._starting:
             self._wait_for_harm(bench)
         said = f"{disaster.kind} of {bench}" if disaster.kind not in ("all", "api", "database") else disaster.kind
         self.run.done.append(f"{said} {disaster.mode}" if disaster.kind == "database" else said)
@@ -174,6 +175,7 @@ class Director:
             for each in topology.benches:
                 if not topology.supervisor(each):
                     topology.supervise(each)
+        self._starting = not disaster.patient
         if disaster.patient:
             self._until(lambda: topology.drives(bench), RETURN_S, f"bench {bench} is driven again")
 
@@ -217,7 +219,9 @@ class Director:
         while self.run.clients.open and time.monotonic() < end:
             self.topology.start()
             time.sleep(0.1)
-        time.sleep(3.0)  # listeners hear the last, witnesses see it
+        while any(listener.is_alive() for listener in self.run.listeners) and time.monotonic() < end:
+            time.sleep(0.1)  # they hear the last
+        time.sleep(1.0)  # witnesses see it
         return not self.run.clients.open
 
     def _until(self, reached: Callable[[], object], seconds: float, what: str) -> None:
