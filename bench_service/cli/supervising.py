@@ -14,6 +14,7 @@ from functools import partial
 from pathlib import Path
 from types import FrameType
 
+from bench_service.cli.logs import set_up
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.jobs.errors import BenchBusy
@@ -36,6 +37,7 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
 
     A companion then leaves it at that: one supervisor looks after every process that drives the bench.
     """
+    set_up(settings, "info")
     ending = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:

@@ -111,9 +111,10 @@ class SimulatedDriver:
             thermal=needs.temperatures,
             currents=needs.currents,
         )
-        bench: Bench = build(config, checkpoint)
+        world = build(config, checkpoint)
+        bench: Bench = world
         if self._asking is not None and job is not None:
-            bench.operator = self._asking(job, bench.operator)
+            bench.operator = self._asking(job, world.operator)
         if self._register is None:
             return bench
         link = self._register.open(job=job)

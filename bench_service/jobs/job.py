@@ -5,7 +5,15 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any
 
-from procedures.bench.errors import BenchError, DeviceFault, Disconnected, NotPowered, NotSettled
+from procedures.bench.errors import (
+    BenchError,
+    DeviceBusy,
+    DeviceFault,
+    Disconnected,
+    NotPowered,
+    NotSettled,
+    SoakNotReached,
+)
 from procedures.core.limits import Verdict
 from procedures.core.recording import Station
 
@@ -49,7 +57,8 @@ LEGAL: dict[JobState, frozenset[JobState]] = {
 }
 """From each state, the states that may follow. From failed to queued only where `Job.resumable` allows it."""
 
-BENCH_FAULTS = frozenset(fault.__name__ for fault in (BenchError, NotSettled, NotPowered, DeviceFault, Disconnected))
+FAULTS = (BenchError, NotSettled, SoakNotReached, NotPowered, DeviceFault, DeviceBusy, Disconnected)
+BENCH_FAULTS = frozenset(fault.__name__ for fault in FAULTS)
 """Kinds of failure that are the bench's, and may be gone the next time; a demand out of range never will be."""
 
 RESUMABLE = BENCH_FAULTS | {"NotSafe", "DeadlinePassed", "LeaseLost", "StorageFull", "StorageFailure"}

@@ -91,7 +91,7 @@ def trend_page(
     """A quantity over the unit's results; without one, what there is to choose from."""
     service = _service(request)
     service.stores.units.unit(serial)
-    kind = service.driver.description.simulated if simulated is None else simulated
+    kind = service.benches.description(service.benches.default()).simulated if simulated is None else simulated
     newest = history(service.stores.results, serial, procedure, kind, 1)
     names = list(quantities(newest[-1].document)) if newest else []
     chosen = quantity or next(iter(names), "")

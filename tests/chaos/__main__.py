@@ -15,6 +15,7 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=200, help="processes to kill on each database")
     parser.add_argument("--seed", type=int, default=1, help="of the disasters, the jobs and the devices' faults")
     parser.add_argument("--database", choices=("sqlite", "postgres", "both"), default="both")
+    parser.add_argument("--minutes", type=float, default=60.0, help="at most so long on each database")
     parser.add_argument(
         "--keep", type=Path, help="a new folder for databases, journals and logs; else they are removed"
     )

@@ -145,7 +145,7 @@ class CampaignDesk:
         self._stores.units.unit(unit)
         self._planner.procedure(procedure)
         if simulated is None:
-            simulated = self._driver.description.simulated
+            simulated = self._planner.benches.description(self._planner.benches.default()).simulated
         found = history(self._stores.results, unit, procedure, simulated, last)
         if same_parameters:
             found = [result for result in found if result.parameters == found[-1].parameters]
