@@ -111,10 +111,7 @@ class SimulatedDriver:
             thermal=needs.temperatures,
             currents=needs.currents,
         )
-        world = build(config, checkpoint)
-        bench: Bench = world
-        if self._asking is not None and job is not None:
-            bench.operator = self._asking(job, world.operator)
+        bench = self._asked(build(config, checkpoint), job)
         if self._register is None:
             return bench
         link = self._register.open(job=job)
@@ -122,6 +119,12 @@ class SimulatedDriver:
         link.note("bench.opened", {"unit": unit}, chamber_ambient_c=None if chamber is None else chamber.ambient_c)
         faults = None if self._faults is None else DeviceFaults(self._faults, f"{job} {link.openings}")
         return RegisteredBench(bench, link, faults)
+
+    def _asked(self, bench: Bench, job: str | None) -> Bench:
+        """The bench with a person before its own operator, where one is to be asked."""
+        if self._asking is not None and job is not None:
+            bench.operator = self._asking(job, bench.operator)
+        return bench
 
     def device_state(self) -> DeviceState | None:
         """What the register holds; None without one."""
