@@ -11,7 +11,7 @@ import httpx
 
 from tests.chaos.databases import OwnPostgres, SqliteFile
 from tests.chaos.load import SHORT, Clients
-from tests.chaos.processes import Ledger, Program, Topology, end_all
+from tests.chaos.processes import Ledger, Program, Topology
 from tests.chaos.witnesses import DatabaseWitness, DeviceWitness, Listener, is_safe, register
 
 START_S = 120.0
@@ -132,7 +132,7 @@ class Director:
             for thread in (run.clients, *run.listeners, *witnesses):
                 if thread.is_alive():
                     thread.end()
-            end_all(self.topology.ledger)
+            self.topology.end_at_once()
             run.seconds = time.monotonic() - begun
         return run
 
