@@ -121,6 +121,11 @@ class Program:
             )
         self._ledger.births[self.pid] = (self.name, time.time())
 
+    def reap(self) -> None:
+        """Take note of the end of a process that was killed."""
+        if self._process is not None:
+            self._process.wait(GONE_S)
+
     def strike(self, how: signal.Signals = signal.SIGKILL) -> bool:
         """See `strike`; the process is noticed as gone by us, its parent."""
         done = self.pid > 0 and strike(self._ledger, self.name, self.pid, how)
@@ -187,6 +192,12 @@ class Topology:
         except (OSError, ValueError):
             return False
         return not document["ended"] and document["process"]["pid"] == self.workers[bench].pid
+
+    def end_at_once(self) -> None:
+        """Kill whatever is left, also of processes that ours started."""
+        end_all(self.ledger)
+        for program in (*self.apis, *self.workers.values(), *self._supervisors.values()):
+            program.reap()
 
     def end_in_order(self) -> None:
         """SIGTERM to all, as a machine that is shut down does."""

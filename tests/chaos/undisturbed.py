@@ -11,7 +11,7 @@ from tests.chaos.books import Books, twin_key
 from tests.chaos.databases import engine
 from tests.chaos.director import START_S
 from tests.chaos.load import RECIPES
-from tests.chaos.processes import Ledger, Topology, end_all
+from tests.chaos.processes import Ledger, Topology
 
 
 def twins(folder: Path) -> dict[str, dict[int, str]]:
@@ -33,7 +33,7 @@ def twins(folder: Path) -> dict[str, dict[int, str]]:
                     _wait(lambda path=f"/api/v1/jobs/{job}": _ended_well(http.get(path).json()))
         topology.end_in_order()
     finally:
-        end_all(topology.ledger)
+        topology.end_at_once()
     found: dict[str, dict[int, str]] = {key: {} for key in asked}
     keys = {job: key for key, job in asked.items()}
     for row in Books(engine(url)).recordings:
