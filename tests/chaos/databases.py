@@ -49,6 +49,7 @@ class OwnPostgres:
         data = self._server.pgdata
         arguments = ("-w", "-m", mode, "-D", str(data), "-l", str(data / "log"), "restart")
         pgexec("pg_ctl", arguments, self._server.bin_path, user=self._server.system_user, timeout=60)
+        self._server.ensure_postgres_running()  # it learns the new process, and can stop it at the end
 
 
 @contextmanager
