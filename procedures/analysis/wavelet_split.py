@@ -99,6 +99,11 @@ def wavelet_split(
     return WaveletSplit(kept, cells - kept, tuple(done), wavelet, rule, edge)
 
 
+def shortest_s(levels: int, cell_s: float, wavelet: str = "sym8") -> float:
+    """The shortest series [s] that can be split into so many levels: ``2^levels·(filter − 1)`` cells (PyWavelets)."""
+    return (_filter_length(wavelet) - 1) * 2**levels * cell_s
+
+
 def levels_for(scale_s: float, cell_s: float) -> int:
     """Levels that reach to a time scale [s], ``log₂(scale/cell)`` rounded. Raises `BadParameter` where that is none.
 

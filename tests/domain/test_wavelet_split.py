@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from procedures.analysis.wavelet_split import Rule, heursure, levels_for, wavelet_split
+from procedures.analysis.wavelet_split import Rule, heursure, levels_for, shortest_s, wavelet_split
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
 from tests.validation.conditioning_noise import SYNTHETIC, noise_cells
@@ -128,3 +128,11 @@ def test_what_cannot_be_split_is_refused() -> None:
         levels_for(1.0, 1.0)
     with pytest.raises(BadParameter, match="cell_s"):
         levels_for(1.0, -1.0)
+
+
+@pytest.mark.parametrize("levels", [1, 4, 6])
+def test_the_shortest_series_is_the_shortest_that_can_be_split(levels: int) -> None:
+    cells = np.sin(np.arange(shortest_s(levels, 2.0) / 2.0))
+    wavelet_split(cells, 2.0, rule="rescaled", levels=levels)
+    with pytest.raises(BadParameter, match="levels"):
+        wavelet_split(cells[:-1], 2.0, rule="rescaled", levels=levels)
