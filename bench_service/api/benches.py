@@ -121,7 +121,7 @@ class Stopping(BaseModel):
 
 def _view(service: BenchService, bench_id: str) -> BenchView:
     description = service.benches.description(bench_id)
-    running = service.running_job(bench_id)
+    running = service.driving_job(bench_id)
     live = service.live.of_bench(bench_id)
     stop = service.stores.units.bench_stop(bench_id)
     return BenchView(

@@ -111,17 +111,17 @@ class SimulatedDriver:
             thermal=needs.temperatures,
             currents=needs.currents,
         )
-        bench = self._asked(build(config, checkpoint), job)
+        bench = build(config, checkpoint)
         if self._register is None:
             return bench
         link = self._register.open(job=job)
         chamber = self.description.chamber
         link.note("bench.opened", {"unit": unit}, chamber_ambient_c=None if chamber is None else chamber.ambient_c)
         faults = None if self._faults is None else DeviceFaults(self._faults, f"{job} {link.openings}")
-        return RegisteredBench(bench, link, faults)
+        return self._asked(RegisteredBench(bench, link, faults), job)
 
     def _asked(self, bench: Bench, job: str | None) -> Bench:
-        """The bench with a person before its own operator, where one is to be asked."""
+        """The bench with a person before the operator that it shows; the world within keeps its own."""
         if self._asking is not None and job is not None:
             bench.operator = self._asking(job, bench.operator)
         return bench

@@ -170,8 +170,14 @@ class BenchService:
         return self.stores.queue.set_priority(job_id, priority, now())
 
     def running_job(self, bench_id: str) -> Job | None:
-        """The job that drives a bench now."""
+        """A bench's job that has begun and not ended."""
         return self.stores.queue.running(bench_id)
+
+    def driving_job(self, bench_id: str) -> Job | None:
+        """The job that drives a bench now; one that only waits for room to note its end drives it no more."""
+        if self._worker is not None and self.driver is not None and self.driver.description.id == bench_id:
+            return self._worker.running_job()
+        return self.running_job(bench_id)
 
     def _wake(self) -> None:
         if self._worker is not None:

@@ -244,7 +244,7 @@ def test_a_truth_file_that_cannot_be_used_is_one_line(
     file = tmp_path / "truth.toml"
     if content is not None:
         file.write_text(content)
-    one_line(bench("jobs", **{name: str(file)}), str(file))
+    one_line(bench("run", "no_operation", "--unit", "SIM-0001", **{name: str(file)}), str(file))
 
 
 class Served:

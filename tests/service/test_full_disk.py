@@ -56,9 +56,12 @@ def noise_file(rows: int) -> bytes:
     return b"gyro_x\n" + b"".join(b"%d\n" % v for v in rng.integers(-(2**31), 2**31, rows))
 
 
-def assert_it_answers(client: Client, job_id: str) -> None:
-    for path in ("/healthz", "/readyz", "/metrics", "/", f"/jobs/{job_id}", "/api/v1/jobs", "/api/v1/benches/sim"):
+def assert_it_answers(client: Client, job_id: str, ready: bool = True) -> None:
+    for path in ("/healthz", "/metrics", "/", f"/jobs/{job_id}", "/api/v1/jobs", "/api/v1/benches/sim"):
         assert client.http.get(path).status_code == 200, path
+    readiness = client.http.get("/readyz")
+    assert readiness.status_code == (200 if ready else 503)
+    assert ready or "the disk is nearly full" in readiness.json()["detail"]
 
 
 def test_a_job_that_fills_the_database_fails_in_words_and_the_next_one_succeeds(
@@ -114,7 +117,7 @@ def test_a_full_disk_takes_no_new_job_and_gives_what_there_is(small_disk: Path, 
         while full.status_code == 202:  # pages that the database has in reserve take a few more jobs
             full = http.post("/api/v1/jobs", json=body)
         assert (full.status_code, full.json()["detail"]) == (507, "the database cannot grow: the disk is full")
-        assert_it_answers(client, done["id"])
+        assert_it_answers(client, done["id"], ready=False)
         first = client.recordings(done["id"])[0]["id"]
         assert len(http.get(f"/api/v1/recordings/{first}/data", params={"format": "csv"}).text) > 10_000
         assert client.stored()["recordings"] == before["recordings"]
@@ -133,7 +136,7 @@ def test_a_job_whose_failure_cannot_be_written_ends_once_there_is_space(
         choke()
         while http.get("/api/v1/benches/sim").json()["state"] == "busy":
             pass
-        assert_it_answers(client, job["id"])
+        assert_it_answers(client, job["id"], ready=False)
         (small_disk / "ballast").unlink()
         ended = client.wait(job["id"], seconds=5)
         assert (ended["state"], ended["error"]["kind"]) == ("failed", "StorageFull")

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench_service.drivers.registered import RegisteredBench
 from bench_service.drivers.simulated import SimulatedDriver
 from procedures.bench import Bench
 from simulators.world import SimulatedBench
@@ -82,8 +83,9 @@ def test_a_cancel_while_the_table_turns_ends_at_rest(sqlite_client: Client, monk
 
     def watched(driver: SimulatedDriver, *job: Any) -> Bench:
         bench = open_bench(driver, *job)
-        assert isinstance(bench, SimulatedBench)
-        opened.append(bench)
+        assert isinstance(bench, RegisteredBench)
+        assert isinstance(bench.inner, SimulatedBench)
+        opened.append(bench.inner)
         return bench
 
     monkeypatch.setattr(SimulatedDriver, "open", watched)
