@@ -58,12 +58,19 @@ class SqlCorrectionStore:
                 row = _found(session, unit, correction_id)
                 if made_before(session, idempotency, "correction choice") is None:
                     remember(session, idempotency, "correction choice", correction_id, wall_clock.now())
+                    _lock_all(session, unit, row.kind)
                     retire_current(session, unit, row.kind)
                     row.is_current = True
                     session.flush()
                 return correction_of_row(row)
 
         return again_after_conflict(once)
+
+
+def _lock_all(session: Session, unit: str, kind: str) -> None:
+    """Every correction of a kind, in one order: two choices at once wait for each other instead of both for both."""
+    mine = select(CorrectionRow.id).where(CorrectionRow.unit == unit, CorrectionRow.kind == kind)
+    session.scalars(mine.order_by(CorrectionRow.id).with_for_update()).all()
 
 
 def _found(session: Session, unit: str, correction_id: str) -> CorrectionRow:

@@ -89,5 +89,6 @@ def test_with_worker_and_supervisor_killed_the_next_start_makes_the_bench_safe_f
     before = len(bench.register.journal.entries())
     bench.start()
     first = [entry["verb"] for entry in bench.register.journal.entries()[before:]]
-    assert first[:4] == ["link.opened", "turntable.make_safe", "chamber.make_safe", "supply.make_safe"]
+    devices = ("turntable", "chamber", "current_source", "supply")
+    assert first[:5] == ["link.opened", *(f"{device}.make_safe" for device in devices)]
     assert "made safe first" in bench.events(job)

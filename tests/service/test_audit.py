@@ -47,7 +47,8 @@ def test_who_only_looks_or_asks_for_what_is_not_there_leaves_no_entry(client: Cl
 def test_a_bench_stop_is_in_the_trail_and_so_is_a_body_that_was_refused(client: Client) -> None:
     client.http.post("/api/v1/benches/sim/stop", json={"reason": "smoke"}, headers={"X-Requested-By": "Bo"})
     client.http.post("/api/v1/benches/sim/release", headers={"X-Requested-By": "Bo"})
-    client.http.post("/api/v1/jobs", content=b'{"a": 1e999, "b": ' + b"[" * 3000, headers={"X-Requested-By": "Bo"})
+    no_json, by = b'{"a": 1e999, "b": ' + b"[" * 3000, {"X-Requested-By": "Bo", "Content-Type": "application/json"}
+    client.http.post("/api/v1/jobs", content=no_json, headers=by)
     client.http.post("/api/v1/jobs", json={"seed": "x" * 10_000}, headers={"X-Requested-By": "Bo"})
     found = entries(client, who="Bo")[::-1]
     assert [(e["action"], e["outcome"]) for e in found] == [
@@ -96,7 +97,7 @@ def test_where_the_entry_cannot_be_written_the_outcome_is_told_all_the_same(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     file = tmp_path / "bench.sqlite"
-    with connect(Settings(database_url=f"sqlite:///{file}"), None, drive=False) as http:
+    with connect(Settings(database_url=f"sqlite:///{file}"), None, drive=True) as http:
         other = sqlite3.connect(file)
         other.execute("CREATE TRIGGER full BEFORE INSERT ON audit BEGIN SELECT RAISE(ABORT, 'no room'); END")
         other.commit()

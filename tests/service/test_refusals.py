@@ -150,7 +150,7 @@ def test_an_orientation_beyond_an_axis_limit_is_shown_in_a_preview_and_refused_a
     (violation,) = preview.json()["violations"]
     assert violation == "station 12 (β=0 γ=200): middle_deg = 200 is outside -190 … 190"
     job = client.http.post("/api/v1/jobs", json={**JOB, "parameters": parameters})
-    assert_field(job, "stations", violation, "axis limit")
+    assert_field(job, "stations", violation, "limit of the bench")
 
 
 def test_the_other_rotation_order_is_refused_with_the_combination_that_it_loses(client: Client) -> None:
