@@ -19,7 +19,9 @@ from bench_service.wall_clock import monotonic_s, now, pause
 
 
 class BenchProcess:
-    """`bench serve` on a database, with its files in a folder."""
+    """`bench serve` on a database, with its files in a folder; `settings` are the environment's, without BENCH_."""
+
+    command = (sys.executable, "-m", "bench_service", "serve")
 
     def __init__(self, database_url: str, port: int, folder: Path, **settings: str) -> None:
         self.environment = {
@@ -35,10 +37,9 @@ class BenchProcess:
         fresh = httpx.Limits(max_keepalive_connections=0)  # the server ends an idle one just when it is used again
         self.client = httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=30, limits=fresh)
 
-    def start(self, command: str = "serve") -> None:
+    def start(self) -> None:
         with self.log.open("ab") as log:
-            arguments = [sys.executable, "-m", "bench_service", command]
-            self.process = subprocess.Popen(arguments, env=self.environment, stdout=log, stderr=log)
+            self.process = subprocess.Popen(self.command, env=self.environment, stdout=log, stderr=log)
         self.until(self._answers, 90)
 
     def _answers(self) -> bool:
@@ -51,6 +52,13 @@ class BenchProcess:
     def kill(self) -> None:
         self.process.send_signal(signal.SIGKILL)
         self.process.wait()
+
+    def terminate(self) -> float:
+        """Ask it to end, which it must do in order; how long that took [s]."""
+        begun = monotonic_s()
+        self.process.send_signal(signal.SIGTERM)
+        assert self.process.wait(30) in (0, -signal.SIGTERM), self.log.read_text()
+        return monotonic_s() - begun
 
     def end(self) -> None:
         """End in order what still lives: the service, and a supervisor that it may have left."""
@@ -75,6 +83,19 @@ class BenchProcess:
 
     def job(self, job_id: str) -> dict[str, Any]:
         return self.client.get(f"/api/v1/jobs/{job_id}").json()
+
+    def station_reached(self, job_id: str, stations: int) -> dict[str, Any]:
+        """The job once it has so many stations, or has ended."""
+        deadline = monotonic_s() + 90
+        while True:
+            job = self.job(job_id)
+            if job["progress"]["station"] >= stations or job["state"] in ("failed", "cancelled", "succeeded"):
+                return job
+            assert monotonic_s() < deadline, job
+            pause(0.005)
+
+    def recordings(self, job_id: str) -> list[dict[str, Any]]:
+        return self.client.get("/api/v1/recordings", params={"job": job_id}).json()["items"]
 
     def state(self) -> DeviceState:
         state = self.register.read()

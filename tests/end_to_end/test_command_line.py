@@ -2,7 +2,6 @@
 
 import json
 import os
-import signal
 import socket
 import subprocess
 import sys
@@ -10,13 +9,12 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
-import httpx
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from bench_service.wall_clock import monotonic_s, pause
+from tests.end_to_end.bench_process import BenchProcess
 
 pytestmark = pytest.mark.timeout(240)
 
@@ -247,57 +245,18 @@ def test_a_truth_file_that_cannot_be_used_is_one_line(
     one_line(bench("run", "no_operation", "--unit", "SIM-0001", **{name: str(file)}), str(file))
 
 
-class Served:
-    """``bench serve`` and a client to it."""
-
-    def __init__(self, folder: Path, port: int) -> None:
-        self.log = folder / "service.log"
-        self.client = httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=10)
-        self._environment = environment(folder, BENCH_PORT=str(port), BENCH_REAL_TIME_FACTOR="400")
-        self.start()
-
-    def start(self) -> None:
-        arguments = [sys.executable, "-m", "bench_service", "serve"]
-        with self.log.open("ab") as log:
-            self.process = subprocess.Popen(arguments, env=self._environment, stdout=log, stderr=log)
-        deadline = monotonic_s() + 60
-        while True:
-            assert self.process.poll() is None, self.log.read_text()
-            assert monotonic_s() < deadline, self.log.read_text()
-            try:
-                if self.client.get("/healthz").is_success:
-                    return
-            except httpx.TransportError:
-                pause(0.05)
-
-    def end(self) -> float:
-        """Ask it to end; how long that took [s]."""
-        begun = monotonic_s()
-        self.process.send_signal(signal.SIGTERM)
-        assert self.process.wait(30) in (0, -signal.SIGTERM), self.log.read_text()
-        return monotonic_s() - begun
-
-    def until(self, job_id: str, stations: int) -> dict[str, Any]:
-        deadline = monotonic_s() + 60
-        while True:
-            job: dict[str, Any] = self.client.get(f"/api/v1/jobs/{job_id}").json()
-            if job["progress"]["station"] >= stations or job["state"] in ("failed", "cancelled", "succeeded"):
-                return job
-            assert monotonic_s() < deadline, job
-            pause(0.01)
-
-
 @pytest.fixture
-def served(tmp_path: Path, free_port: int) -> Generator[Served]:
-    made = Served(tmp_path, free_port)
+def served(tmp_path: Path, free_port: int) -> Generator[BenchProcess]:
+    made = BenchProcess(f"sqlite:///{tmp_path / 'bench.sqlite'}", free_port, tmp_path, real_time_factor="400")
+    made.start()
     yield made
     if made.process.poll() is None:
-        made.end()
+        made.terminate()
     made.client.close()
 
 
 def test_a_second_process_is_kept_off_the_bench_and_the_port_but_may_read(
-    served: Served, bench: Command, free_port: int
+    served: BenchProcess, bench: Command, free_port: int
 ) -> None:
     one_line(bench("serve", BENCH_PORT=str(free_port)), f"port {free_port}", "is taken", "BENCH_PORT")
     one_line(bench("run", "no_operation", "--unit", "SIM-0001"), "bench 'sim'")
@@ -308,16 +267,18 @@ def test_a_second_process_is_kept_off_the_bench_and_the_port_but_may_read(
     assert len(bench("jobs", "--json", "--server", server).json()["items"]) == 1
 
 
-def test_a_service_that_is_asked_to_end_does_so_soon_and_its_job_goes_on_after_the_next_start(served: Served) -> None:
+def test_a_service_that_is_asked_to_end_does_so_soon_and_its_job_goes_on_after_the_next_start(
+    served: BenchProcess,
+) -> None:
     body = {"procedure": "calibration_12_orientations", "unit": "SIM-0001", "seed": 7}
     job = served.client.post("/api/v1/jobs", json=body).json()["id"]
-    served.until(job, 3)
-    assert served.end() < 8.0
+    served.station_reached(job, 3)
+    assert served.terminate() < 8.0
     assert "Traceback" not in served.log.read_text()
     served.start()
-    ended = served.until(job, 13)
+    ended = served.station_reached(job, 13)
     assert (ended["state"], ended["verdict"]) == ("succeeded", "pass"), ended
-    items = served.client.get("/api/v1/recordings", params={"job": job}).json()["items"]
+    items = served.recordings(job)
     assert sorted(r["station"]["index"] for r in items if r["state"] == "complete") == list(range(12))
-    assert served.end() < 8.0
+    assert served.terminate() < 8.0
     assert "Traceback" not in served.log.read_text()
