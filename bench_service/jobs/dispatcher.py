@@ -132,7 +132,6 @@ class Dispatcher:
         if job is None:
             return False
         self._engine.run(job)
-        self._settle()
         return True
 
     def _settle(self) -> None:

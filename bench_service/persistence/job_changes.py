@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import func, select
+from sqlalchemy import bindparam, func, insert, select
 from sqlalchemy.orm import Session
 
 from bench_service.jobs.errors import IllegalTransition, NotFound
@@ -13,11 +13,22 @@ from bench_service.persistence.job_rows import failure_document
 from bench_service.persistence.tables import EventRow, JobRow
 from procedures.core.limits import Verdict
 
+_JOB = select(JobRow).where(JobRow.id == bindparam("id"))
+_LOCKED_JOB = _JOB.with_for_update()
+_EVENTS = EventRow.metadata.tables[EventRow.__tablename__]
+_LAST = select(func.coalesce(func.max(_EVENTS.c.sequence), 0)).where(_EVENTS.c.job_id == bindparam("job"))
+_APPEND = insert(_EVENTS).values(
+    job_id=bindparam("job"),
+    sequence=_LAST.scalar_subquery() + 1,
+    at=bindparam("moment"),
+    kind=bindparam("what"),
+    data=bindparam("document", type_=_EVENTS.c.data.type),
+)
+
 
 def found_job(session: Session, job_id: str, *, lock: bool = False) -> JobRow:
     """The row of a job, locked for this transaction where asked. Raises `NotFound`."""
-    query = select(JobRow).where(JobRow.id == job_id)
-    row = session.scalar(query.with_for_update() if lock else query)
+    row = session.scalar(_LOCKED_JOB if lock else _JOB, {"id": job_id})
     if row is None:
         raise NotFound("job", job_id)
     return row
@@ -61,7 +72,5 @@ def move_job(
 
 def append_event(session: Session, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
     """Add the next event of a job whose row is locked."""
-    last = session.scalar(select(func.max(EventRow.sequence)).where(EventRow.job_id == job_id)) or 0
-    session.add(EventRow(job_id=job_id, sequence=last + 1, at=at, kind=kind, data=data))
-    session.flush()
+    session.execute(_APPEND, {"job": job_id, "moment": at, "what": kind, "document": data})
     announce(session, job_id)

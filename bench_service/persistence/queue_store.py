@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import func, select
+from sqlalchemy import bindparam, func, select
 from sqlalchemy.orm import Session
 
 from bench_service.jobs.errors import IllegalTransition
@@ -19,6 +19,24 @@ from bench_service.persistence.tables_around_jobs import ReservationRow
 
 QUEUED, RUNNING = JobState.QUEUED.value, JobState.RUNNING.value
 _QUEUED_AT = func.coalesce(JobRow.queued_at, JobRow.created_at)
+_OPEN_JOBS = (
+    select(
+        JobRow.id,
+        JobRow.unit,
+        JobRow.priority,
+        _QUEUED_AT,
+        JobRow.attempt,
+        JobRow.not_before,
+        JobRow.reservation,
+        JobRow.state,
+        BenchStopRow.at.label("stopped_at"),
+        BenchStopRow.reason,
+    )
+    .outerjoin(BenchStopRow, BenchStopRow.bench == JobRow.bench)
+    .where(JobRow.bench == bindparam("bench"), JobRow.state.in_((QUEUED, RUNNING)))
+    .order_by(JobRow.priority, _QUEUED_AT, JobRow.id)
+)
+"""Those that wait, in the order of the queue, and the one that runs; each with the stop of its bench."""
 
 
 class SqlQueueStore:
@@ -33,10 +51,9 @@ class SqlQueueStore:
 
     def claim(self, entry: QueueEntry, context: dict[str, Any], at: datetime) -> Job | None:
         with self._database.write() as session:
-            bench = session.scalar(select(JobRow.bench).where(JobRow.id == entry.job)) or ""
-            self._database.one_at_a_time(session, f"claim a job of bench {bench}")
             row = found_job(session, entry.job, lock=True)
-            queue = _look(session, bench, at)
+            self._database.one_at_a_time(session, f"claim a job of bench {row.bench}")
+            queue = _look(session, row.bench, at)
             current = next((e for e in queue.entries if e.job == entry.job and e.attempt == entry.attempt), None)
             if current is None or queue.running is not None or queue.hold(current) is not None:
                 return None
@@ -88,26 +105,13 @@ class SqlQueueStore:
 
 
 def _look(session: Session, bench: str, at: datetime) -> BenchQueue:
-    waiting = session.execute(
-        select(
-            JobRow.id, JobRow.unit, JobRow.priority, _QUEUED_AT, JobRow.attempt, JobRow.not_before, JobRow.reservation
-        )
-        .where(JobRow.bench == bench, JobRow.state == QUEUED)
-        .order_by(JobRow.priority, _QUEUED_AT, JobRow.id)
-    )
-    entries = tuple(QueueEntry(*row) for row in waiting)
-    running = session.scalars(select(JobRow.id).where(JobRow.bench == bench, JobRow.state == RUNNING).limit(1)).first()
+    rows = session.execute(_OPEN_JOBS, {"bench": bench}).all()
+    running = min((row.id for row in rows if row.state == RUNNING), default=None)
+    entries = tuple(QueueEntry(*row[:7]) for row in rows if row.state == QUEUED)
     if not entries:
         return BenchQueue(bench, at, (), running)
-    stop = session.get(BenchStopRow, bench)
-    return BenchQueue(
-        bench,
-        at,
-        entries,
-        running,
-        None if stop is None else BenchStop(stop.bench, stop.at, stop.reason),
-        active_reservations(session, at),
-    )
+    stop = None if rows[0].stopped_at is None else BenchStop(bench, rows[0].stopped_at, rows[0].reason)
+    return BenchQueue(bench, at, entries, running, stop, active_reservations(session, at))
 
 
 def _note_ended_reservation(session: Session, row: JobRow, at: datetime) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import delete, select
+from sqlalchemy import bindparam, delete, select
 from sqlalchemy.orm import Session
 
 from bench_service.formats.chunk import sample_type
@@ -25,6 +25,11 @@ from procedures.core.recording import RawArray, RecordingInfo
 
 _OPEN = RecordingState.OPEN.value
 _COMPLETE = RecordingState.COMPLETE.value
+_OF_JOB = (
+    select(RecordingRow)
+    .where(RecordingRow.job_id == bindparam("job"), RecordingRow.state == _COMPLETE)
+    .order_by(RecordingRow.station_index, RecordingRow.id)
+)
 
 
 @dataclass(frozen=True)
@@ -69,13 +74,8 @@ class SqlRecordingStore:
             return page(session, query, RecordingRow.id, after, limit, stored_of_row)
 
     def of_job(self, job_id: str) -> tuple[StoredRecording, ...]:
-        query = (
-            select(RecordingRow)
-            .where(RecordingRow.job_id == job_id, RecordingRow.state == _COMPLETE)
-            .order_by(RecordingRow.station_index, RecordingRow.id)
-        )
         with self._database.read() as session:
-            return tuple(stored_of_row(row) for row in session.scalars(query))
+            return tuple(stored_of_row(row) for row in session.scalars(_OF_JOB, {"job": job_id}))
 
     def load(self, recording_id: str) -> StoredSamples:
         with self._database.read() as session:

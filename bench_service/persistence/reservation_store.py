@@ -2,7 +2,7 @@
 
 from datetime import datetime
 
-from sqlalchemy import select
+from sqlalchemy import bindparam, select
 from sqlalchemy.orm import Session
 
 from bench_service.jobs.errors import AlreadyReserved, NotFound
@@ -12,6 +12,12 @@ from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.pages import page
 from bench_service.persistence.tables_around_jobs import ReservationRow
+
+_ACTIVE = (
+    select(ReservationRow)
+    .where(ReservationRow.ended_at.is_(None), ReservationRow.until > bindparam("at"))
+    .order_by(ReservationRow.id)
+)
 
 
 class SqlReservationStore:
@@ -62,8 +68,7 @@ class SqlReservationStore:
 
 def active_reservations(session: Session, at: datetime) -> tuple[Reservation, ...]:
     """Every reservation that holds at a moment; few do, so all of them are read."""
-    query = select(ReservationRow).where(ReservationRow.ended_at.is_(None), ReservationRow.until > at)
-    found = (reservation_of_row(row) for row in session.scalars(query.order_by(ReservationRow.id)))
+    found = (reservation_of_row(row) for row in session.scalars(_ACTIVE, {"at": at}))
     return tuple(reservation for reservation in found if reservation.active(at))
 
 

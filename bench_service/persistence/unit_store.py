@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Any
 
 from pydantic import TypeAdapter
-from sqlalchemy import delete, select, update
+from sqlalchemy import bindparam, delete, select, update
 from sqlalchemy.orm import aliased
 
 from bench_service import wall_clock
@@ -45,9 +45,8 @@ class SqlUnitStore:
             session.merge(UnitRow(serial=unit.serial, document=document, updated_at=wall_clock.now()))
 
     def unit(self, serial: str) -> Unit:
-        query = _UNITS.where(UnitRow.serial == serial)
         with self._database.read() as session:
-            row = session.execute(query).one_or_none()
+            row = session.execute(_UNIT, {"serial": serial}).one_or_none()
         if row is None:
             raise NotFound("unit", serial)
         return _unit(*row)
@@ -119,6 +118,8 @@ _UNITS = (
         _CONVERTER, (_CONVERTER.unit == UnitRow.serial) & (_CONVERTER.kind == "converter") & _CONVERTER.is_current
     )
 )
+
+_UNIT = _UNITS.where(UnitRow.serial == bindparam("serial"))
 
 
 def _unit(
