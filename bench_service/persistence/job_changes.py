@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import func, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from bench_service.jobs.errors import IllegalTransition, NotFound
@@ -12,6 +12,9 @@ from bench_service.persistence.database import announce
 from bench_service.persistence.job_rows import failure_document
 from bench_service.persistence.tables import EventRow, JobRow
 from procedures.core.limits import Verdict
+
+CLOCKS_DIFFER_S = 5.0
+"""Clocks of several hosts may differ by this much and nobody set one back [s]."""
 
 
 def found_job(session: Session, job_id: str, *, lock: bool = False) -> JobRow:
@@ -60,8 +63,17 @@ def move_job(
 
 
 def append_event(session: Session, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
-    """Add the next event of a job whose row is locked."""
-    last = session.scalar(select(func.max(EventRow.sequence)).where(EventRow.job_id == job_id)) or 0
-    session.add(EventRow(job_id=job_id, sequence=last + 1, at=at, kind=kind, data=data))
+    """Add the next event of a job whose row is locked.
+
+    Its time is what the clock said. Where that is before the event before it, the event says by how much: the order of
+    events is that of their sequence.
+    """
+    newest = select(EventRow.sequence, EventRow.at).where(EventRow.job_id == job_id)
+    last = session.execute(newest.order_by(EventRow.sequence.desc()).limit(1)).first()
+    sequence, before = last or (0, at)
+    back_s = (before - at).total_seconds()
+    if back_s > CLOCKS_DIFFER_S:
+        data = {**data, "clock_set_back_s": round(back_s, 3)}
+    session.add(EventRow(job_id=job_id, sequence=sequence + 1, at=at, kind=kind, data=data))
     session.flush()
     announce(session, job_id)
