@@ -55,8 +55,8 @@ def serve(
     no_worker: Annotated[bool, typer.Option("--no-worker", help="Drive no bench: workers of the database do")] = False,
 ) -> None:
     """Serve the API and the pages, and run jobs on the bench, until interrupted."""
+    from bench_service.cli.companion import accompanied
     from bench_service.cli.serving import check_port, ready
-    from bench_service.cli.supervising import accompanied
 
     settings = _with(context.obj, host=host, port=port)
     check_port(settings)
@@ -65,7 +65,10 @@ def serve(
             console.print(f"API without a bench of its own at http://{settings.host}:{settings.port}")
             server.run()
         return
-    with ready(settings, level="info") as server, accompanied(settings, lambda: server.started):
+    with (
+        ready(settings, level="info") as server,
+        accompanied(settings, lambda: server.started and not server.should_exit),
+    ):
         console.print(f"bench {settings.bench_id} at http://{settings.host}:{settings.port}")
         server.run()
 
@@ -87,12 +90,15 @@ def supervise(
     context: typer.Context,
     bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
     companion: Annotated[bool, typer.Option(help="End with the process that drives the bench")] = False,
-) -> None:
-    """Watch a bench on its own host, and make it safe where the process that drives it is gone or hangs."""
+) -> int:
+    """Watch a bench on its own host, and make it safe where the process that drives it is gone or hangs.
+
+    Exit code 3: a companion left the bench to another supervisor.
+    """
     from bench_service.cli.supervising import supervise as watch_over
 
     settings = _of_bench(context.obj, bench)
-    watch_over(settings, companion, lambda line: print(line, flush=True))
+    return watch_over(settings, companion, lambda line: print(line, flush=True))
 
 
 @app.command()
@@ -104,9 +110,9 @@ def demo(
     seed: Annotated[int, typer.Option(help="Seed of the calibration's world; the verification takes the next")] = 2,
 ) -> int:
     """Start the service, calibrate and verify the simulated unit through it, show what came out, keep serving."""
+    from bench_service.cli.companion import accompanied
     from bench_service.cli.demo import demonstrate
     from bench_service.cli.serving import check_port, serving
-    from bench_service.cli.supervising import accompanied
 
     settings = _with(context.obj, port=port)
     check_port(settings)

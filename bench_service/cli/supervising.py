@@ -1,17 +1,13 @@
-"""``bench supervise``, and the companion that a driving process starts. Imports no engine, no simulator, no numerics.
+"""``bench supervise``. Imports no engine, no simulator, no numerics.
 
 It has a composition of its own, because that of the service loads what a supervisor must do without.
 """
 
-import os
 import signal
-import subprocess
-import sys
 import threading
-from collections.abc import Callable, Generator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
-from pathlib import Path
 from types import FrameType
 
 from bench_service.cli.logs import set_up
@@ -28,14 +24,15 @@ from bench_service.wall_clock import monotonic_s, pause
 
 TAKE_OVER_S = 2.0
 """How long a companion tries to become the supervisor [s]: one that is about to leave has left by then."""
-LEAVE_S = 2.0
-"""How long a process that ends waits for its companion to see it [s]."""
+SUPERVISED_ALREADY = 3
+"""Exit code of a companion that leaves its bench to another supervisor."""
 
 
-def supervise(settings: Settings, companion: bool, say: Callable[[str], object]) -> None:
-    """Supervise the settings' bench until SIGTERM or SIGINT. Raises `BenchBusy` where it is supervised already.
+def supervise(settings: Settings, companion: bool, say: Callable[[str], object]) -> int:
+    """Supervise the settings' bench until SIGTERM or SIGINT; the exit code. Raises `BenchBusy` where somebody does.
 
-    A companion then leaves it at that: one supervisor looks after every process that drives the bench.
+    A companion then leaves it at that, and ends with `SUPERVISED_ALREADY`: one supervisor looks after every process
+    that drives the bench.
     """
     set_up(settings, "info")
     ending = threading.Event()
@@ -52,7 +49,7 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
             closing.callback(_lock(files, TAKE_OVER_S if companion else 0.0).release)
         except BenchBusy:
             if companion:
-                return
+                return SUPERVISED_ALREADY
             raise
         books = SqlSafetyBooks(settings.database_url, bench)
         closing.callback(books.close)
@@ -60,52 +57,7 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
         devices = RegisteredDevices(DeviceRegister(folder, bench))
         say(f"supervising bench {bench}")
         Supervisor(bench, devices, files, books, take_lease).run(ending, companion)
-
-
-@contextmanager
-def accompanied(settings: Settings, started: Callable[[], bool]) -> Generator[None]:
-    """A supervisor in a process of its own, begun once `started` says so, that outlives the block if it must."""
-    over = threading.Event()
-    made: list[subprocess.Popen[bytes]] = []
-
-    def begin() -> None:
-        while not started():
-            if over.wait(0.05):
-                return
-        made.append(_spawn(settings))
-
-    thread = threading.Thread(target=begin, name="companion", daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
-        for process in made:
-            try:
-                process.wait(LEAVE_S)
-            except subprocess.TimeoutExpired:
-                process.returncode = 0  # it has work left and goes on alone
-
-
-def _spawn(settings: Settings) -> subprocess.Popen[bytes]:
-    folder = settings.devices_in()
-    folder.mkdir(parents=True, exist_ok=True)
-    environment = {
-        **os.environ,
-        "BENCH_DATABASE_URL": settings.database_url,
-        "BENCH_ID": settings.bench_id,
-        "BENCH_DEVICE_FOLDER": str(folder),
-    }
-    with log_of(settings).open("ab") as log:
-        return subprocess.Popen(
-            [sys.executable, "-m", "bench_service", "supervise", "--companion"],
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=log,
-            start_new_session=True,
-        )
+    return 0
 
 
 def _lock(files: HostFiles, patience_s: float) -> SupervisorLock:
@@ -117,8 +69,3 @@ def _lock(files: HostFiles, patience_s: float) -> SupervisorLock:
             if monotonic_s() > deadline:
                 raise
         pause(0.1)
-
-
-def log_of(settings: Settings) -> Path:
-    """Where the companion writes what it has to say."""
-    return settings.devices_in() / f"bench-{settings.bench_id}.supervisor.log"

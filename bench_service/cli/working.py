@@ -7,8 +7,8 @@ from contextlib import ExitStack
 from types import FrameType
 
 from bench_service.app import open_service
+from bench_service.cli.companion import accompanied
 from bench_service.cli.logs import set_up
-from bench_service.cli.supervising import accompanied
 from bench_service.settings import Settings
 
 
@@ -26,7 +26,7 @@ def work(settings: Settings, say: Callable[[str], object]) -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, end)
     started = threading.Event()
-    with accompanied(settings, started.is_set), ExitStack() as closing:
+    with accompanied(settings, lambda: started.is_set() and not ending.is_set()), ExitStack() as closing:
         service = open_service(settings, closing)
         service.begin()
         service.ready()

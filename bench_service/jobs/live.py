@@ -105,8 +105,11 @@ class BenchLive:
         return max(0.0, (at - self.at).total_seconds())
 
     def there(self, at: datetime) -> bool:
-        """Whether somebody drives the bench, as far as can be known from here."""
-        return self.driving and self.seen_s(at) <= SEEN_S
+        """Whether somebody drives the bench, as far as can be known from here.
+
+        A word from later than `SEEN_S` from now is as old as the clock's being set back: who lives says it anew.
+        """
+        return self.driving and abs((at - self.at).total_seconds()) <= SEEN_S
 
 
 class LiveStore(Protocol):

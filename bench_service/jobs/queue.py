@@ -6,12 +6,16 @@ stopped, its bench or unit is reserved by somebody else, its retry is not due) i
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Any, Protocol
 
 from bench_service.jobs.job import Failure, Job
 from bench_service.jobs.reservation import Reservation, Reserved
 from bench_service.jobs.stored import BenchStop
+
+LONGEST_PAUSE_S = 300.0
+"""No retry is put off for longer [s]. One that is due later than that was put off by a clock that was set back since:
+it waits no more."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,8 @@ class BenchQueue:
         for reservation in self._of_others(entry):
             what = f"{reservation.kind.value} {reservation.name}"
             return f"{what} is reserved by {reservation.holder} until {reservation.until.isoformat()}"
-        if entry.not_before is not None and self.at < entry.not_before:
+        latest = self.at + timedelta(seconds=LONGEST_PAUSE_S)
+        if entry.not_before is not None and self.at < entry.not_before <= latest:
             return f"it is tried again at {entry.not_before.isoformat()}"
         return None
 

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
+CAMPAIGN_RUN = "campaign_run"
+"""The label that names the campaign run to which a job belongs."""
+
 
 @dataclass(frozen=True)
 class JobRequest:

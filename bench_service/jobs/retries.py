@@ -3,10 +3,10 @@
 from datetime import timedelta
 
 from bench_service.jobs.job import BENCH_FAULTS, Failure, Job
-from bench_service.jobs.queue import QueueStore
+from bench_service.jobs.queue import LONGEST_PAUSE_S, QueueStore
 from bench_service.wall_clock import now
 
-RETRY_PAUSES_S = (10.0, 30.0, 60.0, 120.0, 300.0)
+RETRY_PAUSES_S = (10.0, 30.0, 60.0, 120.0, LONGEST_PAUSE_S)
 """How long a job waits before its first, second, … retry after a fault of the bench [s]."""
 DATABASE_FAULTS = frozenset({"StorageFailure", "LeaseLost"})
 """Kinds of failure that a restart of the database leaves in a running job."""

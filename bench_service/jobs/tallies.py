@@ -13,7 +13,7 @@ from datetime import datetime, timedelta
 from threading import Lock
 from typing import Protocol
 
-from bench_service.wall_clock import monotonic_s
+from bench_service.wall_clock import monotonic_s, now
 
 OVERLAP = timedelta(seconds=60)
 PAGE = 5000
@@ -74,30 +74,38 @@ class Tallies:
     """The counts of this process, brought up to date at each scrape."""
 
     def __init__(self, store: TallyStore) -> None:
+        self.store = store
+        self.stations = 0
+        self.recorded_bytes = 0
+        self._recorded_at_s: float | None = None
+        self._lock = Lock()
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        """Nothing is counted yet."""
         self.finished: Counter[tuple[str, str, str]] = Counter()
         """(procedure, state, verdict) -> jobs."""
         self.durations: dict[str, Spread] = {}
         """Procedure -> from start to end."""
         self.waits = Spread()
         """From submission to start."""
-        self.stations = 0
-        self.recorded_bytes = 0
-        self.store = store
         self._ended_stations = 0
         self._recent: dict[tuple[str, datetime], None] = {}
         self._newest: datetime | None = None
-        self._recorded_at_s: float | None = None
-        self._lock = Lock()
 
     def update(self) -> None:
         """Count what is new. Raises `StorageFailure`."""
         with self._lock:
+            at = now()
+            if self._newest is not None and at < self._newest - OVERLAP:
+                self._begin_anew()  # the clock was set back: what ends now seems to end before what is counted
             since, after = None if self._newest is None else self._newest - OVERLAP, ""
             while page := self.store.endings(since, after, PAGE):
                 for ending in page:
                     self._count(ending)
                 since, after = page[-1].finished_at, page[-1].job_id
             if self._newest is not None:
+                self._newest = min(self._newest, at)
                 self._recent = {k: None for k in self._recent if k[1] >= self._newest - OVERLAP}
             self.stations = self._ended_stations + self.store.stations_of_open_jobs()
             if self._recorded_at_s is None or monotonic_s() - self._recorded_at_s > RECORDINGS_S:

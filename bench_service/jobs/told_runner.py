@@ -2,12 +2,15 @@
 
 import logging
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 
 from bench_service.jobs.driver import BenchDriver
 from bench_service.jobs.job import Job
 from bench_service.jobs.live import LiveBoard
 from bench_service.jobs.log_context import about
 from bench_service.jobs.planning import Planner
+from bench_service.jobs.queue import QueueEntry
+from bench_service.jobs.request import CAMPAIGN_RUN
 from bench_service.jobs.runner import JobRunner, StepOutcome
 from bench_service.jobs.store import Stores
 from bench_service.jobs.tracing import Found, Traces
@@ -31,9 +34,19 @@ class ToldRunner(JobRunner):
     ) -> None:
         super().__init__(stores, planner, driver, code_version, lease_held, live, retry_scale)
         self._traces = traces
+        self._campaign: tuple[str, str | None] = ("", None)
+        """The job that was begun last, and the campaign run that it belongs to."""
+
+    def claim(self, entry: QueueEntry) -> Job | None:
+        job = super().claim(entry)
+        if job is not None:
+            self._campaign = (job.id, job.labels.get(CAMPAIGN_RUN))
+        return job
 
     def stations(self, job_id: str, attempt: int) -> int:
-        with about(job=job_id, step="begin"):
+        if self._campaign[0] != job_id:  # begun by a process that died
+            self._campaign = (job_id, self._stores.jobs.get(job_id).labels.get(CAMPAIGN_RUN))
+        with self._about(job_id, "begin"):
             count = super().stations(job_id, attempt)
             if count >= 0:
                 log.info("started, attempt %d, %d stations", attempt, count)
@@ -41,7 +54,7 @@ class ToldRunner(JobRunner):
 
     def acquire(self, job_id: str, index: int) -> StepOutcome:
         with (
-            about(job=job_id, step=f"station {index}"),
+            self._about(job_id, f"station {index}"),
             self._traces.part(job_id, f"station {index}", **{"bench.station": index}) as found,
         ):
             outcome = super().acquire(job_id, index)
@@ -49,13 +62,13 @@ class ToldRunner(JobRunner):
             return outcome
 
     def make_safe(self, job_id: str) -> StepOutcome:
-        with about(job=job_id, step="safe"), self._traces.part(job_id, "make safe") as found:
+        with self._about(job_id, "safe"), self._traces.part(job_id, "make safe") as found:
             outcome = super().make_safe(job_id)
             _tell(found, outcome, "bench", "made safe")
             return outcome
 
     def conclude(self, job_id: str) -> StepOutcome:
-        with about(job=job_id, step="conclude"):
+        with self._about(job_id, "conclude"):
             with self._traces.part(job_id, "analysis") as found:
                 outcome = super().conclude(job_id)
                 _tell(found, outcome, "analysis", "done")
@@ -67,10 +80,14 @@ class ToldRunner(JobRunner):
             return outcome
 
     def end_early(self, job_id: str, outcome: StepOutcome) -> Job:
-        with about(job=job_id, step="end"):
+        with self._about(job_id, "end"):
             job = super().end_early(job_id, outcome)
             self._ended(job)
             return job
+
+    def _about(self, job_id: str, step: str) -> AbstractContextManager[None]:
+        known, campaign = self._campaign
+        return about(job=job_id, campaign=campaign if known == job_id else None, step=step)
 
     def _ended(self, job: Job) -> None:
         why = "" if job.failure is None else f": {job.failure.kind}: {job.failure.message}"

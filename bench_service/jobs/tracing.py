@@ -83,7 +83,7 @@ class CollectedTraces(Traces):
             _GIVEN.reset(token)
         if job.failure is not None:
             span.set_status(trace.StatusCode.ERROR, f"{job.failure.kind}: {job.failure.message}")
-        span.end(None if job.finished_at is None else _ns(job.finished_at))
+        span.end(None if job.finished_at is None else max(_ns(job.created_at), _ns(job.finished_at)))
 
     def instrument(self, app: Any) -> None:
         from opentelemetry.instrumentation.fastapi import FastAPIInstrumentor

@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import bindparam, func, insert, select
+from sqlalchemy import bindparam, insert, select
 from sqlalchemy.orm import Session
 
 from bench_service.jobs.errors import IllegalTransition, NotFound
@@ -16,14 +16,15 @@ from procedures.core.limits import Verdict
 _JOB = select(JobRow).where(JobRow.id == bindparam("id"))
 _LOCKED_JOB = _JOB.with_for_update()
 _EVENTS = EventRow.metadata.tables[EventRow.__tablename__]
-_LAST = select(func.coalesce(func.max(_EVENTS.c.sequence), 0)).where(_EVENTS.c.job_id == bindparam("job"))
-_APPEND = insert(_EVENTS).values(
-    job_id=bindparam("job"),
-    sequence=_LAST.scalar_subquery() + 1,
-    at=bindparam("moment"),
-    kind=bindparam("what"),
-    data=bindparam("document", type_=_EVENTS.c.data.type),
+_NEWEST = (
+    select(_EVENTS.c.sequence, _EVENTS.c.at)
+    .where(_EVENTS.c.job_id == bindparam("job"))
+    .order_by(_EVENTS.c.sequence.desc())
+    .limit(1)
 )
+_APPEND = insert(_EVENTS)
+CLOCKS_DIFFER_S = 5.0
+"""Clocks of several hosts may differ by this much and nobody set one back [s]."""
 
 
 def found_job(session: Session, job_id: str, *, lock: bool = False) -> JobRow:
@@ -71,6 +72,14 @@ def move_job(
 
 
 def append_event(session: Session, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
-    """Add the next event of a job whose row is locked."""
-    session.execute(_APPEND, {"job": job_id, "moment": at, "what": kind, "document": data})
+    """Add the next event of a job whose row is locked.
+
+    Its time is what the clock said. Where that is before the event before it, the event says by how much: the order of
+    events is that of their sequence.
+    """
+    sequence, before = session.execute(_NEWEST, {"job": job_id}).first() or (0, at)
+    back_s = (before - at).total_seconds()
+    if back_s > CLOCKS_DIFFER_S:
+        data = {**data, "clock_set_back_s": round(back_s, 3)}
+    session.execute(_APPEND, {"job_id": job_id, "sequence": sequence + 1, "at": at, "kind": kind, "data": data})
     announce(session, job_id)

@@ -76,6 +76,7 @@ class FileLease:
 
     def __init__(self, path: Path, bench_id: str, role: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
+        self._mutex = threading.Lock()
         self._path = path
         self._bench_id = bench_id
         self._role = role
@@ -83,26 +84,32 @@ class FileLease:
 
     def held(self) -> bool:
         """Whether the locked file is still the one that others would lock."""
-        if self._file is None:
-            return False
-        try:
-            there = self._path.stat()
-        except OSError:
-            return False
-        here = os.fstat(self._file)
-        return (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino)
+        with self._mutex:
+            if self._file is None:
+                return False
+            try:
+                there = self._path.stat()
+            except OSError:
+                return False
+            here = os.fstat(self._file)
+            return (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino)
 
     def regain(self) -> bool:
         """Lock the file that is there now, after ours was taken away; False where somebody else was first."""
-        self.release()
-        try:
-            self._file = self._locked()
-        except (BenchBusy, OSError):
-            return False
-        return True
+        with self._mutex:
+            self._drop()
+            try:
+                self._file = self._locked()
+            except (BenchBusy, OSError):
+                return False
+            return True
 
     def release(self) -> None:
         """Give the bench back; a second time does nothing."""
+        with self._mutex:
+            self._drop()
+
+    def _drop(self) -> None:
         if self._file is not None:
             os.close(self._file)
             self._file = None
@@ -110,19 +117,24 @@ class FileLease:
     def _locked(self) -> int:
         """The file, locked, with our process id in it. Raises `BenchBusy`."""
         file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            self._lock(file)
+            os.ftruncate(file, 0)
+            os.pwrite(file, f"{self._role} {os.getpid()}\n".encode(), 0)
+        except BaseException:  # a full disk: an open file that nobody knows would keep the lock from us too
+            os.close(file)
+            raise
+        return file
+
+    def _lock(self, file: int) -> None:
         for again in range(5, -1, -1):
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
+                return
             except BlockingIOError:
                 if not again:
-                    who = _written_holder(file)
-                    os.close(file)
-                    raise _busy(self._bench_id, who) from None
+                    raise _busy(self._bench_id, _written_holder(file)) from None
             wall_clock.pause(0.01)  # it may only be somebody who looks whether it is taken: `lease_holder`
-        os.ftruncate(file, 0)
-        os.pwrite(file, f"{self._role} {os.getpid()}\n".encode(), 0)
-        return file
 
 
 class ServerLease:
@@ -177,10 +189,12 @@ class ServerLease:
     def _locked(self) -> Connection:
         """A connection that has the lock. Raises `BenchBusy`, and the driver's errors."""
         connection = self._engine.connect()
-        if not connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": self._key}):
-            who = holder(connection, self._key)
+        try:
+            if not connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": self._key}):
+                raise _busy(self._bench_id, holder(connection, self._key))
+        except BaseException:
             connection.close()
-            raise _busy(self._bench_id, who)
+            raise
         return connection
 
     def _drop(self) -> None:

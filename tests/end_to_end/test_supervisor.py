@@ -92,3 +92,42 @@ def test_with_worker_and_supervisor_killed_the_next_start_makes_the_bench_safe_f
     devices = ("turntable", "chamber", "current_source", "supply")
     assert first[:5] == ["link.opened", *(f"{device}.make_safe" for device in devices)]
     assert "made safe first" in bench.events(job)
+
+
+@pytest.mark.parametrize("bench", ["sqlite"], indirect=True)
+def test_a_supervisor_that_is_killed_is_replaced_while_its_worker_lives(
+    bench: BenchProcess, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bench.supervised()
+    first = bench.files.supervisor()
+    assert first is not None
+    killed_s = monotonic_s()
+    os.kill(first.pid, signal.SIGKILL)
+    said = lambda: bench.client.get("/api/v1/benches/sim").json()["safety"]["supervisor"]  # noqa: E731
+    bench.until(lambda: said() not in (None, str(first)), 20)
+    with capsys.disabled():
+        print(f"\nfrom the supervisor's kill to the next one {monotonic_s() - killed_s:.3f} s")
+    second = bench.files.supervisor()
+    assert second is not None
+    assert second.alive()
+    assert "was ended by signal 9: started again" in bench.log.read_text()
+    job = bench.submit(seed=7)
+    bench.until(lambda: bench.moving(job), 60)
+    bench.kill()
+    bench.until(lambda: bench.state().safe, 10)
+    assert str(second) in bench.state().by, "the second one does what the first was there for"
+
+
+@pytest.mark.parametrize("bench", ["sqlite"], indirect=True)
+def test_no_supervisor_is_started_beside_one_that_is_there_or_by_a_process_that_ends(bench: BenchProcess) -> None:
+    bench.supervised()
+    keeper = bench.files.supervisor()
+    bench.kill()
+    bench.start()  # its companion finds the first one's at work
+    log = bench.register.journal.path.parent / "bench-sim.supervisor.log"
+    bench.until(lambda: "has another supervisor" in bench.log.read_text(), 20)
+    assert bench.files.supervisor() == keeper
+    assert log.read_text().count("supervising bench") == 1
+    bench.terminate()
+    bench.until(lambda: bench.files.supervisor() is None, 20)
+    assert log.read_text().count("supervising bench") == 1

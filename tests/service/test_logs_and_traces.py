@@ -16,6 +16,7 @@ import pytest
 from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTraceServiceRequest
 
 from bench_service.wall_clock import monotonic_s, pause
+from tests.service.campaigns import add, ended, named, start
 from tests.service.client import FAST, Client
 
 
@@ -119,6 +120,27 @@ def test_every_line_is_json_about_its_job_and_every_job_one_trace(tmp_path: Path
     assert root.start_time_unix_nano <= ours["station 0"].start_time_unix_nano
     requests = [s for s in spans.spans if s.name == "POST /api/v1/jobs"]
     assert len(requests) == 1
+
+
+def test_lines_about_a_campaigns_jobs_name_its_run_and_those_about_other_jobs_none(
+    tmp_path: Path, free_port: int
+) -> None:
+    with process(tmp_path, free_port, BENCH_LOG="json") as (client, file):
+        add(
+            client, named("night", {"parameters": {}}, {"procedure": "calibration_12_orientations", "parameters": FAST})
+        )
+        run = ended(client, start(client, "night")["id"])
+        alone = client.wait(client.submit("no_operation")["id"])
+    lines = [json.loads(line) for line in file.read_text().splitlines()]
+    for step in run["steps"]:
+        about = [line for line in lines if line.get("job") == step["job"]]
+        assert {line.get("campaign") for line in about} == {run["id"]}, about
+        messages = {line["message"] for line in about}
+        assert any(message.endswith("queued") for message in messages), "said by the conductor"
+        assert any(message.startswith("ended as") for message in messages), "said by the worker"
+        queued = next(line for line in about if line["message"].endswith("queued"))
+        assert queued["step"] == step["name"]
+    assert all("campaign" not in line for line in lines if line.get("job") == alone["id"])
 
 
 @pytest.mark.parametrize("there", [True, False], ids=["broken", "absent"])

@@ -121,8 +121,22 @@ def test_a_job_that_runs_is_asked_to_end(stores: Stores, new_job: NewJob) -> Non
     assert [e.kind for e in stores.jobs.events(job.id)] == ["state", "note"]
 
 
+def test_an_event_from_before_the_one_before_says_how_far_the_clock_was_set_back(
+    stores: Stores, new_job: NewJob
+) -> None:
+    job = stores.jobs.add(new_job())
+    begun = job.created_at + 100 * LATER
+    stores.jobs.transition(job.id, JobState.RUNNING, at=begun)
+    for seconds in (-4.0, -7200.0, -7200.0 - 6.0, 0.0):  # clocks of two hosts may differ by a few seconds
+        stores.jobs.note(job.id, "note", begun + timedelta(seconds=seconds), {"at": seconds})
+    events = stores.jobs.events(job.id, after=2)
+    assert [e.data["at"] for e in events] == [-4.0, -7200.0, -7206.0, 0.0]
+    assert [e.data.get("clock_set_back_s") for e in events] == [None, 7196.0, 6.0, None]
+    assert events[1].at == begun - timedelta(hours=2), "what the clock said"
+
+
 def test_a_job_is_put_aside_and_taken_up_again_as_its_next_attempt(stores: Stores, new_job: NewJob) -> None:
-    job = stores.jobs.add(new_job(state=JobState.RUNNING))
+    job = stores.jobs.add(new_job(state=JobState.RUNNING, created_at=now()))
     for _ in range(2):
         assert stores.jobs.request_pause(job.id, now()).pause_requested
     assert stores.jobs.resume(job.id, now()).pause_requested is False  # the wish was taken back

@@ -1,5 +1,7 @@
 """One process drives a bench. Real processes, really killed."""
 
+import errno
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -111,6 +113,23 @@ def test_a_lease_whose_connection_ended_is_lost(postgres_url: str) -> None:
     assert not lease.held()
     assert not lease.held()
     _acquire_soon(postgres_url).release()
+    lease.release()
+
+
+def test_a_lease_that_a_full_disk_kept_from_being_written_can_be_had_when_there_is_room(
+    sqlite_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lease = acquire_lease(sqlite_url, "sim")
+    (tmp_path / "bench-sim.lock").unlink()
+
+    def full(*_: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "pwrite", full)
+        assert not lease.regain()
+    assert lease.regain()
+    assert lease.held()
     lease.release()
 
 

@@ -23,7 +23,8 @@ from bench_service.jobs.errors import (
     StorageFull,
 )
 from bench_service.jobs.job import FINAL, Job, JobState
-from bench_service.jobs.request import JobRequest
+from bench_service.jobs.log_context import about
+from bench_service.jobs.request import CAMPAIGN_RUN, JobRequest
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import StoredResult
 from bench_service.wall_clock import now
@@ -97,11 +98,12 @@ class Conductor:
             run = campaigns.run(run_id)
             if not run.open:
                 return
-            changed = self._changed(run)
-            if changed is None:
-                return
-            if not campaigns.save_run(changed, run.revision):
-                self._abandoned(run, changed)
+            with about(campaign=run.id, step=None if run.current is None else run.steps[run.current].name):
+                changed = self._changed(run)
+                if changed is None:
+                    return
+                if not campaigns.save_run(changed, run.revision):
+                    self._abandoned(run, changed)
 
     def _work(self) -> None:
         busy = False
@@ -166,7 +168,7 @@ class Conductor:
     def _submitted(self, run: CampaignRun, index: int) -> Job:
         step, wanted = run.step_of(index), run.steps[index]
         labels = {**run.campaign.labels, **run.labels}
-        labels |= {"campaign": run.campaign.name, "campaign_run": run.id, "step": step.name}
+        labels |= {"campaign": run.campaign.name, CAMPAIGN_RUN: run.id, "step": step.name}
         request = JobRequest(
             procedure=step.does,
             unit=run.unit,

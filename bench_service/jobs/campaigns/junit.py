@@ -107,7 +107,8 @@ def _sentence(check: Check) -> str:
 
 
 def _seconds(begun: datetime | None, ended: datetime | None) -> float:
-    return 0.0 if begun is None or ended is None else (ended - begun).total_seconds()
+    """By the wall clock; 0 where it was set back meanwhile, because readers take no negative time."""
+    return 0.0 if begun is None or ended is None else max(0.0, (ended - begun).total_seconds())
 
 
 def _text(text: str) -> str:
