@@ -92,6 +92,10 @@ class SimulatedBench(Bench):
             "current_source": None if self.current_source is None else self.current_source.checkpoint(),
         }
 
+    def lost_links(self) -> frozenset[str]:
+        """Devices that do not answer any more, and never will."""
+        return frozenset({"chamber"}) if self.chamber is not None and self.chamber.link_lost else frozenset()
+
     def true_calibration(self) -> dict[str, tuple[Array, Array]]:
         """Triad -> (bias (3,) [rate], K (3, 3)) of the present launch, of the first one before any."""
         return launch_truth(self.config, max(1, self.supply.launches))

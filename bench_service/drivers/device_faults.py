@@ -7,8 +7,9 @@ from random import Random
 from threading import Event
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from bench_service.drivers.device_cables import DeviceCables
 from bench_service.jobs.errors import Misconfigured
 from procedures.bench.errors import DeviceFault, Disconnected
 
@@ -23,10 +24,19 @@ class FaultRule(BaseModel):
 
     verb: str = Field(min_length=1)
     """As in the devices' journal, with wildcards: "turntable.move_to", "supply.*", "imu.block" (each block)."""
-    kind: Literal["hang", "disconnect", "fault"]
-    """No answer at all (the thread that asked is lost, as in a vendor's library), no link, or a fault of the device."""
+    kind: Literal["hang", "disconnect", "fault", "lost"]
+    """No answer at all (the thread that asked is lost, as in a vendor's library), a link that a new one replaces, a
+    fault of the device, or a link that is lost: a new one does not come about before the cable is plugged in again."""
     probability: float = Field(gt=0.0, le=1.0)
     """Each time that the verb begins."""
+    lasts_s: float | None = Field(None, gt=0.0)
+    """Of a lost link: for how long [s, real time]; None: until a person deletes its file (see `device_cables`)."""
+
+    @model_validator(mode="after")
+    def _only_a_lost_link_lasts(self) -> "FaultRule":
+        if self.lasts_s is not None and self.kind != "lost":
+            raise ValueError(f"lasts_s is said of a lost link, not of kind {self.kind!r}")
+        return self
 
 
 class FaultPlan(BaseModel):
@@ -56,9 +66,10 @@ class FaultPlan(BaseModel):
 class DeviceFaults:
     """The faults of one opening of the devices; every opening has chances of its own, the same in each exercise."""
 
-    def __init__(self, plan: FaultPlan, opening: str) -> None:
+    def __init__(self, plan: FaultPlan, opening: str, cables: DeviceCables) -> None:
         self._rules = plan.rules
         self._chance = Random(f"{plan.seed} {opening}")
+        self._cables = cables
 
     def strike(self, verb: str, arguments: Mapping[str, Any]) -> None:
         """Let happen what happens as a verb begins. Raises `DeviceFault`, `Disconnected`, or does not return."""
@@ -68,4 +79,8 @@ class DeviceFaults:
                     Event().wait(HANG_S)
                 if rule.kind == "fault":
                     raise DeviceFault(f"{verb} {json.dumps(dict(arguments))}: a fault put in for an exercise")
+                if rule.kind == "lost":
+                    device = verb.partition(".")[0]
+                    self._cables.cut(device, "put in for an exercise", rule.lasts_s)
+                    self._cables.need(device)
                 raise Disconnected(f"{verb}: no link, put in for an exercise")

@@ -16,6 +16,7 @@ from threading import Lock
 from typing import Any
 
 from bench_service import wall_clock
+from bench_service.drivers.device_cables import DeviceCables
 from bench_service.drivers.device_journal import DeviceJournal
 from bench_service.jobs.devices import DeviceState
 from bench_service.jobs.processes import ProcessIdentity
@@ -28,12 +29,13 @@ TRIES = 50
 
 
 class DeviceRegister:
-    """State and journal of one bench's devices, in two files of a folder on the bench's host."""
+    """State, journal and lost links of one bench's devices, in files of a folder on the bench's host."""
 
     def __init__(self, folder: Path, bench_id: str) -> None:
         self.bench_id = bench_id
         self.path = folder / f"bench-{bench_id}.devices"
         self.journal = DeviceJournal(folder / f"bench-{bench_id}.journal")
+        self.cables = DeviceCables(folder, bench_id)
 
     def read(self) -> DeviceState | None:
         """The devices' state, without their link; None where no process of this host ever had it."""

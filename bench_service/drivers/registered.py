@@ -1,34 +1,60 @@
 """A bench whose devices are remembered in a register: what is asked of them is noted before they are asked."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
+from bench_service.drivers.device_cables import DeviceCables
 from bench_service.drivers.device_faults import DeviceFaults
 from bench_service.drivers.device_register import DeviceLink, DeviceRegister
 from bench_service.jobs.devices import AT_REST, MOVING, DeviceState
 from bench_service.jobs.observed import ObservedBench
 from procedures.bench import Bench
-from procedures.bench.errors import OutOfRange
+from procedures.bench.errors import Disconnected, OutOfRange
 
 READS = frozenset({"turntable.read_angles", "turntable.is_moving", "supply.is_on", "chamber.read"})
 """Verbs that change nothing: not noted."""
 REMEMBERED = ("table", "powered", "chamber_target_c", "current_ma")
 """What a demand changes as soon as it is made, and a refused one did not."""
+SAFE: dict[str, Callable[[DeviceState], dict[str, Any]]] = {
+    "turntable": lambda _: {"table": AT_REST, "angles_deg": None},
+    "chamber": lambda state: {"chamber_target_c": state.chamber_ambient_c},
+    "current_source": lambda _: {"current_ma": 0.0},
+    "supply": lambda _: {"powered": False},
+}
+"""What a device is once it is made safe, in the order in which that is done."""
+LOST = "as the bench's truth file has it"
+"""Why a link is lost that neither a person nor an exercise has lost."""
 
 
 class RegisterObserver:
-    """Turns verbs into the state that real devices would have."""
+    """Turns verbs into the state that real devices would have, and keeps them from devices whose link is lost."""
 
-    def __init__(self, link: DeviceLink, faults: DeviceFaults | None, devices: frozenset[str]) -> None:
+    def __init__(
+        self,
+        link: DeviceLink,
+        cables: DeviceCables,
+        faults: DeviceFaults | None,
+        devices: frozenset[str],
+        lost: Callable[[], frozenset[str]],
+    ) -> None:
+        """`devices`: that are made safe; `lost`: those whose link the simulation has lost by now."""
         self._link = link
+        self._cables = cables
         self._faults = faults
+        self._lost = lost
+        self._cut: frozenset[str] = frozenset()
         self._not_safe = set(devices)
+        self._refusals: dict[str, str] = {}
         self._arguments: dict[str, Mapping[str, Any]] = {}
         self._before = link.state
 
     def begin(self, verb: str, arguments: Mapping[str, Any]) -> None:
-        """Note a demand before the device has it: a crash in between leaves the bench thought less safe than it is."""
+        """Note a demand before the device has it: a crash in between leaves the bench thought less safe than it is.
+
+        Raises `Disconnected` where it cannot reach the device.
+        """
         if verb in READS:
+            self._reach(verb)
             return
         self._before = self._link.state
         self._arguments[verb] = arguments
@@ -42,11 +68,13 @@ class RegisterObserver:
         elif verb == "current_source.set_current":
             changes = {"current_ma": arguments["current_ma"]}
         self._link.note(verb, dict(arguments), **changes)
+        self._reach(verb)
         if self._faults is not None:
             self._faults.strike(verb, arguments)
 
     def end(self, verb: str, failure: BaseException | None) -> None:
         """Note what became of a demand. One that was refused before anything moved changed nothing."""
+        self._notice_losses()
         if verb in READS:
             return
         device, _, action = verb.partition(".")
@@ -55,34 +83,46 @@ class RegisterObserver:
             return
         changes: dict[str, Any] = {}
         if action == "make_safe":
-            changes = {"fault": f"{device}: {failure}"}
+            self._refusals[device] = f"{device}: {failure}"
+            changes = {"fault": "; ".join(self._refusals.values())}
         elif isinstance(failure, OutOfRange):
             changes = {name: getattr(self._before, name) for name in REMEMBERED}
         self._note_quietly(f"{verb}.failed", {"error": f"{type(failure).__name__}: {failure}"}, changes)
 
     def asked(self, device: str) -> None:
         """A block is wanted: not noted, there are too many."""
+        self._reach(f"{device}.block")
         if self._faults is not None:
             self._faults.strike(f"{device}.block", {})
 
-    def heard(self, device: str) -> None: ...
+    def heard(self, device: str) -> None:
+        self._notice_losses()
+
+    def _reach(self, verb: str) -> None:
+        self._notice_losses()
+        self._cables.need(verb.partition(".")[0])
+
+    def _notice_losses(self) -> None:
+        """What the simulation has lost is lost for whoever comes after it, too: even if nobody asked the device."""
+        fresh = self._lost() - self._cut
+        for device in fresh:
+            self._cables.cut(device, LOST)
+        self._cut |= fresh
 
     def _done(self, device: str, action: str) -> dict[str, Any]:
         changes: dict[str, Any] = {}
-        if device == "turntable" and action in ("move_to", "settle", "make_safe"):
+        if action == "make_safe":
+            changes = SAFE[device](self._link.state)
+            self._not_safe.discard(device)
+            self._refusals.pop(device, None)
+            if not self._not_safe:
+                changes["fault"] = ""
+        elif device == "turntable" and action in ("move_to", "settle"):
             changes = {"table": AT_REST, "angles_deg": None}
             if action == "move_to":
                 changes["angles_deg"] = tuple(self._arguments["turntable.move_to"]["angles_deg"])
-        elif device == "supply" and action in ("switch_off", "make_safe"):
-            changes = {"powered": False}
-        elif device == "chamber" and action == "make_safe":
-            changes = {"chamber_target_c": self._link.state.chamber_ambient_c}
-        elif device == "current_source" and action == "make_safe":
-            changes = {"current_ma": 0.0}
-        if action == "make_safe":
-            self._not_safe.discard(device)
-            if not self._not_safe:
-                changes["fault"] = ""
+        elif (device, action) == ("supply", "switch_off"):
+            changes = SAFE["supply"](self._link.state)
         return changes
 
     def _note_quietly(self, verb: str, arguments: dict[str, Any], changes: dict[str, Any]) -> None:
@@ -94,10 +134,18 @@ class RegisterObserver:
 class RegisteredBench(ObservedBench):
     """A bench with the devices' link: as long as it is open, nobody else commands them."""
 
-    def __init__(self, bench: Bench, link: DeviceLink, faults: DeviceFaults | None = None) -> None:
+    def __init__(
+        self,
+        bench: Bench,
+        link: DeviceLink,
+        cables: DeviceCables,
+        faults: DeviceFaults | None = None,
+        lost: Callable[[], frozenset[str]] = frozenset,
+    ) -> None:
+        """`lost`: which devices' links the simulation has lost by now."""
         devices = {"turntable", "supply"}
         devices |= {name for name in ("chamber", "current_source") if getattr(bench, name) is not None}
-        super().__init__(bench, RegisterObserver(link, faults, frozenset(devices)))
+        super().__init__(bench, RegisterObserver(link, cables, faults, frozenset(devices), lost))
         self._link = link
 
     def close(self) -> None:
@@ -116,16 +164,31 @@ class RegisteredDevices:
         return self._register.read()
 
     def make_safe(self, by: str) -> DeviceState:
-        """Stop, lead to ambient, switch off. The simulated table of a dead process stops at once: where, is unknown."""
+        """Stop, lead to ambient, switch off. The simulated table of a dead process stops at once: where, is unknown.
+
+        A device whose link is lost stays as it is, and keeps no other from being made safe. The job whose demands are
+        undone stays known until the next one.
+        """
         state = self._register.read()
         if state is not None and state.safe:
             return state
-        link = self._register.open(by)
+        link = self._register.open(by, None if state is None else state.job)
         try:
-            link.note("turntable.make_safe", {}, table=AT_REST, angles_deg=None)
-            link.note("chamber.make_safe", {}, chamber_target_c=link.state.chamber_ambient_c)
-            link.note("current_source.make_safe", {}, current_ma=0.0)
-            link.note("supply.make_safe", {}, powered=False, fault="")
+            failures = [failure for device in SAFE if (failure := self._make_safe(link, device)) is not None]
+            fault = "; ".join(map(str, failures))
+            link.note(f"bench.make_safe.{'failed' if fault else 'done'}", {}, fault=fault)
+            if failures:
+                raise ExceptionGroup("the bench could not be made safe", failures)
             return link.state
         finally:
             link.close()
+
+    def _make_safe(self, link: DeviceLink, device: str) -> Disconnected | None:
+        """Make one device safe; why it could not be reached."""
+        try:
+            self._register.cables.need(device)
+        except Disconnected as lost:
+            link.note(f"{device}.make_safe.failed", {"error": str(lost)})
+            return lost
+        link.note(f"{device}.make_safe", {}, **SAFE[device](link.state))
+        return None

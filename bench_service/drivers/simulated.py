@@ -117,8 +117,9 @@ class SimulatedDriver:
         link = self._register.open(job=job)
         chamber = self.description.chamber
         link.note("bench.opened", {"unit": unit}, chamber_ambient_c=None if chamber is None else chamber.ambient_c)
-        faults = None if self._faults is None else DeviceFaults(self._faults, f"{job} {link.openings}")
-        return self._asked(RegisteredBench(bench, link, faults), job)
+        cables = self._register.cables
+        faults = None if self._faults is None else DeviceFaults(self._faults, f"{job} {link.openings}", cables)
+        return self._asked(RegisteredBench(bench, link, cables, faults, bench.lost_links), job)
 
     def _asked(self, bench: Bench, job: str | None) -> Bench:
         """The bench with a person before the operator that it shows; the world within keeps its own."""

@@ -140,8 +140,9 @@ class Dispatcher:
         if job is None or self._ending.is_set():
             return
         found = self._engine.unfinished(job)
-        if found.alive:
-            return
+        now_running = self._stores.queue.running(self._bench_id)
+        if found.alive or now_running is None or (now_running.id, now_running.attempt) != (job.id, job.attempt):
+            return  # it goes on, or it came to its end or back into the queue between the two looks
         if found.gone is None:
             never = Failure("NeverBegan", "the service ended after it had chosen this job and before it began")
             self._stores.queue.requeue(job.id, now(), None, never, spend=False)

@@ -208,7 +208,8 @@ class JobRunner:
         except BenchError as error:
             return self._not_safe(job_id, f"{why}; then: {error}" if why else str(error))
         except ExceptionGroup as group:
-            return self._not_safe(job_id, "; ".join([*([why] if why else []), *map(str, group.exceptions)]))
+            again = [text for text in map(str, group.exceptions) if text not in why]
+            return self._not_safe(job_id, "; ".join([*([why] if why else []), *again]))
         if why:
             self._stores.jobs.note(job_id, "note", now(), {"text": f"the bench was made safe over a new link: {why}"})
         return StepOutcome()

@@ -138,10 +138,12 @@ def _here(bench_id: str, state: DeviceState, worker: ProcessIdentity | None, sup
     if state.safe:
         return "The devices are safe: the table is at rest, the unit is off."
     unsafe = f"The devices are not safe: {', '.join(state.unsafe)}."
-    if worker is not None:
+    if worker is not None and state.linked:
         return f"{unsafe} The worker, {worker}, drives them."
     if supervisor is not None:
         return f"{unsafe} Nobody drives them; the supervisor, {supervisor}, makes them safe."
+    if worker is not None:
+        return f"{unsafe} The worker, {worker}, has given them up; a release tries again."
     return (
         f"{unsafe} On this host neither a worker nor a supervisor of bench {bench_id!r} is alive: start one, or use "
         "the hardware emergency stop."

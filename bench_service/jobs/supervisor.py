@@ -1,8 +1,8 @@
 """The supervisor of a bench: a process that outlives the worker, and makes the bench safe where the worker cannot.
 
 It looks at three things: which process drives the bench and whether it lives, what the devices last said of themselves,
-and whether a person has stopped the bench. It starts nothing again; it never commands a device while the
-process that drives the bench lives, but it ends one that does not answer a stop.
+and whether a person has stopped the bench. It starts nothing again. While the process that drives the bench lives, it
+ends one that does not answer a stop, and commands the devices only of a stopped bench whose link was given back.
 """
 
 import logging
@@ -85,7 +85,10 @@ class Supervisor:
         self._told_not_safe = False
         self._next_stop_look_s = 0.0
         self._next_try_s = 0.0
+        self._first_try_s: float | None = None
+        """Of devices that could not be made safe so far."""
         self._unanswered_since_s: float | None = None
+        self._left_since_s: float | None = None
         self._gone_since_s: float | None = None
         self._looked_s = monotonic_s()
 
@@ -100,12 +103,15 @@ class Supervisor:
         now_s = monotonic_s()
         driving, state = self._watch.driving(), self._devices.device_state()
         alive = driving is not None and driving.alive
+        if state is not None and state.safe:  # whoever made it so
+            self._told_not_safe, self._first_try_s = False, None
         self._look_for_stop(now_s, state)
         if alive:
             self._gone_since_s = None
             self._look_for_hang(now_s, driving, state)
+            self._look_for_left(now_s, state)
         else:
-            self._unanswered_since_s = None
+            self._unanswered_since_s = self._left_since_s = None
             self._gone_since_s = now_s if self._gone_since_s is None else self._gone_since_s
             if state is not None and not state.safe and now_s >= self._next_try_s:
                 self._rescue(now_s, driving, state)
@@ -139,8 +145,8 @@ class Supervisor:
             log.warning("the database does not answer the supervisor of bench %s: %s", self._bench_id, error)
 
     def _look_for_hang(self, now_s: float, driving: Driving | None, state: DeviceState | None) -> None:
-        """A worker that lives, is told to stop, and leaves the bench unsafe, does not answer."""
-        if not self._stopped or state is None or state.safe:
+        """A worker that lives, is told to stop, has the devices' link and leaves them unsafe, does not answer."""
+        if not self._stopped or state is None or state.safe or not state.linked:
             self._unanswered_since_s = None
             return
         if self._unanswered_since_s is None:
@@ -150,33 +156,47 @@ class Supervisor:
             self._say(f"{driving.process} left a stop unanswered for {self._hung_s:g} s ({unsafe}): killed", state.job)
             self._unanswered_since_s = None
 
+    def _look_for_left(self, now_s: float, state: DeviceState | None) -> None:
+        """A worker that lives and has given the link of devices back that could not be made safe does nothing more."""
+        if not self._stopped or state is None or state.safe or state.linked:
+            self._left_since_s = None
+        elif self._left_since_s is None:
+            self._left_since_s = now_s
+        elif now_s - self._left_since_s > AGAIN_S and now_s >= self._next_try_s:
+            self._try(now_s, "the bench is stopped", state)
+
     def _rescue(self, now_s: float, driving: Driving | None, state: DeviceState) -> None:
         """Nobody drives the bench, and it is not safe."""
-        who = f"{driving.process} is gone" if driving is not None else "nobody drives the bench"
         lease = self._lease_within(LEASE_S)
         again = self._watch.driving()
         try:
-            if again is not None and again.alive:  # somebody took the bench this moment, and makes it safe himself
-                return
+            if again is None or not again.alive:  # else somebody took the bench this moment, and makes it safe himself
+                self._try(now_s, f"{driving.process} is gone" if driving else "nobody drives the bench", state)
+        finally:
+            if lease is not None:
+                lease.release()
+        self._next_stop_look_s = 0.0
+
+    def _try(self, now_s: float, why: str, state: DeviceState) -> None:
+        """Make the devices safe over their own link, and say so; where that fails, try again later."""
+        try:
             self._devices.make_safe(self._by)
         except DeviceBusy as busy:
             log.warning("bench %s: %s", self._bench_id, busy)
             self._next_try_s = now_s + AGAIN_S
         except (BenchError, ExceptionGroup) as failure:
             self._next_try_s = now_s + AGAIN_S
+            self._first_try_s = now_s if self._first_try_s is None else self._first_try_s
             self._not_safe(failure, state)
         else:
-            self._told_not_safe = False
-            safe_s = monotonic_s()
-            self._say(
-                f"{who}, and {' and '.join(state.unsafe)}: made safe by the supervisor {safe_s - now_s:.3f} s after "
-                f"it noticed, at most {safe_s - self._looked_s:.3f} s after that end",
-                state.job,
-            )
-        finally:
-            if lease is not None:
-                lease.release()
-        self._next_stop_look_s = 0.0
+            safe_s, unsafe = monotonic_s(), " and ".join(state.unsafe)
+            if self._first_try_s is not None:
+                how = f"at last, {safe_s - self._first_try_s:.3f} s after its first try"
+            else:
+                how = f"{safe_s - now_s:.3f} s after it noticed"
+                how += "" if self._left_since_s else f", at most {safe_s - self._looked_s:.3f} s after that end"
+            self._say(f"{why}, and {unsafe}: made safe by the supervisor {how}", state.job)
+            self._told_not_safe, self._first_try_s = False, None
 
     def _not_safe(self, failure: Exception, state: DeviceState) -> None:
         """Nothing else may run on it until a person has looked. Said once, tried again and again."""

@@ -136,8 +136,13 @@ class SimChamber:
         """What the unit's outputs make of node temperatures (n, 8)."""
         return response(self.unit, temperatures_c)
 
+    @property
+    def link_lost(self) -> bool:
+        """Whether nobody reaches it any more, whatever it does."""
+        return any(f.name == "link_lost" and f.from_s <= self._now_s() for f in self.faults)
+
     def _need_link(self) -> None:
-        if any(f.name == "link_lost" and f.from_s <= self._now_s() for f in self.faults):
+        if self.link_lost:
             raise Disconnected("the chamber does not answer")
 
     def checkpoint(self) -> dict[str, Any]:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from bench_service.wall_clock import monotonic_s
+from bench_service.jobs.supervisor import HUNG_S
+from bench_service.wall_clock import monotonic_s, pause
 from tests.end_to_end.bench_process import BenchProcess, one_master_at_a_time
 
 pytestmark = pytest.mark.timeout(240)
@@ -131,3 +132,32 @@ def test_no_supervisor_is_started_beside_one_that_is_there_or_by_a_process_that_
     bench.terminate()
     bench.until(lambda: bench.files.supervisor() is None, 20)
     assert log.read_text().count("supervising bench") == 1
+
+
+def test_killed_with_a_cable_out_the_rest_is_made_safe_and_the_bench_waits_for_the_cable(bench: BenchProcess) -> None:
+    bench.supervised()
+    job = bench.submit(seed=7)
+    bench.until(lambda: bench.moving(job), 60)
+    bench.register.cables.cut("supply", "")
+    bench.kill()
+    bench.until(lambda: bench.state().table == "at rest", 10)
+    bench.until(lambda: "cannot be reached" in bench.state().fault, 10)
+    assert bench.state().powered
+    supervisor = bench.files.supervisor()
+    bench.start()  # it cannot reach it either
+    bench.until(lambda: bench.client.get("/api/v1/benches/sim").json()["state"] == "stopped", 20)
+    refused = bench.client.post("/api/v1/benches/sim/release")
+    assert refused.status_code == 409, refused.text
+    lost = "could not be made safe: the supply cannot be reached: its link is lost"
+    assert refused.json()["detail"] == f"bench 'sim' is not released: {lost}"
+    pause(HUNG_S + 1.0)
+    assert bench.process.poll() is None, "killed for a cable that is out"
+    view = bench.client.get("/api/v1/benches/sim").json()
+    assert (view["state"], view["safety"]["safe"]) == ("stopped", False)
+    bench.register.cables.file("supply").unlink()
+    bench.until(lambda: bench.state().safe, 10)
+    assert "the supervisor" in bench.state().by
+    assert bench.files.supervisor() == supervisor
+    released = bench.client.post("/api/v1/benches/sim/release")
+    assert released.status_code == 200, released.text
+    bench.until(lambda: "made safe by the supervisor at last" in bench.events(job), 10)

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from bench_service.drivers.device_cables import DeviceCables
 from bench_service.drivers.device_faults import DeviceFaults, FaultPlan
 from bench_service.drivers.device_journal import KEPT, ROTATE_BYTES
 from bench_service.drivers.device_register import DeviceRegister
@@ -220,6 +221,7 @@ def test_a_full_disk_costs_lines_of_the_journal_and_no_state(small_disk: Path) -
         ("hang", "no JSON"),
         ('{"rules": [{"verb": "*", "kind": "hang", "probability": 1.5}]}', "rules.0.probability = 1.5"),
         ('{"rules": [{"verb": "*", "kind": "melt", "probability": 0.5}]}', "rules.0.kind = 'melt'"),
+        ('{"rules": [{"verb": "*", "kind": "hang", "probability": 0.5, "lasts_s": 2}]}', "lasts_s is said of a lost"),
         ('{"seed": 1}', "rules"),
         ("[1]", "valid dictionary"),
     ],
@@ -236,7 +238,7 @@ def test_faults_come_as_often_as_said_and_the_same_again(tmp_path: Path) -> None
     plan = FaultPlan.parse(json.dumps({"seed": 3, "rules": rules}))
 
     def struck(opening: str, verb: str) -> list[bool]:
-        faults, found = DeviceFaults(plan, opening), []
+        faults, found = DeviceFaults(plan, opening, DeviceCables(tmp_path, "sim")), []
         for _ in range(2000):
             try:
                 faults.strike(verb, {})

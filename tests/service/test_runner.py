@@ -1,15 +1,17 @@
 """Steps of a job that end badly: the lease is lost, the bench cannot be made safe, the engine does not start."""
 
 from collections.abc import Callable, Generator
+from datetime import timedelta
+from threading import Event
 from typing import Any
 
 import pytest
 
 from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
 from bench_service.jobs.directory import BenchDirectory
-from bench_service.jobs.dispatcher import Unfinished
+from bench_service.jobs.dispatcher import Dispatcher, Unfinished
 from bench_service.jobs.errors import NotReady
-from bench_service.jobs.job import Job, JobState
+from bench_service.jobs.job import Failure, Job, JobState
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.request import JobRequest
 from bench_service.jobs.runner import JobRunner
@@ -18,7 +20,7 @@ from bench_service.jobs.service import BenchService
 from bench_service.jobs.store import Stores
 from bench_service.jobs.worker import Worker
 from bench_service.persistence import open_stores
-from bench_service.wall_clock import now
+from bench_service.wall_clock import now, pause
 from procedures.bench import Bench, BenchNeeds
 from procedures.bench.errors import DeviceFault
 from tests.service.client import FAST
@@ -48,6 +50,18 @@ class IdleDispatcher:
         return True
 
     def shut_down(self) -> None: ...
+
+
+class SureLease:
+    """A lease that is never lost."""
+
+    def held(self) -> bool:
+        return True
+
+    def regain(self) -> bool:
+        return True
+
+    def release(self) -> None: ...
 
 
 class NoWatch:
@@ -154,3 +168,24 @@ def test_an_engine_that_does_not_start_is_told_to_whoever_needs_it(stores: Store
     with pytest.raises(NotReady, match="did not start: no books"):
         service.ready()
     service.stop()
+
+
+def test_a_job_that_was_queued_again_while_the_dispatcher_looked_stays_queued(stores: Stores) -> None:
+    """What a recovered workflow does in its own thread: the job first goes back into the queue, then it is done."""
+    runner, job = prepared(stores, SimulatedDriver("sim"), lambda: True)
+    asked = Event()
+
+    class EndingEngine(IdleEngine):
+        def unfinished(self, job: Job) -> Unfinished:
+            if not asked.is_set():
+                why = Failure("Disconnected", "a test")
+                stores.queue.requeue(job.id, now(), now() + timedelta(hours=1), why, spend=False)
+            asked.set()
+            return Unfinished(gone=Failure("EngineGaveUp", "the job engine ended this job as SUCCESS"))
+
+    dispatcher = Dispatcher("sim", stores, runner, EndingEngine(), SureLease(), 0.05)
+    dispatcher.begin()
+    assert asked.wait(20)
+    pause(0.5)
+    dispatcher.shut_down()
+    assert stores.jobs.get(job.id).state is JobState.QUEUED

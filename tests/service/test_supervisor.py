@@ -209,6 +209,64 @@ def test_devices_that_do_not_obey_stop_the_bench_once_and_are_tried_again(tmp_pa
     assert books.is_stopped, "a person must look, though it obeyed in the end"
 
 
+def until_safe(supervisor: Supervisor, folder: Path) -> None:
+    deadline = monotonic_s() + 20
+    while not state(folder).safe and monotonic_s() < deadline:
+        assert supervisor.look(companion=True), "left a bench that is not safe"
+        pause(0.05)
+    assert state(folder).safe
+
+
+def test_a_device_whose_link_is_lost_keeps_the_bench_stopped_and_is_made_safe_once_it_is_back(tmp_path: Path) -> None:
+    register, books = abandoned(tmp_path, "job-1"), Books()
+    register.cables.cut("supply", "")
+    supervisor = Supervisor("sim", RegisteredDevices(register), Watch(GONE), books, Lease().take)
+    for _ in range(3):
+        assert supervisor.look(companion=True)
+        pause(1.1)
+    left = state(tmp_path)
+    assert (left.table, left.powered, left.safe) == ("at rest", True, False)
+    assert [line for line in books.said if "stopped" in line] == [
+        "stopped: could not be made safe: the supply cannot be reached: its link is lost"
+    ]
+    register.cables.file("supply").unlink()
+    until_safe(supervisor, tmp_path)
+    supervisor.look()
+    assert "made safe by the supervisor at last, " in books.said[-1]
+    assert len(books.said) == 3, books.said
+
+
+def test_a_worker_that_could_not_reach_a_device_is_not_killed_and_its_stopped_bench_tried_again(
+    tmp_path: Path, worker: subprocess.Popen[bytes]
+) -> None:
+    """What a worker does: it takes the link, fails, gives the link back, stops the bench, and lives."""
+    register, books, lease = abandoned(tmp_path, "job-1"), Books(), Lease()
+    devices = RegisteredDevices(register)
+    register.cables.cut("turntable", "")
+    with pytest.raises(ExceptionGroup):
+        devices.make_safe("the worker")
+    before = register.journal.entries()
+    supervisor = Supervisor("sim", devices, Watch(Driving(identity(worker))), books, lease.take, hung_s=0.3)
+    for _ in range(15):
+        supervisor.look()
+        pause(0.1)
+    assert register.journal.entries() == before, "a living worker's bench was commanded, and nobody had stopped it"
+    books.is_stopped = True
+    for _ in range(30):
+        supervisor.look()
+        pause(0.1)
+    assert worker.poll() is None, "killed for a cable that is out"
+    assert register.journal.entries()[len(before) :], "not tried again"
+    assert not state(tmp_path).safe
+    register.cables.file("turntable").unlink()
+    until_safe(supervisor, tmp_path)
+    assert worker.poll() is None
+    assert lease.taken == 0, "the worker has it"
+    supervisor.look()
+    assert "job-1: the bench is stopped, and the table moves and " in books.said[-1]
+    assert "made safe by the supervisor at last" in books.said[-1]
+
+
 def test_a_companion_leaves_after_an_orderly_end_at_once_and_after_a_crash_when_it_has_lasted(tmp_path: Path) -> None:
     register = abandoned(tmp_path)
     devices = RegisteredDevices(register)

@@ -1,0 +1,58 @@
+"""Links of a simulated bench's devices that are lost, for whoever wants them: a file for each, beside the register.
+
+A cable that is out is out for every process, and for the next one too. `bench-<id>.<device>.lost` says that a device's
+cable is; whoever deletes the file plugs it in again, whoever makes one (`touch`) pulls it out.
+"""
+
+import json
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from bench_service import wall_clock
+from procedures.bench.errors import Disconnected
+
+
+class DeviceCables:
+    """The cables of one bench's devices, which are named as in the devices' journal: "turntable", "imu", …"""
+
+    def __init__(self, folder: Path, bench_id: str) -> None:
+        self._folder = folder
+        self._bench_id = bench_id
+
+    def file(self, device: str) -> Path:
+        """Where it lies that a device's link is lost, as long as it is."""
+        return self._folder / f"bench-{self._bench_id}.{device}.lost"
+
+    def cut(self, device: str, why: str, lasts_s: float | None = None) -> None:
+        """Lose a device's link, for `lasts_s` of real time or until its file is deleted.
+
+        One that is lost for good stays so, whatever else becomes of it.
+        """
+        until = None if lasts_s is None else wall_clock.now() + timedelta(seconds=lasts_s)
+        path = self.file(device)
+        lost = self._lost(path)
+        if lost is not None and lost[0] is None:
+            return
+        partial = path.with_name(f"{path.name}.part")
+        partial.write_text(json.dumps({"until": None if until is None else until.isoformat(), "why": why}))
+        partial.replace(path)
+
+    def need(self, device: str) -> None:
+        """Raises `Disconnected` naming the device while its link is lost."""
+        lost = self._lost(self.file(device))
+        if lost is not None and (lost[0] is None or wall_clock.now() < lost[0]):
+            why = f" ({lost[1]})" if lost[1] else ""
+            raise Disconnected(f"the {device} cannot be reached: its link is lost{why}")
+
+    def _lost(self, path: Path) -> tuple[datetime | None, str] | None:
+        """Until when (None: for good) and why; None where there is no file. One that a person made may be empty."""
+        try:
+            text = path.read_text(encoding="utf-8")
+        except FileNotFoundError:
+            return None
+        try:
+            document = json.loads(text)
+            until = document["until"]
+            return None if until is None else datetime.fromisoformat(until), str(document["why"])
+        except (ValueError, TypeError, KeyError):
+            return None, ""
