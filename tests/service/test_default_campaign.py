@@ -12,13 +12,15 @@ from procedures.procedure import Context
 from tests.service.campaigns import SCALED_DOWN, SHORT, add, ended, named, start
 from tests.service.client import Client
 
+pytestmark = pytest.mark.timeout(320)
+
 STEPS = ["static", "thermal", "calibration_1", "calibration_2", "calibration_3", "run_to_run", "verification"]
 
 
 @pytest.fixture(scope="module")
 def run(sqlite_client: Client) -> dict[str, Any]:
     run_id = start(sqlite_client, "thesis_acceptance", seed=5, parameters=SCALED_DOWN)["id"]
-    return ended(sqlite_client, run_id, 110.0)
+    return ended(sqlite_client, run_id, 300.0)
 
 
 @pytest.fixture(scope="module")
