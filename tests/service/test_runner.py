@@ -179,7 +179,7 @@ def test_a_job_that_was_queued_again_while_the_dispatcher_looked_stays_queued(st
         def unfinished(self, job: Job) -> Unfinished:
             if not asked.is_set():
                 why = Failure("Disconnected", "a test")
-                stores.queue.requeue(job.id, now(), now() + timedelta(hours=1), why, spend=False)
+                stores.queue.requeue(job.id, now(), now() + timedelta(minutes=4), why, spend=False)
             asked.set()
             return Unfinished(gone=Failure("EngineGaveUp", "the job engine ended this job as SUCCESS"))
 
