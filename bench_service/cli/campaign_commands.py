@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from bench_service.cli.client import call, connect, sentence
+from bench_service.cli.client import answer, call, connect, segment
 from bench_service.cli.options import AsJson, Server, console, errors, parameter
 from bench_service.cli.refusal import Refused
 
@@ -45,9 +45,11 @@ def run_campaign(
     body = {"unit": unit, "bench": bench, "seed": seed, "labels": _labels(label), "parameters": _step_parameters(set_)}
     if junit is not None and not junit.absolute().parent.is_dir():
         raise Refused(f"{junit} cannot be written: there is no folder {junit.parent}")
+    if key is not None and not (key.isascii() and key.isprintable()):
+        raise Refused(f"--key {key!r}: letters, digits and signs of ASCII are needed")
     headers = {} if key is None else {"Idempotency-Key": key}
     with connect(context.obj, server, drive=True) as client:
-        run = call(client, "POST", f"/api/v1/campaigns/{name}/runs", json=body, headers=headers)
+        run = call(client, "POST", f"/api/v1/campaigns/{segment(name)}/runs", json=body, headers=headers)
         run = watch_campaign(client, run, errors)
         report = call(client, "GET", f"/api/v1/campaign-runs/{run['id']}/report")
         if junit is not None:
@@ -77,7 +79,7 @@ def list_campaigns(context: typer.Context, server: Server = None, as_json: AsJso
 def show_campaign(context: typer.Context, name: str, server: Server = None) -> None:
     """A campaign as JSON, fit to be changed and added under another name."""
     with connect(context.obj, server, drive=False) as client:
-        console.print_json(json.dumps(call(client, "GET", f"/api/v1/campaigns/{name}")["campaign"]))
+        console.print_json(json.dumps(call(client, "GET", f"/api/v1/campaigns/{segment(name)}")["campaign"]))
 
 
 @campaigns.command("add")
@@ -157,19 +159,15 @@ def list_schedules(context: typer.Context, server: Server = None, as_json: AsJso
 def remove_schedule(context: typer.Context, schedule: str, server: Server = None) -> None:
     """Forget a schedule; its runs stay."""
     with connect(context.obj, server, drive=False) as client:
-        answer = client.delete(f"/api/v1/schedules/{schedule}")
-        if not answer.is_success:
-            raise Refused(sentence(answer))
+        answer(client, "DELETE", f"/api/v1/schedules/{segment(schedule)}")
 
 
 def _write_junit(client: "httpx.Client", run_id: str, file: Path) -> None:
     """Whole or not at all: a CI system may be reading."""
-    answer = client.get(f"/api/v1/campaign-runs/{run_id}/report", params={"format": "junit"})
-    if not answer.is_success:
-        raise Refused(sentence(answer))
+    report = answer(client, "GET", f"/api/v1/campaign-runs/{run_id}/report", params={"format": "junit"})
     partial = file.with_name(file.name + ".part")
     try:
-        partial.write_bytes(answer.content)
+        partial.write_bytes(report.content)
         partial.replace(file)
     except OSError as error:
         raise Refused(f"{file} cannot be written: {error.strerror}; the run is {run_id}") from error

@@ -5,6 +5,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from bench_service.cli.refusal import Refused
 from bench_service.settings import Settings
@@ -20,7 +21,21 @@ def connect(settings: Settings, server: str | None, drive: bool) -> Generator["h
     """A client to `server`, or to an application in this process that lives as long as the block.
 
     `drive`: whether the embedded application is to run jobs, for which it must have the bench to itself.
+    Raises `Refused` where nobody answers, whatever in the block asks.
     """
+    import httpx
+
+    try:
+        with _client(settings, server, drive) as client:
+            yield client
+    except httpx.InvalidURL as error:
+        raise Refused(f"--server {server}: {error}") from error
+    except httpx.RequestError as error:
+        raise Refused(f"{error.request.url} does not answer: {error}") from error
+
+
+@contextmanager
+def _client(settings: Settings, server: str | None, drive: bool) -> Generator["httpx.Client"]:
     import httpx
 
     if server is not None:
@@ -42,15 +57,20 @@ def connect(settings: Settings, server: str | None, drive: bool) -> Generator["h
 
 def call(client: "httpx.Client", method: str, path: str, **options: Any) -> Any:
     """The JSON of a good answer. Raises `Refused` with what the service said."""
-    import httpx
+    return answer(client, method, path, **options).json()
 
-    try:
-        response = client.request(method, path, **options)
-    except httpx.HTTPError as error:
-        raise Refused(f"{client.base_url}{path} does not answer: {error}") from error
-    if response.is_success:
-        return response.json()
-    raise Refused(sentence(response))
+
+def answer(client: "httpx.Client", method: str, path: str, **options: Any) -> "httpx.Response":
+    """A good answer, whatever is in it. Raises `Refused` with what the service said."""
+    response = client.request(method, path, **options)
+    if not response.is_success:
+        raise Refused(sentence(response))
+    return response
+
+
+def segment(name: str) -> str:
+    """A name as one segment of a path, whatever is in it."""
+    return quote(name, safe="")
 
 
 def sentence(response: "httpx.Response") -> str:

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from rich.console import Console
 
 from bench_service.cli import campaign_commands
-from bench_service.cli.client import call, connect, sentence
+from bench_service.cli.client import call, connect, segment, sentence
 from bench_service.cli.options import AsJson, Server, console, errors, parameter
 from bench_service.cli.refusal import Refused
 from bench_service.jobs.errors import ServiceError
@@ -219,7 +219,7 @@ def export(
     partial = output.with_name(output.name + ".part")
     with (
         connect(context.obj, server, drive=False) as client,
-        client.stream("GET", f"/api/v1/recordings/{recording}/data", params=query) as response,
+        client.stream("GET", f"/api/v1/recordings/{segment(recording)}/data", params=query) as response,
     ):
         if not response.is_success:
             response.read()
