@@ -52,6 +52,14 @@ class BenchDirectory:
         ids = self.ids()
         return ids[0] if len(ids) == 1 else self._preferred
 
+    def one(self) -> str:
+        """A bench to look at where none is named and nothing will move: the default, or else the first registered one.
+
+        Raises `NotFound` where there is none at all.
+        """
+        default, ids = self.default(), self.ids()
+        return default if default in ids or not ids else ids[0]
+
     def mounted(self, bench_id: str, serial: str | None = None) -> tuple[Unit, ...]:
         """The units that a bench can test, as declared; a simulated bench has drawn ones when they are asked for.
 

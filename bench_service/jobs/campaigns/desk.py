@@ -77,12 +77,12 @@ class CampaignDesk:
         return campaign
 
     def examine(self, campaign: Campaign, unit: str | None = None, bench: str | None = None) -> Examination:
-        """What it would do on a unit, or on the first that is mounted; see `Examiner.examine`."""
+        """What it would do on a unit, or on the first that is mounted on some bench; see `Examiner.examine`."""
         if unit is not None:
             return self._examiner.examine(campaign, unit, bench, strict=True)
-        benches = self._planner.benches
-        first = benches.mounted(benches.default() if bench is None else bench)[0].serial
-        return self._examiner.examine(campaign, first, bench, strict=False)
+        at = self._planner.benches.one() if bench is None else bench
+        first = self._planner.benches.mounted(at)[0].serial
+        return self._examiner.examine(campaign, first, at, strict=False)
 
     def start(self, request: RunRequest, key: str | None = None) -> CampaignRun:
         """Queue a run. Raises `NotFound`, `NotMounted`, `BadParameter`, `IdempotencyConflict`; then nothing moves."""
