@@ -18,8 +18,8 @@ class Health(BaseModel):
 
 
 @router.get("/healthz")
-def healthz(service: Service) -> Health:
-    """The process answers."""
+async def healthz(service: Service) -> Health:
+    """The process answers, whatever its threads are busy with."""
     return Health(code_version=service.code_version)
 
 
