@@ -7,14 +7,15 @@ import hashlib
 import io
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
 import sqlalchemy as sa
 
-from tests.chaos.load import Asked
+from tests.chaos.load import Asked, Stop
 from tests.chaos.witnesses import Listener, Seen
 
 LEGAL = {
@@ -28,8 +29,10 @@ LEGAL = {
     "cancelled": set(),
 }
 """Which state may follow which, as the service's documents say; a queued job fails or is interrupted in no run here."""
-INJECTED = ("put in for an exercise",)
-"""What a failure says that was meant to happen."""
+INJECTED = ("put in for an exercise", "the turntable has not answered turntable.move_to")
+"""What a failure says that was meant to happen: a fault, a lost link, a hang."""
+LATE_S = 60.0
+"""How long after a stop a job may still end for it [s]: its process may be killed and started again meanwhile."""
 Row = dict[str, Any]
 Twins = Mapping[str, Mapping[int, str]]
 """Of an undisturbed run: for each kind of job (`twin_key`), the content hash of each station."""
@@ -41,6 +44,9 @@ class Books:
     def __init__(self, engine: sa.Engine) -> None:
         self.engine = engine
         self.jobs = {row["id"]: row for row in self._rows("SELECT * FROM jobs")}
+        self.runs = {row["id"]: row for row in self._rows("SELECT * FROM campaign_runs")}
+        for row in self.runs.values():
+            row["labels"] = row["document"]["labels"]
         self.recordings = self._rows("SELECT * FROM recordings ORDER BY id")
         self.results = self._rows("SELECT * FROM results")
         self.used = self._rows("SELECT * FROM result_recordings")
@@ -63,7 +69,7 @@ class Books:
 
 def _documents(row: Row) -> Row:
     """SQLite gives JSON as text."""
-    for name in ("data", "failure", "labels", "channels", "parameters", "requested_parameters"):
+    for name in ("data", "failure", "labels", "channels", "parameters", "requested_parameters", "document"):
         if isinstance(row.get(name), str):
             row[name] = json.loads(row[name])
     return row
@@ -74,36 +80,56 @@ def twin_key(procedure: str, parameters: Mapping[str, Any], seed: int) -> str:
     return json.dumps([procedure, dict(parameters), seed], sort_keys=True)
 
 
-def acknowledged(books: Books, jobs: Iterable[Asked], stopped: bool) -> list[str]:
-    """Jobs that were promised: each is there, once, and ended as it may. `stopped`: a bench was stopped in the run."""
+def promised(rows: Mapping[str, Row], asked: Iterable[Asked], bad_end: Callable[[Row, Asked], str]) -> list[str]:
+    """What was acknowledged: each is there, once, under the one id that was said, and ended as it may."""
     wrong: list[str] = []
-    by_label = Counter(row["labels"].get("chaos") for row in books.jobs.values())
-    for asked in jobs:
-        label = asked.body["labels"]["chaos"]
-        if len(set(asked.ids)) > 1:
-            wrong.append(f"{asked.key}: acknowledged as {sorted(set(asked.ids))}")
+    by_label = Counter(row["labels"].get("chaos") for row in rows.values())
+    for one in asked:
+        label = one.body["labels"]["chaos"]
+        if len(set(one.ids)) > 1:
+            wrong.append(f"{one.key}: acknowledged as {sorted(set(one.ids))}")
         if by_label[label] != 1:
-            wrong.append(f"{asked.key}: there are {by_label[label]} jobs of it")
-        row = books.jobs.get(asked.id)
+            wrong.append(f"{one.key}: there are {by_label[label]} of it")
+        row = rows.get(one.id)
         if row is None:
-            wrong.append(f"{asked.key}: job {asked.id!r} is lost")
+            wrong.append(f"{one.key}: {one.id!r} is lost")
             continue
-        why = _bad_end(row, asked, stopped)
+        why = bad_end(row, one)
         if why:
-            wrong.append(f"{asked.key}, job {asked.id} ({row['procedure']}): {why}")
+            wrong.append(f"{one.key}, {one.id}: {why}")
     return wrong
 
 
-def _bad_end(row: Row, asked: Asked, stopped: bool) -> str:
+def acknowledged(books: Books, jobs: Iterable[Asked], stops: Iterable[Stop]) -> list[str]:
+    """Jobs that were promised. `stops`: all of the run, as the clients saw them."""
+    stops = tuple(stops)
+    return promised(books.jobs, jobs, lambda row, asked: bad_end(row, asked.cancel_asked, stops))
+
+
+def bad_end(row: Row, cancel_asked: bool, stops: Iterable[Stop]) -> str:
+    """What is wrong with a job's end; empty: nothing."""
     state, failure = row["state"], row["failure"] or {}
     if state == "succeeded":
         return "" if row["verdict"] in ("pass", "fail") and row["result_id"] else f"no verdict or result: {row}"
     if state == "cancelled":
-        return "" if asked.cancel_asked or stopped else "cancelled, and nobody asked"
+        stopped = any(_ended_by(row, stop) for stop in stops)
+        return "" if cancel_asked or stopped else f"{row['procedure']} was cancelled, and nobody asked"
     if state == "failed":
         meant = any(words in failure.get("message", "") for words in INJECTED)
-        return "" if meant else f"failed of itself: {failure}"
+        return "" if meant else f"{row['procedure']} failed of itself: {failure}"
     return f"it is {state} at the end: {failure}"
+
+
+def _ended_by(row: Row, stop: Stop) -> bool:
+    """Whether a job ended while its bench was stopped, or soon after."""
+    begun = moment(stop.said.partition(": ")[0])
+    return stop.bench == row["bench"] and begun <= moment(row["finished_at"]) <= stop.until + LATE_S
+
+
+def moment(value: str | datetime) -> float:
+    """A moment as either database gives it, and as a document has it [s, Unix time]; without a zone it is UTC."""
+    at = datetime.fromisoformat(value) if isinstance(value, str) else value
+    return (at if at.tzinfo else at.replace(tzinfo=UTC)).timestamp()
 
 
 def histories(books: Books) -> list[str]:
@@ -167,7 +193,11 @@ def stations(books: Books, twins: Twins) -> list[str]:
         found = {recording["station_index"]: recording["content_hash"] for recording in mine}
         if len(found) != len(mine):
             wrong.append(f"job {job}: a station is there twice")
-        twin = twins[twin_key(row["procedure"], row["requested_parameters"], row["seed"])]
+        key = twin_key(row["procedure"], row["requested_parameters"], row["seed"])
+        if key not in twins:
+            wrong.append(f"job {job}: nobody asked for one like {key}")
+            continue
+        twin = twins[key]
         missing = set(twin) - set(found) if row["state"] == "succeeded" else set()
         if missing:
             wrong.append(f"job {job} succeeded without stations {sorted(missing)}")

@@ -1,5 +1,6 @@
 """The director of a chaos run: a seeded list of disasters, brought upon real processes one after the other."""
 
+import json
 import random
 import signal
 import time
@@ -10,9 +11,9 @@ from pathlib import Path
 import httpx
 
 from tests.chaos.databases import OwnPostgres, SqliteFile
-from tests.chaos.load import SHORT, Clients
+from tests.chaos.load import CAMPAIGN, SHORT, Clients
 from tests.chaos.processes import Ledger, Program, Topology
-from tests.chaos.witnesses import DatabaseWitness, DeviceWitness, Listener, is_safe, register
+from tests.chaos.witnesses import DatabaseWitness, DeviceWitness, Listener, is_safe, is_warm, register
 
 START_S = 120.0
 """How long the first start may take [s], with the migration of an empty database, on a loaded machine."""
@@ -20,17 +21,32 @@ RETURN_S = 60.0
 """How long a process that was started again may take to drive its bench [s]."""
 BUSY_S = 12.0
 """How long a disaster waits for a moment at which it hurts [s]; then it comes at any."""
+PATIENCE_S = 1.0
+"""How much longer one waits for a chamber that is led away from ambient, once the bench is not safe [s]."""
 DRAIN_S = 240.0
 """How long the jobs may take to end after the last disaster [s]."""
 LISTENERS = 3
 """How many jobs have a listener at once."""
+LOST_S = 3.0
+"""How long a link that is lost stays lost [s]: longer than what a worker tries, and than most kills take."""
 FAULTS = (
-    '{"seed": %d, "rules": [{"verb": "turntable.move_to", "kind": "fault", "probability": 0.01}, '
-    '{"verb": "imu.block", "kind": "disconnect", "probability": 0.002}]}'
+    ("turntable.move_to", "fault", 0.01),
+    ("turntable.move_to", "hang", 0.008),
+    ("turntable.move_to", "lost", 0.004),
+    ("chamber.command", "lost", 0.02),
+    ("imu.block", "disconnect", 0.002),
 )
-"""What breaks of itself on the simulated benches meanwhile."""
+"""What breaks of itself on the simulated benches meanwhile: verb, kind, probability each time."""
 SETTINGS = {"BENCH_REAL_TIME_FACTOR": "150", "BENCH_RETRY_SCALE": "0.02"}
 """A move lasts a tenth of a second: long enough to be hit."""
+
+
+def faults(seed: int) -> str:
+    """The benches' setting for what breaks of itself."""
+    rules = [{"verb": verb, "kind": kind, "probability": chance} for verb, kind, chance in FAULTS]
+    lasting = [{**rule, "lasts_s": LOST_S} if rule["kind"] == "lost" else rule for rule in rules]
+    return json.dumps({"seed": seed, "rules": lasting})
+
 
 KINDS = {"worker": 6, "api": 2, "supervisor": 2, "worker and supervisor": 2, "all": 1, "term": 1, "database": 2}
 """Disasters, and how often each is chosen."""
@@ -47,7 +63,7 @@ class Disaster:
     api: int
     after_s: float
     aim: str
-    """any, or moving: while the bench is not safe."""
+    """any; moving: while the bench is not safe; warm: while its chamber is led away from ambient, if it soon is."""
     mode: str
     """Of a database's restart."""
     pause_s: float
@@ -67,7 +83,7 @@ def disasters(seed: int, topology: Topology, restarts: bool) -> list[Disaster]:
             chance.choice(topology.benches),
             chance.randrange(len(topology.apis)),
             chance.uniform(0.0, 1.0),
-            chance.choice(("any", "moving", "moving", "moving")),
+            chance.choice(("any", "moving", "moving", "warm")),
             chance.choice(("fast", "immediate")),
             chance.uniform(0.0, 0.5),
             chance.random() < 0.7,
@@ -93,6 +109,8 @@ class Run:
     restarts: int = 0
     drained: bool = False
     seconds: float = 0.0
+    striking_s: float = 0.0
+    """Of these, from the first disaster to the last [s]: without the first start and what is left to end."""
 
     @property
     def kills(self) -> int:
@@ -108,12 +126,12 @@ class Director:
         self._most_s = most_s
         self._database = database
         self._kills = kills
-        settings = {**SETTINGS, "BENCH_DEVICE_FAULTS": FAULTS % seed}
+        settings = {**SETTINGS, "BENCH_DEVICE_FAULTS": faults(seed)}
         self.topology = Topology(Ledger(), folder, database.url, settings)
         self._starting = False
         self._disasters = iter(disasters(seed, self.topology, database.restarts))
         clients = Clients(self.topology.ports, self.topology.benches, seed, 3 * kills + 20)
-        devices = DeviceWitness(folder, self.topology.benches)
+        devices = DeviceWitness(folder, self.topology.benches, LOST_S)
         self.run = Run(folder, self.topology, clients, devices, DatabaseWitness(database.url))
 
     def direct(self) -> Run:
@@ -124,9 +142,11 @@ class Director:
             self._begin()
             for thread in (*witnesses, run.clients):
                 thread.start()
+            first = time.monotonic()
             while run.kills < self._kills and time.monotonic() < begun + self._most_s:
                 self._listen()
                 self._bring(next(self._disasters))
+            run.striking_s = time.monotonic() - first
             run.clients.submit_no_more()
             run.drained = self._drain()
             self.topology.end_in_order()
@@ -139,12 +159,14 @@ class Director:
         return run
 
     def _begin(self) -> None:
-        """Start everything, and calibrate the unit once: a verification needs that."""
+        """Start everything, store the campaign, and calibrate the unit once: a verification needs that."""
         self.topology.start()
         address = f"http://127.0.0.1:{self.topology.ports[0]}"
         with httpx.Client(base_url=address, timeout=30, trust_env=False) as http:
             self._until(lambda: _answers(http), START_S, "the service answers")
             self._until(lambda: all(map(self.topology.drives, self.topology.benches)), START_S, "benches are driven")
+            added = http.post("/api/v1/campaigns", json=CAMPAIGN)
+            assert added.status_code == 201, added.text
             body = {"procedure": "calibration_12_orientations", "unit": "SIM-0001", "parameters": SHORT, "retries": 5}
             more = {"bench": self.topology.benches[0], "seed": 1}
             answer = http.post("/api/v1/jobs", json={**body, **more})
@@ -156,8 +178,8 @@ class Director:
     def _bring(self, disaster: Disaster) -> None:
         topology, bench = self.topology, disaster.bench
         time.sleep(disaster.after_s)
-        if disaster.aim == "moving" and not self._starting:
-            self._wait_for_harm(bench)
+        if disaster.aim != "any" and not self._starting:
+            self._wait_for_harm(bench, PATIENCE_S if disaster.aim == "warm" else 0.0)
         said = f"{disaster.kind} of {bench}" if disaster.kind not in ("all", "api", "database") else disaster.kind
         self.run.done.append(f"{said} {disaster.mode}" if disaster.kind == "database" else said)
         if disaster.kind == "database":
@@ -196,35 +218,45 @@ class Director:
             for api in topology.apis:
                 api.strike()
 
-    def _wait_for_harm(self, bench: str) -> None:
-        """Until the bench is not safe: that is when a death matters."""
-        end = time.monotonic() + BUSY_S
-        while time.monotonic() < end:
+    def _wait_for_harm(self, bench: str, patience_s: float) -> None:
+        """Until the bench is not safe: that is when a death matters. For the chamber's sake, `patience_s` longer."""
+        end, unsafe_since = time.monotonic() + BUSY_S, None
+        while (now := time.monotonic()) < end:
             state = register(self.run.folder / f"bench-{bench}.devices")
             if state is not None and not is_safe(state) and state["linked"]:
-                return
+                unsafe_since = now if unsafe_since is None else unsafe_since
+                if is_warm(state) or now - unsafe_since >= patience_s:
+                    return
             time.sleep(0.005)
 
     def _listen(self) -> None:
         """Give some of the open jobs a listener."""
         heard = {listener.job for listener in self.run.listeners}
-        fresh = [asked for asked in self.run.clients.open if asked.id and asked.id not in heard]
-        busy = sum(listener.job in {asked.id for asked in self.run.clients.open} for listener in self.run.listeners)
+        jobs = [asked for asked in self.run.clients.open if asked in self.run.clients.jobs]
+        fresh = [asked for asked in jobs if asked.id and asked.id not in heard]
+        busy = sum(listener.job in {asked.id for asked in jobs} for listener in self.run.listeners)
         for asked in fresh[: max(0, LISTENERS - busy)]:
             listener = Listener(self.topology.ports, asked.id)
             listener.start()
             self.run.listeners.append(listener)
 
     def _drain(self) -> bool:
-        """Let everything that was begun come to its end; a process that ended by itself is started again."""
+        """Let everything that was begun come to its end, and every bench be safe: a link that is lost comes back.
+
+        A process that ended by itself is started again.
+        """
         end = time.monotonic() + DRAIN_S
-        while self.run.clients.open and time.monotonic() < end:
+        while (self.run.clients.open or not self._safe()) and time.monotonic() < end:
             self.topology.start()
             time.sleep(0.1)
         while any(listener.is_alive() for listener in self.run.listeners) and time.monotonic() < end:
             time.sleep(0.1)  # they hear the last
         time.sleep(1.0)  # witnesses see it
         return not self.run.clients.open
+
+    def _safe(self) -> bool:
+        states = [register(self.run.folder / f"bench-{bench}.devices") for bench in self.topology.benches]
+        return all(state is None or is_safe(state) for state in states)
 
     def _until(self, reached: Callable[[], object], seconds: float, what: str) -> None:
         end = time.monotonic() + seconds

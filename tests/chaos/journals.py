@@ -5,7 +5,7 @@ From the devices' journals and the kernel's locks alone; of the service's own wo
 
 import json
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -59,6 +59,17 @@ def masters(bench: str, entries: Iterable[dict[str, Any]], ledger: Ledger) -> li
     return wrong
 
 
+def struck(run: Run) -> Iterator[str]:
+    """What broke of itself on the benches, by the failures that the journals have."""
+    for bench in run.topology.benches:
+        for entry in journal(run.folder, bench):
+            error = entry["arguments"].get("error", "")
+            if "put in for an exercise" in error:
+                device = entry["verb"].partition(".")[0]
+                kinds = {"lost": "lost link", "no link": "disconnect"}
+                yield f"{device} {next((kind for words, kind in kinds.items() if words in error), 'fault')}"
+
+
 @dataclass(frozen=True)
 class Rescue:
     """A bench that a killed worker left unsafe, and how long it stayed so [s]; None: to the end."""
@@ -66,6 +77,8 @@ class Rescue:
     bench: str
     death: Death
     supervised: bool
+    warm: bool
+    """Whether the chamber was led away from ambient."""
     seconds: float | None
 
 
@@ -78,7 +91,8 @@ def rescues(run: Run) -> list[Rescue]:
                 continue
             safe, seconds = run.devices.safe_after(bench, death.told)
             if not safe:
-                found.append(Rescue(bench, death, death.pid not in run.unsupervised, seconds))
+                warm = run.devices.warm_at(bench, death.told)
+                found.append(Rescue(bench, death, death.pid not in run.unsupervised, warm, seconds))
     return found
 
 

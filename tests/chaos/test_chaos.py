@@ -1,5 +1,6 @@
 """A small chaos run on each database, and proof that its checkers see what they are there to see."""
 
+import json
 import shutil
 import sqlite3
 from collections.abc import Callable
@@ -9,13 +10,14 @@ import pytest
 
 from tests.chaos import books as check
 from tests.chaos.books import Books, Twins
+from tests.chaos.campaigns import campaigns
 from tests.chaos.databases import engine
 from tests.chaos.journals import masters
-from tests.chaos.load import Asked
+from tests.chaos.load import Asked, Stop, recipes_beside_campaign
 from tests.chaos.processes import Death, Ledger
 from tests.chaos.storm import storm
 from tests.chaos.undisturbed import twins
-from tests.chaos.witnesses import Seen
+from tests.chaos.witnesses import DeviceWitness, Seen
 
 pytestmark = pytest.mark.timeout(900)  # a minute on two idle cores; kills and restarts share them with other tests
 KILLS = 10
@@ -52,12 +54,17 @@ def everything(books: Books, expected: Twins, before: Books) -> list[str]:
             if event["kind"] == "station"
         },
     )
-    jobs = [
-        Asked(f"key {label}", {"labels": {"chaos": label}}, "none", [job])
-        for job, label in ((job, row["labels"]["chaos"]) for job, row in before.jobs.items())
-    ]
+    jobs, runs = (
+        [
+            Asked(f"key {row['labels']['chaos']}", {"labels": {"chaos": row["labels"]["chaos"]}}, "none", [id_])
+            for id_, row in rows.items()
+            if "campaign_run" not in row["labels"]
+        ]
+        for rows in (before.jobs, before.runs)
+    )
     return (
-        check.acknowledged(books, jobs, stopped=False)
+        check.acknowledged(books, jobs, ())
+        + campaigns(books, runs, ())
         + check.histories(books)
         + check.results(books)
         + check.stations(books, expected)
@@ -70,7 +77,7 @@ TAMPERED = {
     "a job is lost": ("UPDATE jobs SET id = 'x' || id WHERE procedure = 'no_operation'", "is lost"),
     "a job ended without being asked": ("UPDATE jobs SET state = 'cancelled'", "cancelled, and nobody asked"),
     "a job is stuck": ("UPDATE jobs SET state = 'running'", "nothing is left that runs it"),
-    "a job was made twice": ('UPDATE jobs SET labels = \'{"chaos": "0"}\'', "there are 5 jobs of it"),
+    "a job was made twice": ('UPDATE jobs SET labels = \'{"chaos": "0"}\'', "there are 8 of it"),
     "an event is missing": ("DELETE FROM events WHERE sequence = 2", "sequences [1, 3"),
     "a job ran after its end": (
         'UPDATE events SET data = replace(data, \'"before": "queued"\', \'"before": "succeeded"\')',
@@ -91,6 +98,44 @@ TAMPERED = {
     "a payload is damaged": ("UPDATE chunks SET payload = substr(payload, 2)", "is not what was written"),
     "counts do not add up": ("UPDATE recordings SET samples = samples + 1", "are claimed"),
     "a result's lineage is wrong": ("UPDATE result_recordings SET content_hash = 'x'", "not what it was"),
+    "a campaign run is lost": ("UPDATE campaign_runs SET id = 'x' || id", "is lost"),
+    "a job of a campaign run that is not there": ("UPDATE campaign_runs SET id = 'x' || id", "which is not there"),
+    "a campaign run is stuck": ("UPDATE campaign_runs SET state = 'running'", "it is running at the end"),
+    "a campaign run was cancelled": ("UPDATE campaign_runs SET state = 'cancelled'", "cancelled, and nobody asked"),
+    "a campaign run was made twice, and both ran at once": (
+        "INSERT INTO campaign_runs SELECT 'y' || id, campaign, unit, bench, state, verdict, created_at, finished_at, "
+        "schedule_id, document FROM campaign_runs",
+        "of bench sim overlapped",
+    ),
+    "a step's job was done twice": (
+        "UPDATE jobs SET labels = replace(labels, '\"nothing\"', '\"verification\"')",
+        "step verification: 1 attempts, it lists jobs",
+    ),
+    "a step was done with another seed": (
+        "UPDATE jobs SET seed = 1 WHERE labels LIKE '%\"verification\"%'",
+        "seeds [1] instead of [3]",
+    ),
+    "a step began too soon": (
+        "UPDATE jobs SET finished_at = '2100-01-01 00:00:00.000000' WHERE labels LIKE '%\"calibration\"%'",
+        "began before the one before it had ended",
+    ),
+    "a step's verdict is not its job's": (
+        "UPDATE jobs SET verdict = 'pass' WHERE labels LIKE '%\"calibration\"%'",
+        "its job says pass",
+    ),
+    "a step's verdict is not its method's": (
+        "UPDATE results SET verdict = 'fail' WHERE job_id IS NULL",
+        "step magnitude: verdict pass, its result says ['fail']",
+    ),
+    "a campaign run's verdict is not its steps'": (
+        "UPDATE campaign_runs SET verdict = 'pass'",
+        "verdict pass (its document: fail), by its steps fail",
+    ),
+    "a method ran twice": (
+        "INSERT INTO results SELECT 'y' || id, kind, name, version, parameters, document, verdict, code_version, "
+        "simulated, created_at, unit, job_id, seed, context FROM results WHERE job_id IS NULL",
+        "are of no campaign run",
+    ),
 }
 
 
@@ -101,7 +146,8 @@ def books(folder: Path, undisturbed: Twins) -> Books:
 
 
 def test_nothing_is_found_where_nothing_is_wrong(books: Books, undisturbed: Twins) -> None:
-    assert len(books.jobs) == len(undisturbed) == 5
+    assert len(books.jobs) == len(undisturbed) == len(recipes_beside_campaign()) + 3 == 8
+    assert len(books.runs) == 1
     assert everything(books, undisturbed, books) == []
 
 
@@ -143,3 +189,33 @@ def test_a_master_that_died_or_left_may_be_followed() -> None:
     ledger = Ledger(deaths=[Death("worker", 9, 10.0, 11.0, "SIGKILL")])
     entries = [line(1, 9, "link.opened"), line(12, 8, "link.refused"), line(13, 8, "link.opened")]
     assert masters("sim", [*entries, line(14, 8, "link.closed"), line(15, 7, "link.opened")], ledger) == []
+
+
+def test_who_calls_a_bench_safe_that_cannot_be_reached_is_found(tmp_path: Path) -> None:
+    witness = DeviceWitness(tmp_path, ("sim",), 3.0)
+    said = {"table": "at rest", "powered": False, "chamber_target_c": None, "chamber_ambient_c": 22.0}
+    said |= {"current_ma": 0.0, "fault": "", "by": "a worker", "at": "2031-05-06T07:08:10+00:00"}
+    assert witness.false_safety("sim", said) == []
+    for until, wrong in (("07:08:12", 1), ("07:08:09", 0), ("07:08:14", 0)):
+        text = json.dumps({"until": f"2031-05-06T{until}+00:00", "why": ""})
+        (tmp_path / "bench-sim.chamber.lost").write_text(text)
+        assert len(witness.false_safety("sim", said)) == wrong, until
+    assert witness.false_safety("sim", {**said, "at": "2031-05-06T07:08:13+00:00", "powered": True}) == []
+
+
+def test_a_job_may_end_for_a_stop_of_its_own_bench_and_only_then() -> None:
+    row = {
+        "state": "cancelled",
+        "failure": None,
+        "procedure": "p",
+        "bench": "east",
+        "finished_at": "2031-05-06 07:08:09",
+    }
+    end = check.moment(row["finished_at"])
+    for bench, at, until, found in (
+        ("east", "2031-05-06T07:08:00+00:00", end + 3.0, ""),
+        ("west", "2031-05-06T07:08:00+00:00", end + 3.0, "p was cancelled, and nobody asked"),
+        ("east", "2031-05-06T07:08:10+00:00", end + 3.0, "p was cancelled, and nobody asked"),
+        ("east", "2031-05-06T07:00:00+00:00", end - 100.0, "p was cancelled, and nobody asked"),
+    ):
+        assert check.bad_end(row, False, [Stop(bench, f"{at}: why", until)]) == found

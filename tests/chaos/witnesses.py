@@ -7,6 +7,7 @@ import json
 import time
 import zlib
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
@@ -50,6 +51,8 @@ class Sight:
     at: float
     safe: bool
     by: str
+    warm: bool = False
+    """Whether the chamber was led away from ambient."""
 
 
 def register(path: Path) -> dict[str, Any] | None:
@@ -63,9 +66,31 @@ def register(path: Path) -> dict[str, Any] | None:
 
 
 def is_safe(state: dict[str, Any]) -> bool:
-    """Table at rest, unit without power, chamber led nowhere but to ambient, no fault."""
-    chamber = state["chamber_target_c"] in (None, state["chamber_ambient_c"])
-    return state["table"] == "at rest" and not state["powered"] and chamber and not state["fault"]
+    """Table at rest, unit without power, chamber led nowhere but to ambient, no current, no fault."""
+    quiet = not state["powered"] and state["current_ma"] == 0.0
+    return state["table"] == "at rest" and quiet and not is_warm(state) and not state["fault"]
+
+
+def is_warm(state: dict[str, Any]) -> bool:
+    """Whether the chamber is led to anything but ambient."""
+    return state["chamber_target_c"] not in (None, state["chamber_ambient_c"])
+
+
+def unreachable(folder: Path, bench: str, at: float, lasts_s: float) -> list[str]:
+    """Devices that have to be made safe and whose link was lost at a moment [s, Unix time].
+
+    By their files, which say until when; each loss is known to last `lasts_s`.
+    """
+    found: list[str] = []
+    for device in ("turntable", "chamber", "current_source", "supply"):
+        try:
+            until = json.loads((folder / f"bench-{bench}.{device}.lost").read_text())["until"]
+        except (OSError, ValueError):
+            continue
+        end = datetime.fromisoformat(until).timestamp()
+        if end - lasts_s < at < end:
+            found.append(device)
+    return found
 
 
 def lock_holders(path: Path) -> list[int]:
@@ -79,25 +104,44 @@ def lock_holders(path: Path) -> list[int]:
 class DeviceWitness(Witness):
     """When each bench was safe, by its register; and that its link's lock was held by the one who said so."""
 
-    def __init__(self, folder: Path, benches: tuple[str, ...]) -> None:
+    def __init__(self, folder: Path, benches: tuple[str, ...], lost_s: float) -> None:
+        """`lost_s`: how long a link that is lost stays lost [s]."""
         super().__init__("devices", 0.01)
         self.sights: dict[str, list[Sight]] = {bench: [] for bench in benches}
         self.locks_seen = 0
         self.wrong: list[str] = []
+        self.warm_s = 0.0
+        """How long chambers were seen led away from ambient [s]."""
         self._looks = 0
+        self._looked_at = time.time()
+        self._folder, self._lost_s = folder, lost_s
         self._files = {bench: folder / f"bench-{bench}.devices" for bench in benches}
 
     def look(self) -> None:
         self._looks += 1
+        passed_s, self._looked_at = time.time() - self._looked_at, time.time()
         for bench, path in self._files.items():
             state, at = register(path), time.time()
             if state is None:
                 continue
+            if is_warm(state):
+                self.warm_s += passed_s
             sights = self.sights[bench]
-            if not sights or sights[-1].safe != is_safe(state):
-                sights.append(Sight(at, is_safe(state), state["by"]))
+            seen = Sight(at, is_safe(state), state["by"], is_warm(state))
+            if not sights or (sights[-1].safe, sights[-1].warm) != (seen.safe, seen.warm):
+                sights.append(seen)
+                self.wrong += self.false_safety(bench, state)
             if LOCKS.exists() and self._looks % LOCKS_EVERY == 0:
                 self._look_at_lock(bench, path, state)
+
+    def false_safety(self, bench: str, state: dict[str, Any]) -> list[str]:
+        """Whether a bench is said to be safe by somebody who could not reach all of it."""
+        if not is_safe(state) or state["at"] is None:
+            return []
+        lost = unreachable(self._folder, bench, datetime.fromisoformat(state["at"]).timestamp(), self._lost_s)
+        return (
+            [f"bench {bench}: {state['by']!r} calls it safe at {state['at']}, {lost} cannot be reached"] if lost else []
+        )
 
     def _look_at_lock(self, bench: str, path: Path, before: dict[str, Any]) -> None:
         holders = lock_holders(path)
@@ -119,6 +163,11 @@ class DeviceWitness(Witness):
             return False
         self.locks_seen += 1
         return holders != [master]
+
+    def warm_at(self, bench: str, at: float) -> bool:
+        """Whether the chamber was led away from ambient at a moment."""
+        before = [sight for sight in self.sights[bench] if sight.at <= at]
+        return bool(before) and before[-1].warm
 
     def safe_after(self, bench: str, at: float) -> tuple[bool, float | None]:
         """Whether the bench was safe at a moment, and how long it then took until it was [s]; None: never."""
