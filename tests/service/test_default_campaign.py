@@ -11,6 +11,7 @@ from procedures import catalog
 from procedures.procedure import Context
 from tests.service.campaigns import SCALED_DOWN, SHORT, add, ended, named, start
 from tests.service.client import Client
+from tests.service.junit_readers import assert_readable
 
 pytestmark = pytest.mark.timeout(320)
 
@@ -97,6 +98,7 @@ def test_the_report_leads_back_to_the_samples(
 def test_the_junit_document_is_what_ci_systems_read(sqlite_client: Client, run: dict[str, Any]) -> None:
     answer = sqlite_client.http.get(f"/api/v1/campaign-runs/{run['id']}/report", params={"format": "junit"})
     assert answer.headers["content-type"] == "application/xml"
+    assert_readable(answer.content)
     root = ElementTree.fromstring(answer.content)
     assert (root.tag, root.get("name")) == ("testsuites", "thesis_acceptance SIM-0001")
     suites = root.findall("testsuite")
@@ -116,8 +118,6 @@ def test_the_junit_document_is_what_ci_systems_read(sqlite_client: Client, run: 
         properties = {p.get("name"): p.get("value") for p in suite.iter("property")}
         assert properties["campaign_run"] == run["id"]
         assert properties.get("job") == step["job"]
-    for name in ("tests", "failures", "errors", "skipped"):
-        assert int(root.get(name) or 0) == sum(int(suite.get(name) or 0) for suite in suites)
 
 
 def test_limits_and_history_of_a_golden_unit(sqlite_client: Client) -> None:

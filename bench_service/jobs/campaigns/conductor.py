@@ -2,7 +2,8 @@
 
 Any number of processes may conduct: a decision is written before it is acted on, acting twice gives the same job (its
 key is the run, the step and the attempt), and a change is only stored by whoever read the run's last revision. So a
-process may be killed anywhere, and another one, or its next life, goes on.
+process may be killed anywhere, and another one, or its next life, goes on. A method, which may take long, is worked out
+beside the looking, under such a key too.
 """
 
 import logging
@@ -11,6 +12,7 @@ from threading import Event, Thread
 
 from bench_service.jobs.analyses import AnalysisDesk, AnalysisRequest
 from bench_service.jobs.campaigns import transitions
+from bench_service.jobs.campaigns.beside import Beside
 from bench_service.jobs.campaigns.campaign import Step
 from bench_service.jobs.campaigns.judgement import judge
 from bench_service.jobs.campaigns.run import CampaignRun, StepState
@@ -36,6 +38,8 @@ IDLE_S = 1.0
 """How often it looks for runs of other processes, and for schedules that are due [s]."""
 LEAVE_S = 10.0
 """How long the end of the service waits for what it is in the middle of [s]."""
+METHODS_LEAVE_S = 1.0
+"""How long it waits for methods that are worked out [s]: the next start begins them again."""
 HOPELESS = ("BadParameter", "Undetermined", "MissingChannel", "NotMounted")
 """Refusals that would be the same another time: no retry helps."""
 
@@ -61,6 +65,7 @@ class Conductor:
         self._ending = Event()
         self._wanted = Event()
         self._thread: Thread | None = None
+        self._methods = Beside(self.nudge)
 
     def begin(self) -> None:
         """Begin to look."""
@@ -73,6 +78,7 @@ class Conductor:
         self._wanted.set()
         if self._thread is not None:
             self._thread.join(LEAVE_S)
+            self._methods.wait(METHODS_LEAVE_S)
 
     def nudge(self) -> None:
         """Look now: something was asked for."""
@@ -134,7 +140,7 @@ class Conductor:
             if not step.decided:
                 return self._attempt(run, index, late)
             if run.step_of(index).method is not None:
-                return self._method_done(run, index)
+                return self._method(run, index, late)
             if step.job_id is None:
                 return transitions.submitted(run, index, self._submitted(run, index).id)
             return self._followed(run, index, late)
@@ -227,7 +233,16 @@ class Conductor:
         judgement = judge(run.step_of(index), run.campaign, result, self._stores)
         return transitions.judged(run, index, judgement, result.id, now())
 
-    def _method_done(self, run: CampaignRun, index: int) -> CampaignRun:
+    def _method(self, run: CampaignRun, index: int, late: bool) -> CampaignRun | None:
+        """What a step's method says now. One of a run that ends meanwhile still gives its result, judged by nobody."""
+        key = key_of(run, index)
+        result_id = self._methods.outcome(key, lambda: self._work_out(run, index, key))
+        if result_id is not None:
+            return self._judged(run, index, self._stores.results.get(result_id))
+        return transitions.out_of_time(run, now()) if late else transitions.observed(run, index, StepState.RUNNING, "")
+
+    def _work_out(self, run: CampaignRun, index: int, key: str) -> str:
+        """The id of the result; of the first, where it was worked out before."""
         step = run.step_of(index)
         request = AnalysisRequest(
             step.does,
@@ -235,7 +250,7 @@ class Conductor:
             calibrations=self._calibrations_of(run, step),
             parameters=step.parameters,
         )
-        return self._judged(run, index, self._analyses.run_method(request, key_of(run, index)))
+        return self._analyses.run_method(request, key).id
 
     def _recordings_of(self, run: CampaignRun, step: Step) -> tuple[str, ...]:
         jobs = [s.job_id for name in step.recordings_of for s in run.steps if s.name == name and s.job_id]

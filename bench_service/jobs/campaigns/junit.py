@@ -25,10 +25,11 @@ def document(run: CampaignRun) -> bytes:
     """UTF-8, with its declaration. Of a run that is still open the open steps are errors: they gave no verdict yet."""
     from junitparser import JUnitXml
 
-    whole = JUnitXml(f"{run.campaign.name} {run.unit}")
+    whole = JUnitXml(_text(f"{run.campaign.name} {run.unit}"))
     for step in run.steps:
         whole.add_testsuite(_suite(run, step))
     whole.update_statistics()
+    whole._elem.attrib.pop("skipped")  # pyright: ignore[reportPrivateUsage]  Jenkins' schema has it at suites alone
     return DECLARATION + whole.tostring()
 
 
@@ -59,21 +60,24 @@ def _suite(run: CampaignRun, step: StepRun) -> "TestSuite":
 
 def _cases(run: CampaignRun, step: StepRun) -> list["TestCase"]:
     """A case a check, and one for the step itself where no check says what became of it."""
-    from junitparser import Error, Skipped
+    from junitparser import Error, Failure, Skipped
 
     cases = [_checked(run, step, check) for check in step.checks]
-    verdict_is_said = bool(cases) and step.verdict is not Verdict.ERROR
+    missed = any(not check.passed for check in step.checks)
+    verdict_is_said = bool(cases) and (step.verdict is Verdict.PASS or (step.verdict is Verdict.FAIL and missed))
     if step.state in (StepState.SUCCEEDED, StepState.FAILED) and verdict_is_said:
         cases[0].time = _seconds(step.started_at, step.finished_at)
         return cases
     whole = _case(run, step, step.name)
     whole.time = _seconds(step.started_at, step.finished_at)
     if step.state is StepState.SKIPPED:
-        whole.result = [Skipped(_text(step.reason))]
+        whole.result = [Skipped(_text(step.reason or "skipped"))]
     elif step.state not in ENDED:
         whole.result = [Error(_text(f"not ended: {step.state.value} {run.waiting}".strip()), "NotEnded")]
     elif step.verdict is Verdict.ERROR:
         whole.result = [Error(_text(step.reason or "no verdict"), "Error")]
+    elif step.verdict is Verdict.FAIL and not missed:
+        whole.result = [Failure(_text(step.reason or "the verdict is fail"), "Verdict")]
     elif step.verdict is None:
         whole.result = [Error(_text(step.reason or step.state.value), step.state.value.capitalize())]
     return [*cases, whole]
@@ -107,8 +111,8 @@ def _sentence(check: Check) -> str:
 
 
 def _seconds(begun: datetime | None, ended: datetime | None) -> float:
-    """By the wall clock; 0 where it was set back meanwhile, because readers take no negative time."""
-    return 0.0 if begun is None or ended is None else max(0.0, (ended - begun).total_seconds())
+    """To the millisecond, by the wall clock; 0 where it was set back meanwhile: readers take no sign, no exponent."""
+    return 0.0 if begun is None or ended is None else max(0.0, round((ended - begun).total_seconds(), 3))
 
 
 def _text(text: str) -> str:
