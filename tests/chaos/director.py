@@ -110,7 +110,9 @@ class Run:
     drained: bool = False
     seconds: float = 0.0
     striking_s: float = 0.0
-    """Of these, from the first disaster to the last [s]: without the first start and what is left to end."""
+    """Of these, from the first disaster to the last [s]."""
+    draining_s: float = 0.0
+    """Of these, from the last disaster to the end of all that was begun [s]."""
 
     @property
     def kills(self) -> int:
@@ -149,6 +151,7 @@ class Director:
             run.striking_s = time.monotonic() - first
             run.clients.submit_no_more()
             run.drained = self._drain()
+            run.draining_s = time.monotonic() - first - run.striking_s
             self.topology.end_in_order()
         finally:
             for thread in (run.clients, *run.listeners, *witnesses):

@@ -14,7 +14,7 @@ import httpx
 FINAL = ("succeeded", "failed", "cancelled")
 OPEN_JOBS = 1
 """How many jobs of a bench wait or run at any time, as long as the load lasts; beside them a campaign run."""
-SECOND_RUN = 0.01
+SECOND_RUN = 0.003
 """How often, of all looks, a second campaign run is asked for while a bench has an open one: it must wait."""
 LOST_ANSWERS = 0.2
 """Of the submissions, how many clients hang up before the answer."""

@@ -66,7 +66,7 @@ def figures(run: Run, books: Books) -> list[str]:
     return [
         f"{run.kills} processes killed ({_counted(killed)}), {run.restarts} database restarts, "
         f"{sum(d.how == 'SIGTERM' for d in run.topology.ledger.deaths)} orderly ends, in {run.seconds:.0f} s: "
-        f"{60.0 * run.kills / run.striking_s:.1f} kills/min until the last",
+        f"{60.0 * run.kills / run.striking_s:.1f} kills/min until the last, {run.draining_s:.0f} s until all had ended",
         f"disasters: {_counted(Counter(run.done))}",
         f"jobs: {len(books.jobs)} ({by_state}); failed of: {_counted(failures)}; attempts at most "
         f"{max(row['attempt'] for row in books.jobs.values())}; queued again because of: {_counted(again)}",

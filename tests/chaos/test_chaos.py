@@ -3,13 +3,13 @@
 import json
 import shutil
 import sqlite3
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
 
 from tests.chaos import books as check
-from tests.chaos.books import Books, Twins
+from tests.chaos.books import Books, Row, Twins
 from tests.chaos.campaigns import campaigns
 from tests.chaos.databases import engine
 from tests.chaos.journals import masters
@@ -42,6 +42,15 @@ def test_every_promise_is_kept_while_processes_are_killed(kind: str, tmp_path: P
     assert finding.kills >= KILLS
 
 
+def asked(rows: Mapping[str, Row]) -> list[Asked]:
+    """As clients would have asked for jobs or campaign runs; nobody asks for the jobs of a campaign run."""
+    return [
+        Asked(f"key {row['labels']['chaos']}", {"labels": {"chaos": row["labels"]["chaos"]}}, "none", [id_])
+        for id_, row in rows.items()
+        if "campaign_run" not in row["labels"]
+    ]
+
+
 def everything(books: Books, expected: Twins, before: Books) -> list[str]:
     """All that is checked of stored rows; `before` is what was once seen."""
     seen = Seen(
@@ -54,17 +63,9 @@ def everything(books: Books, expected: Twins, before: Books) -> list[str]:
             if event["kind"] == "station"
         },
     )
-    jobs, runs = (
-        [
-            Asked(f"key {row['labels']['chaos']}", {"labels": {"chaos": row["labels"]["chaos"]}}, "none", [id_])
-            for id_, row in rows.items()
-            if "campaign_run" not in row["labels"]
-        ]
-        for rows in (before.jobs, before.runs)
-    )
     return (
-        check.acknowledged(books, jobs, ())
-        + campaigns(books, runs, ())
+        check.acknowledged(books, asked(before.jobs), ())
+        + campaigns(books, asked(before.runs), ())
         + check.histories(books)
         + check.results(books)
         + check.stations(books, expected)
@@ -98,6 +99,8 @@ TAMPERED = {
     "a payload is damaged": ("UPDATE chunks SET payload = substr(payload, 2)", "is not what was written"),
     "counts do not add up": ("UPDATE recordings SET samples = samples + 1", "are claimed"),
     "a result's lineage is wrong": ("UPDATE result_recordings SET content_hash = 'x'", "not what it was"),
+}
+TAMPERED_RUNS = {
     "a campaign run is lost": ("UPDATE campaign_runs SET id = 'x' || id", "is lost"),
     "a job of a campaign run that is not there": ("UPDATE campaign_runs SET id = 'x' || id", "which is not there"),
     "a campaign run is stuck": ("UPDATE campaign_runs SET state = 'running'", "it is running at the end"),
@@ -151,17 +154,29 @@ def test_nothing_is_found_where_nothing_is_wrong(books: Books, undisturbed: Twin
     assert everything(books, undisturbed, books) == []
 
 
+def tampered(folder: Path, to: Path, statement: str) -> Books:
+    """The undisturbed run's books, copied, after a statement that changes something."""
+    copy = shutil.copy(folder / "undisturbed.sqlite", to / "copy.sqlite")
+    with sqlite3.connect(copy) as connection:
+        connection.execute("DROP INDEX uq_recordings_complete_station")
+        assert connection.execute(statement).rowcount > 0
+    connection.close()
+    return Books(engine(f"sqlite:///{copy}"))
+
+
 @pytest.mark.parametrize("what", TAMPERED)
 def test_what_is_wrong_in_the_books_is_found(
     what: str, folder: Path, tmp_path: Path, undisturbed: Twins, books: Books
 ) -> None:
     statement, words = TAMPERED[what]
-    copy = shutil.copy(folder / "undisturbed.sqlite", tmp_path / "copy.sqlite")
-    with sqlite3.connect(copy) as connection:
-        connection.execute("DROP INDEX uq_recordings_complete_station")
-        assert connection.execute(statement).rowcount > 0
-    connection.close()
-    found = everything(Books(engine(f"sqlite:///{copy}")), undisturbed, books)
+    found = everything(tampered(folder, tmp_path, statement), undisturbed, books)
+    assert any(words in violation for violation in found), found
+
+
+@pytest.mark.parametrize("what", TAMPERED_RUNS)
+def test_what_is_wrong_with_campaign_runs_is_found(what: str, folder: Path, tmp_path: Path, books: Books) -> None:
+    statement, words = TAMPERED_RUNS[what]
+    found = campaigns(tampered(folder, tmp_path, statement), asked(books.runs), ())
     assert any(words in violation for violation in found), found
 
 
