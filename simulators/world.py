@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from procedures.bench import Bench
-from procedures.bench.errors import DeviceFault
+from procedures.bench.errors import DeviceFault, OtherVersion
 from procedures.core import units
 from procedures.core.recording import Station
 from procedures.core.table_angles import TableAngles
@@ -104,7 +104,7 @@ class SimulatedBench(Bench):
 def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> SimulatedBench:
     """A bench with the table at zero and the unit off, or as a checkpoint of the same seed and rate left it.
 
-    Raises `DeviceFault` where a chamber is wanted and the bench has none.
+    Raises `DeviceFault` where a chamber is wanted and the bench has none, `OtherVersion` for another's checkpoint.
     """
     clock = SimClock(config.rate_hz, config.real_time_factor, config.wait, config.slice_s)
     table = SimTurntable(config.bench, config.seed, clock)
@@ -191,12 +191,18 @@ def climate_of(chamber: SimChamber, warmth: Warmth, ticks: int) -> Climate:
 
 def _resume(bench: SimulatedBench, checkpoint: Mapping[str, Any]) -> None:
     config = bench.config
-    version = checkpoint["version"]
+    version = checkpoint.get("version")
+    if version != CHECKPOINT_VERSION:
+        raise OtherVersion(
+            f"the simulated bench's state was stored by version {version} of the simulators, and these are version "
+            f"{CHECKPOINT_VERSION}: a job cannot go on from it. Submit it again with the same seed, or resume it under "
+            "the service that began it"
+        )
     warm = checkpoint.get("chamber") is not None
     sourced = checkpoint.get("current_source") is not None
-    made_with = (version, checkpoint["seed"], checkpoint["rate_hz"], warm, sourced)
-    if made_with != (CHECKPOINT_VERSION, config.seed, config.rate_hz, config.thermal, config.currents):
-        raise ValueError(f"the checkpoint was made with (version, seed, rate_hz, thermal, currents) = {made_with!r}")
+    made_with = (checkpoint["seed"], checkpoint["rate_hz"], warm, sourced)
+    if made_with != (config.seed, config.rate_hz, config.thermal, config.currents):
+        raise ValueError(f"the checkpoint was made with (seed, rate_hz, thermal, currents) = {made_with!r}")
     bench.clock.ticks = int(checkpoint["ticks"])
     bench.turntable.resume(checkpoint["turntable"])
     bench.supply.resume(checkpoint["supply"])

@@ -61,8 +61,9 @@ FAULTS = (BenchError, NotSettled, SoakNotReached, NotPowered, DeviceFault, Devic
 BENCH_FAULTS = frozenset(fault.__name__ for fault in FAULTS)
 """Kinds of failure that are the bench's, and may be gone the next time; a demand out of range never will be."""
 
-RESUMABLE = BENCH_FAULTS | {"NotSafe", "DeadlinePassed", "LeaseLost", "StorageFull", "StorageFailure"}
-"""Kinds of failure after which the stations that remain, or the analysis, can still be done."""
+RESUMABLE = BENCH_FAULTS | {"NotSafe", "DeadlinePassed", "LeaseLost", "StorageFull", "StorageFailure", "OtherVersion"}
+"""Kinds of failure after which the stations that remain, or the analysis, can still be done: after `OtherVersion` by
+the service that began the job."""
 
 
 @dataclass(frozen=True)

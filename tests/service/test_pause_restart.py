@@ -1,5 +1,8 @@
 """What outlives the service: a paused job, a wish to pause, a stopped bench."""
 
+import json
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 from bench_service.cli.client import connect
@@ -32,6 +35,49 @@ def test_a_pause_survives_the_service_and_a_resume_gives_what_an_undisturbed_job
         assert http.post(f"/api/v1/jobs/{job}/resume").status_code == 202
         assert second.wait(job)["state"] == "succeeded"
         assert hashes(second, job) == hashes(second, undisturbed)
+
+
+def store_version(database: Path, job: str, version: int) -> int:
+    """Have every checkpoint of a job be of a version; the one that they were of."""
+    with closing(sqlite3.connect(database)) as connection, connection:
+        rows = connection.execute("SELECT id, checkpoint FROM recordings WHERE job_id = ?", (job,)).fetchall()
+        found = [(recording, json.loads(text)) for recording, text in rows if text is not None]
+        for recording, checkpoint in found:
+            changed = json.dumps({**checkpoint, "version": version})
+            connection.execute("UPDATE recordings SET checkpoint = ? WHERE id = ?", (changed, recording))
+    (before,) = {checkpoint["version"] for _, checkpoint in found if checkpoint is not None}
+    return before
+
+
+def test_a_job_whose_world_another_version_stored_ends_with_both_versions_and_what_to_do(tmp_path: Path) -> None:
+    database = tmp_path / "bench.sqlite"
+    with connect(Settings(database_url=f"sqlite:///{database}"), None, drive=True) as http:
+        client = Client(http)
+        undisturbed = client.wait(client.submit(seed=5, parameters=SLOW)["id"])["id"]
+        job = client.submit(seed=5, parameters=SLOW, retries=2)["id"]
+        deadline = monotonic_s() + 60.0
+        while client.job(job)["progress"]["station"] < 4:
+            assert monotonic_s() < deadline
+            pause(0.005)
+        http.post(f"/api/v1/jobs/{job}/pause")
+        done = client.wait(job, "paused")["progress"]["station"]
+        present = store_version(database, job, 1)
+        http.post(f"/api/v1/jobs/{job}/resume").raise_for_status()
+        failed = client.wait(job)
+        assert (failed["state"], failed["verdict"], failed["attempt"]) == ("failed", "error", 2), "and is not retried"
+        assert failed["error"]["kind"] == "OtherVersion"
+        for words in ("version 1 of", f"these are version {present}", "Submit it again with the same seed"):
+            assert words in failed["error"]["message"]
+        assert len(client.recordings(job)) == done, "what was recorded is kept"
+        view = http.get("/api/v1/benches/sim").json()
+        assert (view["state"], view["safety"]["safe"]) == ("idle", True)
+        assert client.wait(client.submit("no_operation")["id"])["state"] == "succeeded"
+
+        store_version(database, job, present)  # the service that began it is back
+        assert failed["resumable"]
+        http.post(f"/api/v1/jobs/{job}/resume").raise_for_status()
+        assert client.wait(job)["state"] == "succeeded"
+        assert hashes(client, job) == hashes(client, undisturbed)
 
 
 def test_a_stop_outlives_the_service(tmp_path: Path) -> None:

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from procedures.bench import Operator
-from procedures.bench.errors import DeviceFault, OutOfRange
+from procedures.bench.errors import DeviceFault, OtherVersion, OutOfRange
 from procedures.core.recording import Station
 from procedures.core.table_angles import TableAngles
 from procedures.core.units import ARCSEC
 from simulators.truth import OperatorTruth, TableTruth, default_bench
 from simulators.truth.thermal import ChamberFault
-from simulators.world import SimulatedBench, WorldConfig, build
+from simulators.world import CHECKPOINT_VERSION, SimulatedBench, WorldConfig, build
 
 FAULTS = (ChamberFault("cooling_lost", 900.0),)
 CONFIG = WorldConfig(bench=replace(default_bench(), chamber_faults=FAULTS), seed=9, sample_rate_hz=100.0, thermal=True)
@@ -81,8 +81,14 @@ def test_another_seed_is_another_chamber_and_another_seat(undisturbed: list[byte
 @pytest.mark.parametrize("changes", [{"sample_rate_hz": 50.0}, {"seed": 1}, {"thermal": False}])
 def test_a_checkpoint_is_refused_by_another_rate_seed_or_world(changes: dict[str, object]) -> None:
     state = build(CONFIG).checkpoint()
-    with pytest.raises(ValueError, match=r"made with .* = \(3, 9, 100.0, True, False\)"):
+    with pytest.raises(ValueError, match=r"made with .* = \(9, 100.0, True, False\)"):
         build(replace(CONFIG, **changes), state)
+
+
+@pytest.mark.parametrize("version", [None, 1, CHECKPOINT_VERSION + 1])
+def test_a_checkpoint_of_another_version_is_refused_before_anything_else_of_it_is_read(version: int | None) -> None:
+    with pytest.raises(OtherVersion, match=f"by version {version} of .* are version {CHECKPOINT_VERSION}"):
+        build(CONFIG, {} if version is None else {"version": version})
 
 
 def test_a_job_without_temperatures_does_not_wake_in_the_chamber() -> None:
