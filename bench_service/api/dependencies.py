@@ -9,11 +9,11 @@ from bench_service.jobs.event_hub import EventHub
 from bench_service.jobs.service import BenchService
 
 
-def _service(request: Request) -> BenchService:
+async def _service(request: Request) -> BenchService:  # async: else it is looked up in a thread, for each request
     return request.app.state.service
 
 
-def _hub(request: Request) -> EventHub:
+async def _hub(request: Request) -> EventHub:
     return request.app.state.hub
 
 
