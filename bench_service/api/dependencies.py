@@ -9,7 +9,7 @@ from bench_service.jobs.event_hub import EventHub
 from bench_service.jobs.service import BenchService
 
 
-async def _service(request: Request) -> BenchService:  # not for its own sake: a sync one costs each request a thread
+async def _service(request: Request) -> BenchService:  # async: else it is looked up in a thread, for each request
     return request.app.state.service
 
 

@@ -1,25 +1,28 @@
 """One reader of a job's events for everybody of this process who listens to it.
 
-Lives on the server's event loop. While a job has a listener its events are read once, at most `WATCH_S` after they were
-committed anywhere and at once after a commit of this process, and handed to each listener's own bounded queue. Who does
-not take what is his is dropped, and nobody else notices. What a listener has is in order, without gaps or doubles:
-sequences count from 1 within a job, history comes from the database, and the queue goes on where history ends.
+Lives on the server's event loop. While a job has a listener its events are read once, at once after a commit of this
+process and soon after one of another (`WATCH_S`, `OWN_WATCH_S`), and handed to each listener's own bounded queue. Who
+does not take what is his is dropped, and nobody else notices. What a listener has is in order, without gaps or doubles:
+sequences count from 1 within a job, history comes from memory or the database, and the queue goes on where it ends.
 """
 
 import asyncio
 import logging
 from collections import deque
 from collections.abc import AsyncIterator
-from typing import Protocol
+from contextlib import suppress
 
 from bench_service.jobs.errors import ServiceError
 from bench_service.jobs.job import FINAL, Event, Job, JobState
+from bench_service.jobs.listener import Frames, Listener
 from bench_service.jobs.live import PUBLISH_S, BenchLive, LiveBoard
 from bench_service.jobs.store import JobStore
 from bench_service.wall_clock import monotonic_s
 
 WATCH_S = 0.1
 """How often a watched job is looked at for events that other processes made [s]."""
+OWN_WATCH_S = 0.5
+"""The same for a job of the bench that this process drives: nearly all its events are made here."""
 AGAIN_S = 1.0
 """How long to wait after the database failed [s]."""
 HEARTBEAT_S = 15.0
@@ -27,99 +30,32 @@ HEARTBEAT_S = 15.0
 LAG = 256
 """Events that a listener may be behind before it is dropped."""
 RECENT = 256
-"""Events of a watched job that are kept for who comes next: many who reconnect at once do not read the database."""
+"""The last events of a watched job, which are kept: many who come at once do not each read the database."""
 PAGE = 1000
 LIVE_PER_S = 100.0
-"""Live words sent in a second, over all listeners of a job: the more they are, the less often each one hears."""
+"""Live words sent in a second, over all listeners of a job: the more they are, the less often each one hears, but for
+the words that an event takes along.
+"""
 OVER = FINAL | {JobState.INTERRUPTED}
 
 log = logging.getLogger(__name__)
 
 
-class Frames(Protocol):
-    """How what listeners are told is written."""
-
-    @property
-    def quiet(self) -> bytes:
-        """Nothing has happened for a while."""
-        ...
-
-    @property
-    def dropped(self) -> bytes:
-        """The listener was too slow; this is the last it hears."""
-        ...
-
-    def event(self, event: Event) -> bytes: ...
-
-    def live(self, live: BenchLive) -> bytes: ...
-
-
-class Listener:
-    """One who listens: what waits for him, and whether it ends."""
-
-    def __init__(self, watch: "_Watch", after: int, lag: int) -> None:
-        self.watch = watch
-        self.after = after
-        self.joined_at = watch.sequence
-        self.ended = False
-        self.dropped = False
-        self._lag = lag
-        self._frames: deque[tuple[int, bytes]] = deque()
-        self._live: bytes | None = None
-        self._woken = asyncio.Event()
-
-    def put(self, sequence: int, frame: bytes) -> bool:
-        """Queue an event. False where too many wait already: the listener is dropped, and its queue let go."""
-        if len(self._frames) >= self._lag:
-            self.dropped = self.ended = True
-            self._frames.clear()
-        else:
-            self._frames.append((sequence, frame))
-        self._woken.set()
-        return not self.dropped
-
-    def put_live(self, frame: bytes) -> None:
-        """Only the newest live word waits."""
-        self._live = frame
-        self._woken.set()
-
-    def end(self) -> None:
-        """Nothing more will come."""
-        self.ended = True
-        self._woken.set()
-
-    async def next(self) -> bytes | None:
-        """What is next; None: nothing for `HEARTBEAT_S`, or the end (see `ended`)."""
-        while True:
-            while self._frames:
-                sequence, frame = self._frames.popleft()
-                if sequence > self.after:
-                    self.after = sequence
-                    return frame
-            if self.ended:
-                return None
-            if self._live is not None:
-                frame, self._live = self._live, None
-                return frame
-            self._woken.clear()
-            if not await _comes(self._woken, HEARTBEAT_S):
-                return None
-
-
 class _Watch:
     """A job that somebody listens to."""
 
-    def __init__(self, job: Job, sequence: int, state: JobState, recent: int) -> None:
+    def __init__(self, job: Job, sequence: int, state: JobState, recent: deque[tuple[int, bytes]]) -> None:
         self.job_id, self.bench = job.id, job.bench
         self.sequence = sequence
         self.state = state
-        self.recent: deque[tuple[int, bytes]] = deque(maxlen=recent)
+        self.recent = recent
         self.listeners: set[Listener] = set()
         self.woken = asyncio.Event()
         self.loop = asyncio.get_running_loop()
-        self.task: asyncio.Task[None] | None = None
+        self.closed = False
         self.live_told: BenchLive | None = None
         self.live_at_s = 0.0
+        self.beat_at_s = monotonic_s()
 
 
 class EventHub:
@@ -134,6 +70,8 @@ class EventHub:
         self._lag = lag
         self._recent = recent
         self._watches: dict[str, _Watch] = {}
+        self._opening: dict[str, asyncio.Task[_Watch]] = {}
+        self._running: set[asyncio.Task[None]] = set()
         jobs.on_event(self.wake)
 
     @property
@@ -149,8 +87,7 @@ class EventHub:
 
     async def require(self, job_id: str) -> None:
         """Raises `NotFound` for a job that there is not, `StorageFailure`."""
-        if job_id not in self._watches:
-            await asyncio.to_thread(self._jobs.get, job_id)
+        await self._watch(job_id)
 
     async def follow(self, job_id: str, after: int) -> AsyncIterator[bytes]:
         """Everything after an event's sequence until the job has ended, or the listener is dropped.
@@ -158,45 +95,63 @@ class EventHub:
         It also ends where the database does not answer: who comes back with the last id he saw misses nothing.
         """
         try:
-            listener = await self._join(job_id, after)
+            watch = await self._watch(job_id)
         except ServiceError as error:
             log.warning("nobody can listen to job %s now: %s", job_id, error)
             return
+        listener = Listener(after, watch.sequence, self._lag)
+        watch.listeners.add(listener)
+        if watch.closed:
+            listener.end()
         try:
-            async for frame in self._history(listener):
+            async for frame in self._history(watch, listener):
                 yield frame
-            while (frame := await listener.next()) is not None or not listener.ended:
-                yield self._frames.quiet if frame is None else frame
+            while piece := await listener.next():
+                yield piece
             if listener.dropped:
                 yield self._frames.dropped
         except ServiceError as error:
             log.warning("a listener to job %s is let go, the past cannot be read now: %s", job_id, error)
         finally:
-            listener.watch.listeners.discard(listener)
+            watch.listeners.discard(listener)
 
-    async def _join(self, job_id: str, after: int) -> Listener:
+    async def _watch(self, job_id: str) -> _Watch:
+        """The watch of a job; it waits `WATCH_S` for its first listener. Many who come at once share one look at the
+        database. Raises as `require`.
+        """
         watch = self._watches.get(job_id)
-        if watch is None:
-            job, (sequence, state) = await asyncio.to_thread(
-                lambda: (self._jobs.get(job_id), self._jobs.last_event(job_id))
-            )
-            watch = self._watches.setdefault(job_id, _Watch(job, sequence, state, self._recent))
-        listener = Listener(watch, after, self._lag)
-        watch.listeners.add(listener)
-        if watch.task is None:
-            watch.task = asyncio.create_task(self._run(watch), name=f"events of {job_id}")
-        return listener
+        while watch is None or (watch.closed and watch.state not in OVER):
+            if job_id not in self._opening:
+                self._opening[job_id] = asyncio.create_task(self._open(job_id), name=f"open the watch of {job_id}")
+            watch = await asyncio.shield(self._opening[job_id])  # one who goes away does not end it for the others
+        return watch
 
-    async def _history(self, listener: Listener) -> AsyncIterator[bytes]:
+    async def _open(self, job_id: str) -> _Watch:
+        try:
+            job, (sequence, state), page = await asyncio.to_thread(self._found, job_id)
+        finally:
+            del self._opening[job_id]
+        recent = ((event.sequence, self._frames.event(event)) for event in page if event.sequence <= sequence)
+        watch = self._watches[job_id] = _Watch(job, sequence, state, deque(recent, self._recent))
+        running = asyncio.create_task(self._run(watch), name=f"events of {job_id}")
+        self._running.add(running)
+        running.add_done_callback(self._running.discard)
+        return watch
+
+    def _found(self, job_id: str) -> tuple[Job, tuple[int, JobState], tuple[Event, ...]]:
+        job, last = self._jobs.get(job_id), self._jobs.last_event(job_id)
+        return job, last, self._jobs.events(job_id, max(0, last[0] - self._recent), self._recent)
+
+    async def _history(self, watch: _Watch, listener: Listener) -> AsyncIterator[bytes]:
         """What had happened when the listener came: from what is kept, or from the database."""
-        kept = tuple(listener.watch.recent)
+        kept = tuple(watch.recent)
         if kept and kept[0][0] <= listener.after + 1:
             for sequence, frame in kept:
                 if listener.after < sequence <= listener.joined_at:
                     listener.after = sequence
                     yield frame
         while listener.after < listener.joined_at and not listener.dropped:
-            page = await asyncio.to_thread(self._jobs.events, listener.watch.job_id, listener.after, PAGE)
+            page = await asyncio.to_thread(self._jobs.events, watch.job_id, listener.after, PAGE)
             for event in page:
                 if event.sequence <= listener.joined_at:
                     listener.after = event.sequence
@@ -204,27 +159,32 @@ class EventHub:
 
     async def _run(self, watch: _Watch) -> None:
         """Read and hand out while somebody listens and the job goes on."""
+        look_s = OWN_WATCH_S if watch.bench == self._board.own else WATCH_S
+        wait_s = look_s
         try:
-            while watch.listeners:
+            while watch.state not in OVER:
+                await _comes(watch.woken, wait_s)
+                if not watch.listeners:
+                    return
                 watch.woken.clear()
+                self._beat(watch)
                 try:
-                    await self._read(watch)
-                    if watch.state in OVER:
-                        return
-                    await self._tell_live(watch)
-                    wait_s = WATCH_S
+                    alone_s = len(watch.listeners) / LIVE_PER_S
+                    await self._tell_live(watch, 0.0 if await self._read(watch) else alone_s)
+                    wait_s = look_s
                 except ServiceError as error:
                     log.warning("events of job %s cannot be read now: %s", watch.job_id, error)
                     wait_s = AGAIN_S
-                await _comes(watch.woken, wait_s)
         finally:
+            watch.closed = True
             if self._watches.get(watch.job_id) is watch:
                 del self._watches[watch.job_id]
             for listener in tuple(watch.listeners):
                 listener.end()
 
-    async def _read(self, watch: _Watch) -> None:
-        """Hand out what is new; afterwards `state` is that of the newest event."""
+    async def _read(self, watch: _Watch) -> bool:
+        """Hand out what is new, and whether anything is; afterwards `state` is that of the newest event."""
+        before = watch.sequence
         newest, state = await asyncio.to_thread(self._jobs.last_event, watch.job_id)
         while watch.sequence < newest:
             page = await asyncio.to_thread(self._jobs.events, watch.job_id, watch.sequence, PAGE)
@@ -232,6 +192,7 @@ class EventHub:
                 self._hand_out(watch, event)
             newest = max(newest, watch.sequence)
         watch.state = state
+        return watch.sequence > before
 
     def _hand_out(self, watch: _Watch, event: Event) -> None:
         frame = self._frames.event(event)
@@ -243,10 +204,10 @@ class EventHub:
                 self.dropped += 1
                 log.info("a listener to job %s was %d events behind and is dropped", watch.job_id, self._lag)
 
-    async def _tell_live(self, watch: _Watch) -> None:
-        """Hand out what the bench does now, where it works on this job."""
+    async def _tell_live(self, watch: _Watch, rest_s: float) -> None:
+        """Hand out what the bench does now, where it works on this job; `rest_s` at least after the last time."""
         at_s = monotonic_s()
-        if at_s - watch.live_at_s < max(PUBLISH_S, len(watch.listeners) / LIVE_PER_S):
+        if watch.state in OVER or at_s - watch.live_at_s < max(PUBLISH_S, rest_s):
             return
         own = watch.bench == self._board.own
         live = self._board.said() if own else await asyncio.to_thread(self._board.of_bench, watch.bench)
@@ -256,13 +217,20 @@ class EventHub:
         watch.live_told = live
         frame = self._frames.live(live)
         for listener in watch.listeners:
-            listener.put_live(frame)
+            listener.put_word(frame)
+
+    def _beat(self, watch: _Watch) -> None:
+        """Let nobody wait longer than `HEARTBEAT_S` for a word."""
+        at_s = monotonic_s()
+        if at_s - watch.beat_at_s < HEARTBEAT_S / 2:
+            return
+        watch.beat_at_s = at_s
+        for listener in watch.listeners:
+            listener.beat(self._frames.quiet)
 
 
-async def _comes(event: asyncio.Event, seconds: float) -> bool:
-    """Whether it comes within so long."""
-    try:
+async def _comes(event: asyncio.Event, seconds: float) -> None:
+    """Wait for it, but only so long."""
+    with suppress(TimeoutError):
         async with asyncio.timeout(seconds):
-            return await event.wait()
-    except TimeoutError:
-        return False
+            await event.wait()

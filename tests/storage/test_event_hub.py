@@ -25,8 +25,8 @@ def elsewhere(database_url: str) -> Iterator[Stores]:
     database.dispose()
 
 
-def ids(frames: list[bytes]) -> list[int]:
-    return [int(frame.split(b"\n")[0].removeprefix(b"id: ")) for frame in frames]
+def ids(pieces: list[bytes]) -> list[int]:
+    return [int(line.removeprefix(b"id: ")) for line in b"".join(pieces).split(b"\n") if line.startswith(b"id: ")]
 
 
 async def note(stores: Stores, job: Job, count: int = 1) -> None:
