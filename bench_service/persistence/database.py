@@ -18,12 +18,15 @@ from typing import Any
 from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
 from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError, SQLAlchemyError
 from sqlalchemy.orm import Session
+from sqlalchemy.pool import QueuePool
 
 from bench_service import wall_clock
 from bench_service.jobs.errors import StorageFailure, StorageFull
 
 BUSY_S = 30.0
 """How long a writer waits for another one."""
+LEAVE_S = 1.0
+"""How long the end waits for connections that are in use [s]."""
 
 _NEWS = "news"
 _SQLITE_FULL = frozenset({sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_SHMSIZE})
@@ -89,7 +92,10 @@ class Database:
         return self.engine.dialect.name == "postgresql"
 
     def dispose(self) -> None:
-        """Close all connections."""
+        """Close all connections; one that a thread still reads over is waited for, as nobody would close it later."""
+        pool, deadline = self.engine.pool, wall_clock.monotonic_s() + LEAVE_S
+        while isinstance(pool, QueuePool) and pool.checkedout() > 0 and wall_clock.monotonic_s() < deadline:
+            wall_clock.pause(0.01)
         self.engine.dispose()
 
 

@@ -77,6 +77,7 @@ class FileLease:
     def __init__(self, path: Path, bench_id: str, role: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._mutex = threading.Lock()
+        self._given_back = False
         self._path = path
         self._bench_id = bench_id
         self._role = role
@@ -98,6 +99,8 @@ class FileLease:
         """Lock the file that is there now, after ours was taken away; False where somebody else was first."""
         with self._mutex:
             self._drop()
+            if self._given_back:  # a thread that looks once more while the process ends
+                return False
             try:
                 self._file = self._locked()
             except (BenchBusy, OSError):
@@ -105,8 +108,9 @@ class FileLease:
             return True
 
     def release(self) -> None:
-        """Give the bench back; a second time does nothing."""
+        """Give the bench back, for good; a second time does nothing."""
         with self._mutex:
+            self._given_back = True
             self._drop()
 
     def _drop(self) -> None:
@@ -142,6 +146,7 @@ class ServerLease:
 
     def __init__(self, url: URL, bench_id: str, role: str) -> None:
         self._mutex = threading.Lock()
+        self._given_back = False
         self._bench_id = bench_id
         self._key = lease_key(bench_id)
         self._engine = create_engine(
@@ -175,6 +180,8 @@ class ServerLease:
         """Lock again over a new connection, after the old one ended; False where that cannot be done now."""
         with self._mutex:
             self._drop()
+            if self._given_back:  # a thread that looks once more while the process ends
+                return False
             try:
                 self._connection = self._locked()
             except (BenchBusy, SQLAlchemyError):
@@ -182,8 +189,9 @@ class ServerLease:
             return True
 
     def release(self) -> None:
-        """Give the bench back; a second time does nothing."""
+        """Give the bench back, for good; a second time does nothing."""
         with self._mutex:
+            self._given_back = True
             self._drop()
 
     def _locked(self) -> Connection:

@@ -29,7 +29,8 @@ def test_a_stop_its_confirmation_and_what_was_done(
     assert stop.safe_at is not None
     books.note("the supervisor", "made safe", job.id)
     books.note("the supervisor", "made safe", "no such job")
-    assert stores.jobs.events(job.id)[-1].data == {"text": "made safe", "by": "the supervisor"}
+    said = stores.jobs.events(job.id)[-1].data
+    assert (said["text"], said["by"]) == ("made safe", "the supervisor")
     with database.read() as session:
         assert session.scalar(sa.select(sa.func.count()).select_from(AuditRow)) == 2
     stores.units.release_bench("sim")
