@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Event
 from uuid import uuid4
 
 import numpy as np
@@ -24,7 +25,7 @@ from bench_service.persistence import Database, open_stores
 from bench_service.persistence.database import connect
 from bench_service.persistence.tables import ChunkRow, RecordingRow
 from bench_service.persistence.tables_around_jobs import Table
-from bench_service.wall_clock import now
+from bench_service.wall_clock import now, pause
 from procedures.core.recording import RawArray
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -70,6 +71,25 @@ def test_what_is_no_database_is_refused(tmp_path: Path) -> None:
     for url in (f"sqlite:///{file}", "sqlite://", "nonsense", f"sqlite:///{file}/below.sqlite"):
         with pytest.raises(StorageFailure):
             open_stores(url)
+
+
+def test_a_database_closes_once_nobody_reads(database_url: str) -> None:
+    database, reading = connect(database_url), Event()
+
+    def read() -> int | None:
+        with database.read() as session:
+            found = session.scalar(sa.select(sa.literal(7)))
+            reading.set()
+            pause(0.3)
+        return found
+
+    with ThreadPoolExecutor(1) as pool:
+        reader = pool.submit(read)
+        assert reading.wait(20)
+        old = database.engine.pool
+        database.dispose()
+        assert old.checkedout() == 0
+        assert reader.result() == 7
 
 
 def test_sqlite_survives_a_power_cut_by_its_settings(sqlite_url: str) -> None:

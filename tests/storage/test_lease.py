@@ -97,6 +97,14 @@ def test_a_lease_is_for_one_bench_and_ends_with_its_release(database_url: str) -
     _acquire_soon(database_url).release()
 
 
+def test_a_lease_that_was_given_back_is_not_taken_again_by_who_looks_once_more(database_url: str) -> None:
+    lease = acquire_lease(database_url, "sim")
+    lease.release()
+    assert not lease.held()
+    assert not lease.regain()
+    acquire_lease(database_url, "sim").release()
+
+
 def test_a_lease_whose_lock_file_was_taken_away_is_lost(sqlite_url: str, tmp_path: Path) -> None:
     lease = acquire_lease(sqlite_url, "sim")
     (tmp_path / "bench-sim.lock").unlink()
