@@ -1,8 +1,8 @@
 """The dispatcher of a bench: it takes the next admissible job from the bench's queue, has it run, and takes the next.
 
 The queue is our own jobs table. A job is claimed in one transaction (it is running from then on, and no bench has two
-running jobs), and its durable workflow begins at once. What a crash leaves behind is put right at the next start and
-after every job, so that no job stays running without anybody who runs it:
+running jobs), and its durable workflow begins at once. What a crash leaves behind is put right whenever the queue
+is looked at, so that no job stays running without anybody who runs it:
 
 - claimed, and the process died before its workflow was written: back into its place in the queue;
 - its workflow is this engine's and unfinished: the engine goes on with it by itself, and is waited for;
