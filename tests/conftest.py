@@ -12,9 +12,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: two xdist wo
 
 import pytest
 import sqlalchemy as sa
+from hypothesis import settings
 
 from bench_service.persistence import open_stores
 from tests.shared_data import SHARED_DATA
+
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.load_profile("repeatable")
 
 
 @pytest.fixture(scope="session")

@@ -146,6 +146,12 @@ class Clients(Thread):
                 self._keep_busy(bench)
             self._release()
 
+    def see_through(self, asked: Asked) -> str:
+        """What all others are asked for by the thread, of one job alone, before it is started; its state now."""
+        self._follow(asked)
+        self._release()
+        return asked.state
+
     def submit_no_more(self) -> None:
         """From now on only what was begun is followed to its end; what is paused is resumed at once."""
         self._submitting = False
@@ -214,7 +220,7 @@ class Clients(Thread):
         asked.state = answer.json()["state"]
         if asked.state in FINAL:
             return
-        if asked.state in ("paused", "interrupted") and asked in self.jobs:
+        if asked.state in ("paused", "interrupted") and asked not in self.runs:
             self._resume(asked)
         elif not asked.wished and asked.wish != "none" and self._chance.random() < 0.3:
             self._wish(asked)
