@@ -24,6 +24,7 @@ from bench_service.jobs.stored import (
     Idempotency,
     NewRecording,
     Page,
+    ResultValue,
     StoredCalibration,
     StoredRecording,
     StoredResult,
@@ -214,8 +215,25 @@ class ResultStore(Protocol):
         self, *, job_id: str | None = None, unit: str | None = None, after: str | None = None, limit: int = 50
     ) -> Page[StoredResult]: ...
 
-    def of_verdicts(self, unit: str, name: str, *, simulated: bool, limit: int) -> tuple[StoredResult, ...]:
-        """The results of a procedure that gave a job of the unit its verdict, newest first; no second analyses."""
+    def newest_verdict(self, unit: str, procedure: str, *, simulated: bool) -> StoredResult | None:
+        """The newest of the procedure's results that gave a job of the unit its verdict; no second analysis."""
+        ...
+
+    def values(
+        self,
+        unit: str,
+        procedure: str,
+        quantity: str,
+        *,
+        simulated: bool,
+        limit: int,
+        before: str | None = None,
+        parameters: dict[str, Any] | None = None,
+    ) -> tuple[ResultValue, ...]:
+        """What the newest `limit` of such results say of a quantity, newest first.
+
+        Only results older than `before`, an id, and of a job with just these parameters, count, where these are given.
+        """
         ...
 
     def calibrations_of(self, results: Sequence[str]) -> tuple[str, ...]:

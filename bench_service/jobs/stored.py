@@ -7,6 +7,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from bench_service.jobs.campaigns.quantities import Quantity
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import Channel, RecordingInfo, Station
@@ -113,6 +114,18 @@ class StoredResult:
     context: dict[str, Any] = field(default_factory=dict[str, Any])
     corrections: tuple[str, ...] = ()
     """Ids of correction sets used."""
+
+
+@dataclass(frozen=True)
+class ResultValue:
+    """What one result says of a quantity; None where it lacks it."""
+
+    result: str
+    job: str | None
+    at: datetime
+    simulated: bool
+    code_version: str
+    quantity: Quantity | None
 
 
 @dataclass(frozen=True)

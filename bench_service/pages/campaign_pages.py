@@ -7,7 +7,7 @@ from fastapi.responses import HTMLResponse
 
 from bench_service.jobs.campaigns.quantities import quantities
 from bench_service.jobs.campaigns.run import CampaignRun, StepState
-from bench_service.jobs.campaigns.trend import Trend, history
+from bench_service.jobs.campaigns.trend import Trend
 from bench_service.jobs.job import JobState
 from bench_service.jobs.service import BenchService
 from bench_service.pages.figures import svg
@@ -92,8 +92,8 @@ def trend_page(
     service = _service(request)
     service.stores.units.unit(serial)
     kind = service.benches.description(service.benches.default()).simulated if simulated is None else simulated
-    newest = history(service.stores.results, serial, procedure, kind, 1)
-    names = list(quantities(newest[-1].document)) if newest else []
+    newest = service.stores.results.newest_verdict(serial, procedure, simulated=kind)
+    names = list(quantities(newest.document)) if newest is not None else []
     chosen = quantity or next(iter(names), "")
     trend = service.campaigns.trend(serial, procedure, chosen, kind, limit) if chosen else None
     figure = None if trend is None else trend_figure(trend)

@@ -1,11 +1,18 @@
-"""Results and calibrations as rows and back. Knows the two shapes only; no transaction begins here."""
+"""Results, their numbers, and calibrations as rows and back. Knows the shapes only; no transaction begins here."""
 
 from collections.abc import Iterable
 
 from pydantic import TypeAdapter
 
+from bench_service.jobs.campaigns.quantities import quantities
 from bench_service.jobs.stored import StoredCalibration, StoredResult
-from bench_service.persistence.tables import CalibrationRow, ResultCalibrationRow, ResultRecordingRow, ResultRow
+from bench_service.persistence.tables import (
+    CalibrationRow,
+    ResultCalibrationRow,
+    ResultQuantityRow,
+    ResultRecordingRow,
+    ResultRow,
+)
 from bench_service.persistence.tables_around_jobs import ResultCorrectionRow
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
@@ -31,6 +38,20 @@ def row_of_result(result: StoredResult) -> ResultRow:
         seed=result.seed,
         context=result.context,
     )
+
+
+def quantity_rows(result: StoredResult) -> list[ResultQuantityRow]:
+    """The rows that keep the numbers of a result's document."""
+    return [
+        ResultQuantityRow(
+            result_id=result.id,
+            name=quantity.name,
+            value=quantity.value,
+            unit=quantity.unit,
+            standard_uncertainty=quantity.standard_uncertainty,
+        )
+        for quantity in quantities(result.document).values()
+    ]
 
 
 def lineage_rows(result: StoredResult) -> tuple[ResultRecordingRow | ResultCalibrationRow, ...]:

@@ -2,13 +2,15 @@
 
 from collections import defaultdict
 from collections.abc import Sequence
+from itertools import islice
+from typing import Any
 
 from sqlalchemy import select, update
 from sqlalchemy.orm import Session
 
 from bench_service import wall_clock
 from bench_service.jobs.errors import NotFound
-from bench_service.jobs.stored import Idempotency, Page, StoredCalibration, StoredResult
+from bench_service.jobs.stored import Idempotency, Page, ResultValue, StoredCalibration, StoredResult
 from bench_service.persistence.correction_rows import add_corrections, check_corrections, correction_lineage
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
@@ -17,12 +19,13 @@ from bench_service.persistence.result_rows import (
     TRIADS,
     calibration_of_row,
     lineage_rows,
+    quantity_rows,
     result_of_row,
     row_of_result,
 )
+from bench_service.persistence.result_values import newest_first, of_verdicts, value_of_row, values_query
 from bench_service.persistence.tables import (
     CalibrationRow,
-    JobRow,
     RecordingRow,
     ResultCalibrationRow,
     ResultRecordingRow,
@@ -61,7 +64,7 @@ class SqlResultStore:
                 _check_lineage(session, result)
                 session.add(row_of_result(result))
                 session.flush()
-                session.add_all([*lineage_rows(result), *correction_lineage(result)])
+                session.add_all([*quantity_rows(result), *lineage_rows(result), *correction_lineage(result)])
                 if calibrations:
                     _add_calibration(session, result, calibrations, make_current)
                 add_corrections(session, result, corrections, make_current)
@@ -85,16 +88,27 @@ class SqlResultStore:
             rows = page(session, query, ResultRow.id, after, limit, _itself)
             return Page(_results(session, rows.items), rows.next)
 
-    def of_verdicts(self, unit: str, name: str, *, simulated: bool, limit: int) -> tuple[StoredResult, ...]:
-        query = (
-            select(ResultRow)
-            .join(JobRow, JobRow.result_id == ResultRow.id)
-            .where(ResultRow.unit == unit, ResultRow.name == name, ResultRow.simulated == simulated)
-            .order_by(ResultRow.id.desc())
-            .limit(limit)
-        )
+    def newest_verdict(self, unit: str, procedure: str, *, simulated: bool) -> StoredResult | None:
+        query = of_verdicts(select(ResultRow), unit, procedure, simulated).limit(1)
         with self._database.read() as session:
-            return _results(session, session.scalars(query).all())
+            return next(iter(_results(session, session.scalars(query).all())), None)
+
+    def values(
+        self,
+        unit: str,
+        procedure: str,
+        quantity: str,
+        *,
+        simulated: bool,
+        limit: int,
+        before: str | None = None,
+        parameters: dict[str, Any] | None = None,
+    ) -> tuple[ResultValue, ...]:
+        query = of_verdicts(values_query(quantity), unit, procedure, simulated)
+        with self._database.read() as session:
+            rows = newest_first(session, query, before)
+            same = (row for row in rows if parameters is None or row.parameters == parameters)
+            return tuple(value_of_row(row, quantity) for row in islice(same, limit))
 
     def calibrations_of(self, results: Sequence[str]) -> tuple[str, ...]:
         query = select(CalibrationRow.result_id, CalibrationRow.id).where(CalibrationRow.result_id.in_(results))

@@ -230,6 +230,18 @@ class ResultRecordingRow(Table):
     content_hash: Mapped[str]
 
 
+class ResultQuantityRow(Table):
+    """A number of a result under its name, out of its document: a trend over many results reads no document."""
+
+    __tablename__ = "result_quantities"
+
+    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"), primary_key=True)
+    name: Mapped[str] = mapped_column(Id, primary_key=True)
+    value: Mapped[float] = mapped_column(Float(53))
+    unit: Mapped[str]
+    standard_uncertainty: Mapped[float | None] = mapped_column(Float(53))
+
+
 class CalibrationRow(Table):
     __tablename__ = "calibrations"
     __table_args__ = (

@@ -10,10 +10,11 @@ from bench_service.jobs.analyses import AnalysisDesk
 from bench_service.jobs.campaigns.campaign import Campaign
 from bench_service.jobs.campaigns.conductor import Conductor
 from bench_service.jobs.campaigns.examination import Examination, Examiner, step_field
+from bench_service.jobs.campaigns.quantities import quantity
 from bench_service.jobs.campaigns.run import CampaignRun, RunRequest, StepRun, StepState
 from bench_service.jobs.campaigns.scheduler import Scheduler
 from bench_service.jobs.campaigns.shipped import shipped
-from bench_service.jobs.campaigns.trend import Trend, history, trend_of
+from bench_service.jobs.campaigns.trend import Trend, trend_of
 from bench_service.jobs.errors import IllegalTransition, NameTaken, NotFound
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.planning import Planner
@@ -146,10 +147,13 @@ class CampaignDesk:
         self._planner.procedure(procedure)
         if simulated is None:
             simulated = self._planner.benches.description(self._planner.benches.default()).simulated
-        found = history(self._stores.results, unit, procedure, simulated, last)
-        if same_parameters:
-            found = [result for result in found if result.parameters == found[-1].parameters]
-        return trend_of(found, unit, procedure, name, None)
+        newest = self._stores.results.newest_verdict(unit, procedure, simulated=simulated)
+        plan = newest.parameters if newest is not None and same_parameters else None
+        found = self._stores.results.values(unit, procedure, name, simulated=simulated, limit=last, parameters=plan)
+        trend = trend_of(found[::-1], unit, procedure, name)
+        if newest is not None and not trend.points:
+            quantity(newest.document, name)  # raises: it names what there is
+        return trend
 
 
 def overridden(campaign: Campaign, parameters: Mapping[str, Mapping[str, Any]]) -> Campaign:

@@ -8,7 +8,7 @@ from pydantic import TypeAdapter
 
 from bench_service.jobs.campaigns.campaign import Campaign, Step, StepLimit, TrendRule
 from bench_service.jobs.campaigns.quantities import quantity
-from bench_service.jobs.campaigns.trend import history, trend_of
+from bench_service.jobs.campaigns.trend import trend_of, value_of
 from bench_service.jobs.errors import NotFound
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import StoredResult
@@ -77,18 +77,22 @@ def _limited(limit: StepLimit, campaign: Campaign, document: dict[str, Any]) -> 
 
 
 def _trend(rule: TrendRule, result: StoredResult, stores: Stores) -> tuple[list[Check], list[str]]:
-    """The newest value against limits from the results before it."""
-    unit = result.unit or ""
-    found = history(stores.results, unit, result.name, result.simulated, rule.last + 1, result.parameters)
-    before = [r for r in found if r.id < result.id][-rule.last :]
-    earlier = trend_of(before, unit, result.name, rule.quantity, None) if before else None
-    known = 0 if earlier is None else len(earlier.points)
-    now = quantity(result.document, rule.quantity)
-    if earlier is None or known < rule.at_least or earlier.limits is None:
+    """The newest value against limits from the results of the same plan before it."""
+    unit, now = result.unit or "", quantity(result.document, rule.quantity)
+    earlier = stores.results.values(
+        unit,
+        result.name,
+        rule.quantity,
+        simulated=result.simulated,
+        limit=rule.last,
+        before=result.id,
+        parameters=result.parameters,
+    )
+    chart = trend_of([*earlier[::-1], value_of(result, rule.quantity)], unit, result.name, rule.quantity, judged=1)
+    known = len(chart.points) - 1
+    if known < rule.at_least or chart.limits is None:
         return [], [f"trend of {rule.quantity}: {known} earlier results, {rule.at_least} are needed to judge it"]
-    chart = trend_of([*before, result], unit, result.name, rule.quantity, known)
-    assert chart.limits is not None
-    broken = [s.rule for s in chart.signals if s.index == len(chart.points) - 1]
+    broken = [s.rule for s in chart.signals if s.index == known]
     text = f"trend of {rule.quantity} over {known} results: {'; '.join(broken) or 'no signal'}"
     if rule.outcome == "warning":
         return [], [text] if broken else []

@@ -3,12 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
 
 from bench_service.jobs.campaigns.quantities import Quantity, quantity
-from bench_service.jobs.errors import NotFound
-from bench_service.jobs.store import ResultStore
-from bench_service.jobs.stored import StoredResult
+from bench_service.jobs.stored import ResultValue, StoredResult
 from procedures.analysis.control_chart import LEAST_POINTS, ControlLimits, Signal, control_limits, signals
 
 
@@ -42,52 +39,26 @@ class Trend:
     """Results of that procedure that lack the quantity."""
 
 
-def trend_of(results: Sequence[StoredResult], unit: str, procedure: str, name: str, baseline: int | None) -> Trend:
-    """A chart of results, oldest first; the limits rest on the first `baseline` of them, or on all.
+def trend_of(values: Sequence[ResultValue], unit: str, procedure: str, name: str, judged: int = 0) -> Trend:
+    """A chart of results, oldest first; its limits rest on all points but the last `judged`.
 
-    Raises `NotFound` where there are results and none has the quantity.
+    Points are of the newest one's unit: where another version of a procedure gave another, it began anew.
     """
-    found: list[tuple[StoredResult, Quantity]] = []
-    refusal: NotFound | None = None
-    for result in results:
-        try:
-            found.append((result, quantity(result.document, name)))
-        except NotFound as missing:
-            refusal = missing
-    if not found and refusal is not None:
-        raise refusal
+    found = [(value, value.quantity) for value in values if value.quantity is not None]
     unit_of = found[-1][1].unit if found else ""
-    points = tuple(_point(result, q) for result, q in found if q.unit == unit_of)
-    values = [p.value for p in points]
-    base = values[:baseline]
+    points = tuple(_point(value, q) for value, q in found if q.unit == unit_of)
+    numbers = [p.value for p in points]
+    base = numbers[: len(numbers) - judged]
     limits = control_limits(base) if len(base) >= LEAST_POINTS else None
-    broken = () if limits is None else signals(values, limits)
-    return Trend(unit, procedure, name, unit_of, points, limits, broken, len(results) - len(points))
+    broken = () if limits is None else signals(numbers, limits)
+    return Trend(unit, procedure, name, unit_of, points, limits, broken, len(values) - len(points))
 
 
-def history(
-    results: ResultStore,
-    unit: str,
-    procedure: str,
-    simulated: bool,
-    last: int,
-    parameters: dict[str, Any] | None = None,
-) -> list[StoredResult]:
-    """The latest results that gave a job of the unit its verdict, oldest first; real and simulated ones apart.
-
-    With `parameters` only those of the same plan: another dwell has another spread.
-    """
-    found = results.of_verdicts(unit, procedure, simulated=simulated, limit=last)
-    return [result for result in found[::-1] if parameters is None or result.parameters == parameters]
+def value_of(result: StoredResult, name: str) -> ResultValue:
+    """A quantity of one result. Raises `NotFound`, naming what there is."""
+    found = quantity(result.document, name)
+    return ResultValue(result.id, result.job_id, result.created_at, result.simulated, result.code_version, found)
 
 
-def _point(result: StoredResult, q: Quantity) -> TrendPoint:
-    return TrendPoint(
-        result.id,
-        result.job_id,
-        result.created_at,
-        q.value,
-        q.standard_uncertainty,
-        result.simulated,
-        result.code_version,
-    )
+def _point(of: ResultValue, q: Quantity) -> TrendPoint:
+    return TrendPoint(of.result, of.job, of.at, q.value, q.standard_uncertainty, of.simulated, of.code_version)
