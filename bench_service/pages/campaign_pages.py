@@ -9,17 +9,12 @@ from bench_service.jobs.campaigns.quantities import quantities
 from bench_service.jobs.campaigns.run import CampaignRun, StepState
 from bench_service.jobs.campaigns.trend import Trend
 from bench_service.jobs.job import JobState
-from bench_service.jobs.service import BenchService
 from bench_service.pages.figures import svg
-from bench_service.pages.routes import templates
+from bench_service.pages.routes import service_of, templates
 from procedures.core.report import Figure, Series
 from procedures.core.units import DISPLAY
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
-
-
-def _service(request: Request) -> BenchService:
-    return request.app.state.service
 
 
 def _explanation(run: CampaignRun) -> str:
@@ -57,7 +52,7 @@ def trend_figure(trend: Trend) -> Figure | None:
 @router.get("/campaigns")
 def campaigns_page(request: Request) -> HTMLResponse:
     """Campaigns, schedules, the latest runs."""
-    service = _service(request)
+    service = service_of(request)
     return templates.TemplateResponse(
         request,
         "campaigns.html",
@@ -72,7 +67,7 @@ def campaigns_page(request: Request) -> HTMLResponse:
 @router.get("/campaign-runs/{run_id}")
 def campaign_run_page(run_id: str, request: Request) -> HTMLResponse:
     """A run: its steps, what each said, what it waits for."""
-    run = _service(request).stores.campaigns.run(run_id)
+    run = service_of(request).stores.campaigns.run(run_id)
     missed = {step.name: [c for c in step.checks if not c.passed] for step in run.steps}
     done = sum(s.finished_at is not None or s.state is StepState.SKIPPED for s in run.steps)
     context = {"run": run, "missed": missed, "explanation": _explanation(run), "done": done}
@@ -89,7 +84,7 @@ def trend_page(
     limit: Annotated[int, Query(ge=2, le=500)] = 100,
 ) -> HTMLResponse:
     """A quantity over the unit's results; without one, what there is to choose from."""
-    service = _service(request)
+    service = service_of(request)
     service.stores.units.unit(serial)
     kind = service.benches.description(service.benches.default()).simulated if simulated is None else simulated
     newest = service.stores.results.newest_verdict(serial, procedure, simulated=kind)

@@ -41,7 +41,8 @@ _VERBS = {
 """What a person can do to a job, by its state."""
 
 
-def _service(request: Request) -> BenchService:
+def service_of(request: Request) -> BenchService:
+    """What the application was made for."""
     return request.app.state.service
 
 
@@ -97,7 +98,7 @@ def _explanation(job: Job) -> str:
 @router.get("/")
 def home(request: Request) -> HTMLResponse:
     """The benches, their units, the latest jobs."""
-    service = _service(request)
+    service = service_of(request)
     queued = service.stores.queue.lengths()
     return _page(
         request,
@@ -121,7 +122,7 @@ def home(request: Request) -> HTMLResponse:
 @router.get("/jobs/{job_id}")
 def job_page(job_id: str, request: Request) -> HTMLResponse:
     """A job: progress, stations, recordings, and its result once there is one."""
-    service = _service(request)
+    service = service_of(request)
     last_event, _ = service.stores.jobs.last_event(job_id)  # before the job: what comes later reloads the page
     job = service.stores.jobs.get(job_id)
     live = service.live.of_job(job)
@@ -148,7 +149,7 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
 @router.get("/results/{result_id}")
 def result_page(result_id: str, request: Request) -> HTMLResponse:
     """A result: verdict, checks, tables, plots, lineage."""
-    service = _service(request)
+    service = service_of(request)
     result = service.stores.results.get(result_id)
     report = service.analyses.report(result)
     return _page(request, "result.html", result=result, report=report, sections=_sections(report))
@@ -157,7 +158,7 @@ def result_page(result_id: str, request: Request) -> HTMLResponse:
 @router.get("/units/{serial}")
 def unit_page(serial: str, request: Request) -> HTMLResponse:
     """A unit: its record, its calibrations and its correction sets."""
-    service = _service(request)
+    service = service_of(request)
     unit = service.stores.units.unit(serial)
     return _page(
         request,

@@ -4,10 +4,9 @@ Nothing is remembered over the end of the process: a piece must be safe to begin
 """
 
 from collections.abc import Callable
+from concurrent import futures
 from contextvars import copy_context
 from threading import Thread
-
-from bench_service.wall_clock import monotonic_s
 
 
 class Beside:
@@ -16,7 +15,7 @@ class Beside:
     def __init__(self, tell: Callable[[], None]) -> None:
         """`tell`: called, in its thread, when a piece is done."""
         self._tell = tell
-        self._pieces: dict[str, _Piece] = {}
+        self._pieces: dict[str, futures.Future[str]] = {}
 
     def outcome(self, key: str, work: Callable[[], str]) -> str | None:
         """What the piece of work gave, once; None while it goes on. Begins it where it does not. Raises what it raised.
@@ -25,39 +24,28 @@ class Beside:
         """
         piece = self._pieces.get(key)
         if piece is None:
-            piece = self._pieces[key] = _Piece(key, work, self._tell)
+            self._pieces[key] = self._begin(key, work)
             return None
-        if not piece.over:
+        if not piece.done():
             return None
         del self._pieces[key]
-        if piece.failure is not None:
-            raise piece.failure
-        return piece.gave
+        return piece.result()
 
     def wait(self, seconds: float) -> None:
         """Wait for what goes on, all in all for so long [s]; what lasts longer ends with the process."""
-        deadline = monotonic_s() + seconds
-        for piece in self._pieces.values():
-            piece.thread.join(max(0.0, deadline - monotonic_s()))
+        futures.wait(self._pieces.values(), seconds)
 
+    def _begin(self, key: str, work: Callable[[], str]) -> futures.Future[str]:
+        """In a thread that the process does not wait for at its end, as it would for an executor's."""
+        piece: futures.Future[str] = futures.Future()
+        piece.add_done_callback(lambda _: self._tell())
 
-class _Piece:
-    """One piece of work, begun."""
+        def run() -> None:
+            try:
+                piece.set_result(work())
+            except Exception as failure:  # raised again where it is asked for
+                piece.set_exception(failure)
 
-    def __init__(self, key: str, work: Callable[[], str], tell: Callable[[], None]) -> None:
-        self.gave: str | None = None
-        self.failure: Exception | None = None
-        self.over = False
-        self._work = work
-        self._tell = tell
         context = copy_context()  # lines of the log are about the same things
-        self.thread = Thread(target=context.run, args=(self._run,), name=f"beside {key}", daemon=True)
-        self.thread.start()
-
-    def _run(self) -> None:
-        try:
-            self.gave = self._work()
-        except Exception as failure:  # raised again where it is asked for
-            self.failure = failure
-        self.over = True
-        self._tell()
+        Thread(target=context.run, args=(run,), name=f"beside {key}", daemon=True).start()
+        return piece
