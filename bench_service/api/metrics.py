@@ -20,6 +20,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from bench_service.api.dependencies import Hub, Service
 from bench_service.api.errors import problems
 from bench_service.jobs.event_hub import EventHub
+from bench_service.jobs.job import FINAL, JobState
 from bench_service.jobs.live import BenchLive
 from bench_service.jobs.service import BenchService
 from bench_service.jobs.tallies import DURATION_S, Spread, Tallies
@@ -56,6 +57,7 @@ class Snapshot(Collector):
     def collect(self) -> Iterator[Metric]:
         """One family after the other."""
         yield from self._jobs()
+        yield from self._campaigns()
         yield from self._benches()
         yield GaugeMetricFamily("bench_listeners", "Who listens to events of jobs here", self._hub.listeners)
         dropped = "Listeners that were too slow and let go here"
@@ -84,6 +86,17 @@ class Snapshot(Collector):
         yield waited
         yield CounterMetricFamily("bench_stations_done", "Stations recorded", tallies.stations)
         yield GaugeMetricFamily("bench_recordings_bytes", "Stored bytes of all recordings", tallies.recorded_bytes)
+
+    def _campaigns(self) -> Iterator[Metric]:
+        labels = ["campaign", "state", "verdict"]
+        still = GaugeMetricFamily("bench_campaign_runs_open", "Runs that have not ended", labels=labels[:2])
+        finished = CounterMetricFamily("bench_campaign_runs_finished", "Runs that have ended", labels=labels)
+        for (campaign, state, verdict), count in sorted(self._service.stores.campaigns.counts().items()):
+            if JobState(state) in FINAL:
+                finished.add_metric([campaign, state, verdict], count)
+            else:
+                still.add_metric([campaign, state], count)
+        yield from (still, finished)
 
     def _benches(self) -> Iterator[Metric]:
         units, at = self._service.stores.units, now()

@@ -18,7 +18,7 @@ from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import Idempotency, NewRecording, RecordingState, StoredResult
 from bench_service.wall_clock import new_id, now
 from procedures import methods
-from procedures.core.errors import UnfitRecording
+from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.recording import Recording, RecordingInfo
 from procedures.core.report import Report
 from procedures.core.unit import Unit
@@ -52,17 +52,26 @@ class AnalysisDesk:
 
     def analyse_again(self, job_id: str, parameters: dict[str, Any], key: str | None = None) -> StoredResult:
         """Analyse a job's recordings with other parameters; the first result stays as it is."""
+        idempotency = None if key is None else Idempotency(f"again:{key}", fingerprint([job_id, parameters]))
+        known = self._stores.keys.made(idempotency, "result")
+        if known is not None:
+            return self._stores.results.get(known)
         job = self._stores.jobs.get(job_id)
         recordings = recordings_of(self._stores, job_id)
         if len(recordings) < len(job.stations):
             raise UnfitRecording(f"job {job_id} has {len(recordings)} of its {len(job.stations)} recordings")
         merged = {**job.requested_parameters, **parameters}
         result = analysed(job, self._planner.procedure(job.procedure), merged, recordings, self._code_version)
-        idempotency = None if key is None else Idempotency(f"again:{key}", fingerprint([job_id, parameters]))
         return self._stores.results.add(result.stored, result.calibrations, False, idempotency, result.corrections)
 
     def run_method(self, request: AnalysisRequest, key: str | None = None) -> StoredResult:
         """Run a method on stored recordings or calibrations. Raises `NotFound`, `DomainError`, `ValidationError`."""
+        idempotency = None if key is None else Idempotency(f"analyses:{key}", fingerprint(request))
+        known = self._stores.keys.made(idempotency, "result")
+        if known is not None:
+            return self._stores.results.get(known)
+        _require_each_once("recordings", request.recordings)
+        _require_each_once("calibrations", request.calibrations)
         method = self.method(request.method)
         params = method.params.model_validate(request.parameters)
         used = [self._stores.results.calibration(c) for c in request.calibrations]
@@ -88,7 +97,6 @@ class AnalysisDesk:
             created_at=now(),
             unit=serial,
         )
-        idempotency = None if key is None else Idempotency(f"analyses:{key}", fingerprint(request))
         gives = method.calibrations(outcome), method.corrections(outcome)
         return self._stores.results.add(stored, gives[0], False, idempotency, gives[1])
 
@@ -102,9 +110,9 @@ class AnalysisDesk:
         imported = read_import(files, description)
         idempotency = None if key is None else Idempotency(f"recordings:{key}", fingerprint(imported.source))
         recordings = self._stores.recordings
-        first = recordings.made_before(idempotency)
-        if first is not None:
-            return first
+        known = self._stores.keys.made(idempotency, "recording")
+        if known is not None:
+            return recordings.get(known).info
         register(self._stores, Unit(description.unit, imported.rate_hz, imported.channels))
         writer = recordings.open(
             NewRecording(
@@ -146,3 +154,10 @@ class AnalysisDesk:
             if stored.state is not RecordingState.COMPLETE:
                 raise UnfitRecording(f"recording {recording_id} is {stored.state.value}: kept, but not for analysis")
         return tuple(self._stores.recordings.load(recording_id) for recording_id in ids)
+
+
+def _require_each_once(field: str, ids: Sequence[str]) -> None:
+    """The same evidence given twice would count as two. Raises `BadParameter`."""
+    for position, known in enumerate(ids):
+        if known in ids[:position]:
+            raise BadParameter(f"{field}.{position}", known, "each is given once")

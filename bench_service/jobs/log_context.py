@@ -10,7 +10,10 @@ _ABOUT: ContextVar[dict[str, str] | None] = ContextVar("about", default=None)
 
 @contextmanager
 def about(**subjects: str | None) -> Generator[None]:
-    """Lines written inside are about these: `bench`, `job`, `campaign`, `step`, `request`. None adds nothing."""
+    """Lines written inside are about these: `bench`, `job` and its `step`, `campaign` and `campaign_step`, `request`.
+
+    None adds nothing.
+    """
     known = {name: value for name, value in subjects.items() if value is not None}
     token = _ABOUT.set({**(_ABOUT.get() or {}), **known})
     try:

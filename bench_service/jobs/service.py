@@ -115,6 +115,10 @@ class BenchService:
 
     def submit(self, request: JobRequest, idempotency_key: str | None = None, requested_by: str = "") -> Job:
         """Plan, store and queue a job. Raises what `Planner.plan` raises, `BadParameter` for an axis limit."""
+        key = None if idempotency_key is None else Idempotency(f"jobs:{idempotency_key}", fingerprint(request))
+        known = self.stores.keys.made(key, "job")
+        if known is not None:
+            return self.stores.jobs.get(known)
         plan = self.planner.plan(request.procedure, request.unit, request.parameters, request.bench)
         if plan.violations:
             raise BadParameter("stations", plan.violations[0], "beyond a limit of the bench")
@@ -124,7 +128,6 @@ class BenchService:
             self.queues.usable(request.reservation, plan.context.bench.id, request.unit)
         register(self.stores, plan.context.unit)
         job = replace(self._new_job(request, plan), requested_by=requested_by)
-        key = None if idempotency_key is None else Idempotency(f"jobs:{idempotency_key}", fingerprint(request))
         stored = self.stores.jobs.add(job, key)
         self._wake()
         with about(job=stored.id):

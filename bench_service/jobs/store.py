@@ -19,23 +19,19 @@ from bench_service.jobs.live import LiveStore
 from bench_service.jobs.prompts import PromptStore
 from bench_service.jobs.queue import QueueStore
 from bench_service.jobs.reservation import ReservationStore
+from bench_service.jobs.results import ResultStore
 from bench_service.jobs.stored import (
     BenchStop,
     Idempotency,
     NewRecording,
     Page,
-    ResultValue,
-    StoredCalibration,
     StoredRecording,
-    StoredResult,
 )
 from bench_service.jobs.tallies import TallyStore
 from procedures.bench import BenchDescription
-from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import RawArray, Recording, RecordingInfo
 from procedures.core.unit import Unit
-from procedures.core.unit_correction import UnitCorrection
 
 
 class RecordingWriter(Protocol):
@@ -59,10 +55,6 @@ class RecordingStore(Protocol):
     """Raw samples."""
 
     def open(self, new: NewRecording) -> RecordingWriter: ...
-
-    def made_before(self, idempotency: Idempotency | None) -> RecordingInfo | None:
-        """The recording that a client's key made. Raises `IdempotencyConflict` for a key of another request."""
-        ...
 
     def get(self, recording_id: str) -> StoredRecording:
         """Raises `NotFound`."""
@@ -189,72 +181,6 @@ class JobStore(Protocol):
         ...
 
 
-class ResultStore(Protocol):
-    """Results, the calibrations and corrections that come with them, and lineage."""
-
-    def add(
-        self,
-        result: StoredResult,
-        calibrations: Sequence[TriadCalibration] = (),
-        make_current: bool = True,
-        idempotency: Idempotency | None = None,
-        corrections: Sequence[UnitCorrection] = (),
-    ) -> StoredResult:
-        """Store a result with its lineage, and its calibrations as the unit's current ones, in one transaction.
-
-        Corrections, at most one of a kind, are stored in the same manner; see `CorrectionStore` for their history.
-        Raises `IdempotencyConflict`; a known key with the same fingerprint returns the first result.
-        """
-        ...
-
-    def get(self, result_id: str) -> StoredResult:
-        """Raises `NotFound`."""
-        ...
-
-    def list(
-        self, *, job_id: str | None = None, unit: str | None = None, after: str | None = None, limit: int = 50
-    ) -> Page[StoredResult]: ...
-
-    def newest_verdict(self, unit: str, procedure: str, *, simulated: bool) -> StoredResult | None:
-        """The newest of the procedure's results that gave a job of the unit its verdict; no second analysis."""
-        ...
-
-    def values(
-        self,
-        unit: str,
-        procedure: str,
-        quantity: str,
-        *,
-        simulated: bool,
-        limit: int,
-        before: str | None = None,
-        parameters: dict[str, Any] | None = None,
-    ) -> tuple[ResultValue, ...]:
-        """What the newest `limit` of such results say of a quantity, newest first.
-
-        Only results older than `before`, an id, and of a job with just these parameters, count, where these are given.
-        """
-        ...
-
-    def calibrations_of(self, results: Sequence[str]) -> tuple[str, ...]:
-        """Ids of the calibrations that results gave, in the order of the results."""
-        ...
-
-    def of_recording(self, recording_id: str) -> tuple[str, ...]:
-        """Ids of the results that used a recording."""
-        ...
-
-    def calibrations(self, unit: str, after: str | None = None, limit: int = 50) -> Page[StoredCalibration]:
-        """A unit's calibrations, newest first."""
-        ...
-
-    def calibration(self, calibration_id: str) -> StoredCalibration:
-        """Raises `NotFound`."""
-        ...
-
-    def current_calibration(self, unit: str) -> StoredCalibration | None: ...
-
-
 class UnitStore(Protocol):
     """Units and benches: what is declared of them."""
 
@@ -299,6 +225,18 @@ class UnitStore(Protocol):
         ...
 
 
+class KeyStore(Protocol):
+    """What clients' keys made."""
+
+    def made(self, idempotency: Idempotency | None, kind: str) -> str | None:
+        """Id of the "job", "recording", "result", "campaign", "campaign_run" or "schedule" that a key made.
+
+        None for a key that is new, and without one. Asked before anything is examined: what was made stays made, also
+        where the same request would be refused now. Raises `IdempotencyConflict` for a key of another request.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class Stores:
     """All memory of one service."""
@@ -315,3 +253,4 @@ class Stores:
     prompts: PromptStore
     audit: AuditTrail
     tallies: TallyStore
+    keys: KeyStore

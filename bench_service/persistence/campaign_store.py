@@ -7,7 +7,7 @@ transaction itself), so of two processes one wins and the other reads again.
 from datetime import datetime
 
 from pydantic import TypeAdapter
-from sqlalchemy import select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from bench_service.jobs.campaigns.campaign import Campaign
@@ -108,6 +108,13 @@ class SqlCampaignStore:
             query = query.where(CampaignRunRow.state == state.value)
         with self._database.read() as session:
             return page(session, query, CampaignRunRow.id, after, limit, _run)
+
+    def counts(self) -> dict[tuple[str, str, str], int]:
+        row = CampaignRunRow
+        key = (row.campaign, row.state, func.coalesce(row.verdict, ""))
+        with self._database.read() as session:
+            found = session.execute(select(*key, func.count()).group_by(*key))
+            return {(campaign, state, verdict): number for campaign, state, verdict, number in found}
 
     def open_runs(self) -> tuple[CampaignRun, ...]:
         query = select(CampaignRunRow).where(CampaignRunRow.state.in_(OPEN)).order_by(CampaignRunRow.id)

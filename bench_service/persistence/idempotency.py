@@ -8,13 +8,26 @@ from sqlalchemy.orm import Session
 
 from bench_service.jobs.errors import IdempotencyConflict
 from bench_service.jobs.stored import Idempotency
-from bench_service.persistence.database import Conflict
+from bench_service.persistence.database import Conflict, Database
 from bench_service.persistence.tables import IdempotencyKeyRow
 
 T = TypeVar("T")
 
 _RIVALS = 32
 """Each conflict means that some rival committed, so who has this many rivals at once still comes through."""
+
+
+class SqlKeyStore:
+    """`bench_service.jobs.store.KeyStore`."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def made(self, idempotency: Idempotency | None, kind: str) -> str | None:
+        if idempotency is None:
+            return None
+        with self._database.read() as session:
+            return made_before(session, idempotency, kind)
 
 
 def made_before(session: Session, idempotency: Idempotency | None, kind: str) -> str | None:

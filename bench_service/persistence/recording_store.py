@@ -13,10 +13,9 @@ from sqlalchemy.orm import Session
 from bench_service.formats.chunk import sample_type
 from bench_service.formats.content_hash import ContentHash
 from bench_service.jobs.errors import NotFound
-from bench_service.jobs.stored import Idempotency, NewRecording, Page, RecordingState, StoredRecording
+from bench_service.jobs.stored import NewRecording, Page, RecordingState, StoredRecording
 from bench_service.persistence.chunk_reader import ChunkReader
 from bench_service.persistence.database import Database
-from bench_service.persistence.idempotency import made_before
 from bench_service.persistence.pages import page
 from bench_service.persistence.recording_rows import info_of_row, stored_of_row
 from bench_service.persistence.recording_writer import SqlRecordingWriter
@@ -52,11 +51,6 @@ class SqlRecordingStore:
 
     def open(self, new: NewRecording) -> SqlRecordingWriter:
         return SqlRecordingWriter(self._database, new)
-
-    def made_before(self, idempotency: Idempotency | None) -> RecordingInfo | None:
-        with self._database.read() as session:
-            made = made_before(session, idempotency, "recording")
-            return None if made is None else info_of_row(_found(session, made))
 
     def get(self, recording_id: str) -> StoredRecording:
         with self._database.read() as session:

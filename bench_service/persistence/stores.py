@@ -5,6 +5,7 @@ from bench_service.persistence.audit_store import SqlAuditTrail
 from bench_service.persistence.campaign_store import SqlCampaignStore
 from bench_service.persistence.correction_store import SqlCorrectionStore
 from bench_service.persistence.database import Database, connect
+from bench_service.persistence.idempotency import SqlKeyStore
 from bench_service.persistence.job_store import SqlJobStore
 from bench_service.persistence.live_store import SqlLiveStore
 from bench_service.persistence.migration import upgrade_to_head
@@ -43,4 +44,5 @@ def stores_of(database: Database) -> Stores:
         prompts=SqlPromptStore(database),
         audit=SqlAuditTrail(database),
         tallies=SqlTallyStore(database),
+        keys=SqlKeyStore(database),
     )

@@ -22,6 +22,8 @@ D2 = 1.128
 D4 = 3.267
 """Upper limit of a moving range of two, in mean moving ranges."""
 LEAST_POINTS = 2
+ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
+"""What a mean of some values, and their distance from it, may be off by, relative to the greatest of them."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,8 @@ def control_limits(values: Sequence[float]) -> ControlLimits:
     x = _finite(values)
     if len(x) < LEAST_POINTS:
         raise BadParameter("values", len(x), f"a control chart needs at least {LEAST_POINTS}")
-    centre, mean_range = float(np.mean(x)), float(np.mean(np.abs(np.diff(x))))
+    centre = float(x[0] + np.mean(x - x[0]))  # of equal values just that value, not one that rounding moved
+    mean_range = float(np.mean(np.abs(np.diff(x))))
     sigma = mean_range / D2
     return ControlLimits(centre, sigma, centre - 3.0 * sigma, centre + 3.0 * sigma, mean_range, D4 * mean_range, len(x))
 
@@ -82,13 +85,15 @@ def signals(values: Sequence[float], limits: ControlLimits) -> tuple[Signal, ...
     """Every point at which a rule is broken, in order; a point that lies on a line is not beyond it.
 
     A point breaks a rule of a window when it belongs to those beyond the line itself: the one that came back does not.
-    Where the spread is zero every departure from the centre, however small, is beyond every line.
+    Where the spread is zero every departure from the centre is beyond every line, but for the rounding of doubles.
     """
-    x = _finite(values) - limits.centre
+    x = _finite(values)
+    rounding = ROUNDING * max(float(np.max(np.abs(x), initial=0.0)), abs(limits.centre))
+    x = x - limits.centre
     found: list[Signal] = []
     for rule in RULES:
         for side in (1, -1):
-            beyond = side * x > rule.sigmas * limits.sigma
+            beyond = side * x > rule.sigmas * limits.sigma + rounding
             for index in np.flatnonzero(beyond).tolist():
                 window = beyond[max(0, index - rule.window + 1) : index + 1]
                 if int(np.sum(window)) >= rule.count:

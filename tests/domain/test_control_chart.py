@@ -37,6 +37,17 @@ def test_a_slow_drift_does_not_widen_its_own_limits() -> None:
     assert signals(drifting.tolist(), moved)
 
 
+def test_a_constant_is_in_control_and_the_least_step_is_seen() -> None:
+    rng = np.random.Generator(np.random.PCG64(5))
+    for value in rng.standard_normal(200) * 10.0 ** rng.integers(-12, 12, 200):
+        for count in (9, 20, 100):
+            constant = [float(value)] * count
+            limits = control_limits(constant)
+            assert (limits.centre, limits.sigma) == (value, 0.0)
+            assert signals(constant, limits) == ()
+            assert signals([*constant, float(value) * (1.0 + 1e-12)], limits)[0].index == count
+
+
 @pytest.mark.parametrize(
     ("values", "rule", "index"),
     [

@@ -21,6 +21,14 @@ def limits(**limit: Any) -> dict[str, Any]:
     return {**CALIBRATION, "limits": [{"quantity": "gyro condition number", "unit": "1", **limit}]}
 
 
+CONTRADICTORY = [
+    {"quantity": "gyro.b_x", "unit": "deg/h", "minimum": 5.0},
+    {"quantity": "gyro.b_x", "unit": "rad/s", "maximum": 1e-6},
+]
+OF_ANOTHER_KIND = [{"quantity": "gyro.b_x", "unit": "kg", "maximum": 1.0}]
+NEVER_JUDGED = [{"quantity": "gyro.b_x", "at_least": 50, "last": 5}]
+
+
 @pytest.mark.parametrize(
     ("campaign", "field", "said"),
     [
@@ -33,12 +41,17 @@ def limits(**limit: Any) -> dict[str, Any]:
         (named("x", {"procedure": "no_such"}), "steps.0.procedure", "one of calibration_12_orientations"),
         (named("x", {**METHOD, "calibrations_of": []}), "steps.0", "calibrations_of"),
         (named("x", {}, {**METHOD, "method": "no_such", "calibrations_of": ["a"]}), "steps.1.method", "run_to_run"),
-        (named("x", {}, {**METHOD, "calibrations_of": ["z"]}), "body", "earlier step"),
+        (named("x", {}, {**METHOD, "calibrations_of": ["z"]}), "steps.1.calibrations_of.0", "earlier step"),
+        (named("x", CALIBRATION, {**METHOD, "calibrations_of": ["a", "a"]}), "steps.1.calibrations_of.1", "once"),
+        (named("x", {}, {**METHOD, "calibrations_of": ["a"]}), "steps.1.calibrations_of.0", "calibrates"),
+        (named("x", {**CALIBRATION, "limits": CONTRADICTORY}), "steps.0.limits.1", "what passes ≥ 5 deg/h too"),
+        (named("x", {**CALIBRATION, "limits": OF_ANOTHER_KIND}), "steps.0.limits.0.unit", "kg"),
+        (named("x", {**CALIBRATION, "trends": NEVER_JUDGED}), "steps.0.trends.0.at_least", "at most 5"),
         (named("x", {"method": "run_to_run"}), "steps.0", "either a procedure or a method"),
         (named("x", {**CALIBRATION, "parameters": {"dwell": 5}}), "steps.0.parameters.dwell", "Extra inputs"),
         (named("x", {**CALIBRATION, "parameters": {"dwell_s": -5}}), "steps.0.parameters.dwell_s", "equal to 1"),
         (named("x", {**CALIBRATION, "parameters": {"orientations": [[0, 0]]}}), "steps.0.parameters", "rank"),
-        (named("x", {}, {"name": "a"}), "body", "a name of its own"),
+        (named("x", {}, {"name": "a"}), "steps.1.name", "a name of its own"),
         (named("x", {"procedure": "static_run"}, window_h=20.0), "window_h", "at least 28"),
         (named("x", {"retries": -1}), "steps.0.retries", "greater than or equal to 0"),
         (named("x", {"on_fail": "explode"}), "steps.0.on_fail", "'stop' or 'continue'"),
@@ -88,7 +101,7 @@ def test_names_are_taken_once(sqlite_client: Client) -> None:
         ({"unit": "SIM-0001", "bench": "moon"}, 404, None),
         ({"unit": "SIM-0001", "seed": -1}, 422, "seed"),
         ({"unit": "SIM-0001", "parameters": {"nothing": {}}}, 422, "parameters.nothing"),
-        ({"unit": "SIM-0001", "parameters": {"static": {"launches": 0}}}, 422, "steps.0.parameters.launches"),
+        ({"unit": "SIM-0001", "parameters": {"static": {"launches": 0}}}, 422, "parameters.static.launches"),
         ({}, 422, "unit"),
     ],
 )

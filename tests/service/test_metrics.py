@@ -5,6 +5,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from bench_service.cli.client import connect
 from bench_service.settings import Settings
+from tests.service.campaigns import add, ended, named, start, until
 from tests.service.client import FAST, Client
 
 
@@ -52,6 +53,24 @@ def test_the_numbers_follow_what_happened_in_every_process_alike(client: Client,
     for key in after:
         if key[0] in shared:
             assert theirs[key] == after[key], key
+
+
+def test_campaign_runs_are_counted_by_what_became_of_them(client: Client) -> None:
+    http = client.http
+    add(client, named("metered", {}))
+    ended(client, start(client, "metered")["id"])
+    http.post("/api/v1/benches/sim/stop")
+    waits = start(client, "metered")["id"]
+    until(client, waits, lambda run: run["waiting"])
+    seen = scraped(http)
+    assert seen[("bench_campaign_runs_finished_total", "metered", "succeeded", "pass")] == 1
+    assert seen[("bench_campaign_runs_open", "metered", "running")] == 1
+    http.post(f"/api/v1/campaign-runs/{waits}/cancel")
+    ended(client, waits)
+    seen = scraped(http)
+    assert seen[("bench_campaign_runs_finished_total", "metered", "cancelled", "")] == 1
+    assert ("bench_campaign_runs_open", "metered", "running") not in seen
+    http.post("/api/v1/benches/sim/release").raise_for_status()
 
 
 def test_a_stop_and_the_disk_are_seen(sqlite_client: Client) -> None:

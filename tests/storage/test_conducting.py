@@ -75,6 +75,42 @@ def test_a_retry_is_another_job_with_another_seed(laboratory: Laboratory) -> Non
     assert (run.steps[0].job_id, run.steps[0].attempt) == (jobs[2].id, 3)
 
 
+@pytest.mark.parametrize("stopped", [False, True])
+def test_a_job_that_a_person_cancels_is_not_tried_again_one_of_a_stopped_bench_is(
+    laboratory: Laboratory, stopped: bool
+) -> None:
+    run = laboratory.done(new_run(campaign({"retries": 3})))
+    (job,) = laboratory.jobs()
+    laboratory.stores.jobs.transition(job.id, JobState.RUNNING, at=NOW)
+    if stopped:
+        laboratory.stores.units.stop_bench(BenchStop("sim", NOW, "smoke"))
+    laboratory.stores.jobs.request_cancel(job.id, NOW)
+    laboratory.stores.jobs.transition(job.id, JobState.CANCELLED, at=NOW)
+    laboratory.conductor().advance(run.id)
+    run = laboratory.stores.campaigns.run(run.id)
+    if not stopped:
+        assert (run.state, run.verdict, states(run)) == (JobState.FAILED, Verdict.ERROR, ["cancelled"])
+        assert run.steps[0].reason == f"job {job.id} was cancelled"
+    else:
+        assert (run.state, states(run), len(laboratory.jobs())) == (JobState.RUNNING, ["queued"], 1)
+        laboratory.stores.units.release_bench("sim")
+        laboratory.conductor().advance(run.id)
+        assert [j.state for j in laboratory.jobs()] == [JobState.CANCELLED, JobState.QUEUED]
+
+
+def test_the_log_tells_what_became_of_steps_and_run(laboratory: Laboratory, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO", logger="bench_service.jobs.campaigns.told")
+    run = laboratory.done(new_run(campaign({"retries": 1}, {})), "DeviceFault", PASS, FAIL)
+    said = [record.getMessage() for record in caplog.records]
+    assert said[0] == f"campaign run {run.id} of trial on U-1 is running"
+    assert "step a, attempt 1" in said
+    assert any(line.startswith("step a is queued: attempt 1:") and "the table said so" in line for line in said)
+    assert said[-2:] == [
+        "step b is succeeded, verdict fail",
+        f"campaign run {run.id} of trial on U-1 is succeeded, verdict fail",
+    ]
+
+
 def test_a_limit_of_the_campaign_in_its_own_unit(laboratory: Laboratory) -> None:
     limits = [{"quantity": "bias", "unit": "rad/s", "maximum": 1e-6}]
     for value, verdict in ((0.2, PASS), (0.21, FAIL)):  # 1e-6 rad/s is 0.20626 deg/h

@@ -212,13 +212,13 @@ def test_a_recording_of_no_job_there_is_is_refused(stores: Stores, new_recording
 
 def test_a_key_makes_one_recording(stores: Stores, database: Database, new_recording: New, samples: Samples) -> None:
     key = Idempotency("k", "f")
-    assert stores.recordings.made_before(key) is None
+    assert stores.keys.made(key, "recording") is None
     rivals = [stores.recordings.open(new_recording(idempotency=key)) for _ in range(2)]
     for rival in rivals:
         rival.write(samples(2 * ROWS + 1))
     first = rivals[0].seal()
     assert rivals[1].seal() == first
-    assert stores.recordings.made_before(key) == first
+    assert stores.keys.made(key, "recording") == first.id
     assert (_count(database, RecordingRow), _count(database, ChunkRow)) == (1, 3)
     late = stores.recordings.open(new_recording(idempotency=Idempotency("k", "g")))
     late.write(samples(5))

@@ -1,11 +1,15 @@
 """A campaign as data: procedures in order, with limits, stop rules, and a rule for the seeds of simulated benches.
 
-What can be refused by looking at the document alone is refused here; what needs the catalogue, in `examination`.
+What is no campaign is refused here; what can never work, in `examination`, so that one that was stored once can always
+be read.
 """
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from procedures.core.units import converted
 
 NAME = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 TEXT = r"^[^\x00-\x08\x0b-\x1f]*$"
@@ -41,6 +45,20 @@ class StepLimit(Document):
         if self.minimum is not None and self.maximum is not None and self.minimum > self.maximum:
             raise ValueError(f"nothing can pass: minimum {self.minimum:g} is above maximum {self.maximum:g}")
         return self
+
+    def __str__(self) -> str:
+        bounds = [f"≥ {self.minimum:g}"] if self.minimum is not None else []
+        bounds += [f"≤ {self.maximum:g}"] if self.maximum is not None else []
+        return f"{' and '.join(bounds)} {self.unit}"
+
+    def excludes(self, other: "StepLimit") -> bool:
+        """Whether all that passes the other limit of the same quantity is below this one's minimum."""
+        if other.quantity != self.quantity or self.minimum is None or other.maximum is None:
+            return False
+        try:
+            return self.minimum > converted(other.maximum, other.unit, self.unit)
+        except ValueError:  # not of one kind: one of them is refused for its unit
+            return False
 
 
 class TrendRule(Document):
@@ -120,19 +138,24 @@ class Campaign(Document):
 
     @model_validator(mode="after")
     def _names(self) -> Self:
-        known: set[str] = set()
+        known: list[str] = []
         for index, step in enumerate(self.steps):
             if step.name in known:
-                raise ValueError(f"steps.{index}.name = {step.name!r}: each step needs a name of its own")
-            for other in (*step.calibrations_of, *step.recordings_of):
-                if other not in known:
-                    raise ValueError(
-                        f"steps.{index} works on {other!r}: an earlier step is needed, "
-                        f"there is {', '.join(sorted(known)) or 'none'}"
-                    )
-            known.add(step.name)
+                raise _fault(("steps", index, "name"), step.name, "each step needs a name of its own")
+            for field in ("calibrations_of", "recordings_of"):
+                for position, other in enumerate(getattr(step, field)):
+                    if other not in known:
+                        allowed = f"an earlier step is needed, there is {', '.join(known) or 'none'}"
+                        raise _fault(("steps", index, field, position), other, allowed)
+            known.append(step.name)
         return self
 
     def step(self, name: str) -> Step:
         """A step by name."""
         return next(step for step in self.steps if step.name == name)
+
+
+def _fault(where: tuple[str | int, ...], value: str, text: str) -> ValidationError:
+    """A refusal of one field by what is said elsewhere in the document."""
+    error = PydanticCustomError("campaign", "{text}", {"text": text})
+    return ValidationError.from_exception_data("Campaign", [InitErrorDetails(type=error, loc=where, input=value)])

@@ -16,6 +16,7 @@ from bench_service.jobs.campaigns.beside import Beside
 from bench_service.jobs.campaigns.campaign import Step
 from bench_service.jobs.campaigns.judgement import judge
 from bench_service.jobs.campaigns.run import CampaignRun, StepState
+from bench_service.jobs.campaigns.told import tell
 from bench_service.jobs.errors import (
     BenchBusy,
     IllegalTransition,
@@ -104,11 +105,13 @@ class Conductor:
             run = campaigns.run(run_id)
             if not run.open:
                 return
-            with about(campaign=run.id, step=None if run.current is None else run.steps[run.current].name):
+            with about(campaign=run.id, campaign_step=None if run.current is None else run.steps[run.current].name):
                 changed = self._changed(run)
                 if changed is None:
                     return
-                if not campaigns.save_run(changed, run.revision):
+                if campaigns.save_run(changed, run.revision):
+                    tell(run, changed)
+                else:
                     self._abandoned(run, changed)
 
     def _work(self) -> None:
@@ -224,7 +227,9 @@ class Conductor:
             return transitions.out_of_time(run, at)
         why = "" if job.failure is None else f"{job.failure.kind}: {job.failure.message}"
         if job.state is JobState.CANCELLED:
-            return transitions.failed(run, index, StepState.CANCELLED, f"job {job.id} was cancelled. {why}".strip(), at)
+            stopped = self._stores.units.bench_stop(run.bench) is not None  # then the job may go on once it is released
+            said = f"job {job.id} was cancelled" + (" when the bench was stopped" if stopped else "")
+            return transitions.failed(run, index, StepState.CANCELLED, said, at, final=not stopped)
         kind = f"job {job.id} {job.state.value}: "
         hopeless = job.failure is not None and job.failure.kind in HOPELESS
         return transitions.failed(run, index, StepState.FAILED, kind + (why or "no reason given"), at, hopeless)

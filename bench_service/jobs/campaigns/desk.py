@@ -63,6 +63,8 @@ class CampaignDesk:
     def add(self, campaign: Campaign, key: str | None = None) -> Campaign:
         """Store a campaign once it was examined. Raises `NameTaken`, and what `examine` raises."""
         idempotency = None if key is None else Idempotency(f"campaigns:{key}", fingerprint(campaign.model_dump()))
+        if self._stores.keys.made(idempotency, "campaign") is not None:
+            return self._stores.campaigns.get(campaign.name)
         if campaign.name in shipped():
             raise NameTaken(f"campaign {campaign.name!r} comes with the service: choose another name")
         self.examine(campaign)
@@ -87,16 +89,21 @@ class CampaignDesk:
 
     def start(self, request: RunRequest, key: str | None = None) -> CampaignRun:
         """Queue a run. Raises `NotFound`, `NotMounted`, `BadParameter`, `IdempotencyConflict`; then nothing moves."""
-        run = self.prepared(request)
         idempotency = None if key is None else Idempotency(f"campaign_runs:{key}", fingerprint(request))
-        stored = self._stores.campaigns.add_run(run, idempotency)
+        known = self._stores.keys.made(idempotency, "campaign_run")
+        if known is not None:
+            return self._stores.campaigns.run(known)
+        stored = self._stores.campaigns.add_run(self.prepared(request), idempotency)
         self.conductor.nudge()
         return stored
 
     def prepared(self, request: RunRequest) -> CampaignRun:
         """A new run, not stored yet: the campaign with the request's parameters, examined on its unit and bench."""
         campaign = overridden(self.campaign(request.campaign), request.parameters)
-        examination = self.examine(campaign, request.unit, request.bench)
+        try:
+            examination = self.examine(campaign, request.unit, request.bench)
+        except BadParameter as error:
+            raise _as_asked(error, campaign, request.parameters) from error
         bench = self._planner.context(request.unit, request.bench).bench
         if request.seed is not None and not bench.simulated:
             raise BadParameter("seed", request.seed, "only a simulated bench has one")
@@ -167,6 +174,15 @@ def overridden(campaign: Campaign, parameters: Mapping[str, Mapping[str, Any]]) 
         merged = {**steps[index].parameters, **changed}
         steps[index] = steps[index].model_copy(update={"parameters": merged})
     return campaign.model_copy(update={"steps": tuple(steps)})
+
+
+def _as_asked(error: BadParameter, campaign: Campaign, changed: Mapping[str, Mapping[str, Any]]) -> BadParameter:
+    """The refusal of a parameter under the name by which it was asked for: with the run, or in the campaign."""
+    for index, step in enumerate(campaign.steps):
+        inner = error.field.removeprefix(f"steps.{index}.parameters.")
+        if inner != error.field and inner.split(".")[0] in changed.get(step.name, {}):
+            return BadParameter(f"parameters.{step.name}.{inner}", error.value, error.allowed)
+    return error
 
 
 def _base(campaign: Campaign, asked: int | None) -> int:

@@ -9,13 +9,13 @@ from pydantic import ValidationError
 from bench_service.jobs.analyses import AnyMethod
 from bench_service.jobs.campaigns.campaign import Campaign, Step, StepLimit
 from bench_service.jobs.errors import NotFound
-from bench_service.jobs.planning import AnyProcedure, Plan, Planner
+from bench_service.jobs.planning import Plan, Planner
 from procedures.core.errors import BadParameter, DomainError
 from procedures.core.units import HOUR, converted
 from procedures.procedure import PredictedUncertainty, Procedure
 
 NO_CALIBRATIONS = Procedure.calibrations
-"""What a procedure has whose results are no calibration."""
+"""What a procedure or method has whose results are no calibration."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,9 @@ class _Progress:
     """What earlier steps leave for later ones."""
 
     calibrated: bool = False
+    """The unit's current calibration is of this campaign."""
+    calibrating: set[str] = field(default_factory=set[str])
+    """Steps whose results give calibrations."""
     left_out: set[str] = field(default_factory=set[str])
 
 
@@ -79,6 +82,7 @@ class Examiner:
         self, campaign: Campaign, index: int, unit: str, bench: str | None, progress: _Progress, strict: bool
     ) -> StepPlan:
         step, where = campaign.steps[index], f"steps.{index}"
+        _require_possible(step, where)
         catalog: Mapping[str, Any] = self._methods if step.method else self._planner.catalog
         missing = [name for name in (*step.calibrations_of, *step.recordings_of) if name in progress.left_out]
         if step.does not in catalog or missing:
@@ -92,7 +96,10 @@ class Examiner:
             why = f"it works on {missing[0]}, which is left out" if missing else f"there is no {kind} {step.does} yet"
             return StepPlan(step.name, step.does, f"left out: {why}")
         if step.method is not None:
+            _require_calibrations(step, where, progress)
             _valid_parameters(self._methods[step.does].params.model_validate, step.parameters, where)
+            if self._methods[step.does].calibrations is not NO_CALIBRATIONS:
+                progress.calibrating.add(step.name)
             return StepPlan(step.name, step.does)
         procedure = self._planner.procedure(step.does)
         try:
@@ -113,9 +120,12 @@ class Examiner:
         procedure, prediction = plan.procedure, plan.prediction
         names = None if procedure.quantities is None else procedure.quantities(plan.parameters, plan.context)
         _require_known(step, where, names)
+        _require_units(step, where, prediction.uncertainties)
         warnings = [*prediction.warnings]
         warnings += [w for limit in step.limits if (w := _unresolved(limit, prediction.uncertainties)) is not None]
-        progress.calibrated |= _calibrates(procedure)
+        if procedure.calibrations is not NO_CALIBRATIONS:
+            progress.calibrated = True
+            progress.calibrating.add(step.name)
         return StepPlan(
             step.name, step.does, "", len(plan.stations), prediction.duration_s, plan.data_bytes, tuple(warnings)
         )
@@ -151,10 +161,6 @@ def _warnings(plans: Sequence[StepPlan]) -> list[str]:
     return [f"step{'s' if len(names) > 1 else ''} {', '.join(names)}: {text}" for text, names in said.items()]
 
 
-def _calibrates(procedure: AnyProcedure) -> bool:
-    return procedure.calibrations is not NO_CALIBRATIONS
-
-
 def _valid_parameters(validate: Any, parameters: dict[str, Any], where: str) -> None:
     try:
         validate(parameters)
@@ -180,21 +186,58 @@ def _require_known(step: Step, where: str, names: tuple[str, ...] | None) -> Non
                 raise BadParameter(f"{where}.{kind}.{position}.quantity", one.quantity, allowed)
 
 
+def _require_possible(step: Step, where: str) -> None:
+    """Refuse what contradicts itself: nothing could pass, or nothing would ever be judged."""
+    for position, limit in enumerate(step.limits):
+        for earlier in step.limits[:position]:
+            if earlier.excludes(limit) or limit.excludes(earlier):
+                allowed = f"what passes {earlier} too, an earlier limit of {limit.quantity}"
+                raise BadParameter(f"{where}.limits.{position}", str(limit), allowed)
+    for position, rule in enumerate(step.trends):
+        if rule.at_least > rule.last:
+            allowed = f"at most {rule.last}: of so many results the limits are made"
+            raise BadParameter(f"{where}.trends.{position}.at_least", rule.at_least, allowed)
+    for kind, names in (("calibrations_of", step.calibrations_of), ("recordings_of", step.recordings_of)):
+        for position, name in enumerate(names):
+            if name in names[:position]:
+                raise BadParameter(f"{where}.{kind}.{position}", name, "each step once: given twice it counts as two")
+
+
+def _require_calibrations(step: Step, where: str, progress: _Progress) -> None:
+    """Refuse to work on calibrations of a step that gives none."""
+    for position, name in enumerate(step.calibrations_of):
+        if name not in progress.calibrating:
+            allowed = (
+                f"a step that calibrates: {', '.join(sorted(progress.calibrating)) or 'none before this one does'}"
+            )
+            raise BadParameter(f"{where}.calibrations_of.{position}", name, allowed)
+
+
+def _require_units(step: Step, where: str, predicted: tuple[PredictedUncertainty, ...]) -> None:
+    """Refuse a limit in a unit of another kind than the quantity's, where that is known."""
+    for position, limit in enumerate(step.limits):
+        found = next((p for p in predicted if _same(p.name, limit.quantity)), None)
+        if found is None:
+            continue
+        try:
+            converted(1.0, found.unit, limit.unit)
+        except ValueError as error:
+            raise BadParameter(f"{where}.limits.{position}.unit", limit.unit, f"{limit.quantity}: {error}") from error
+
+
 def _unresolved(limit: StepLimit, predicted: tuple[PredictedUncertainty, ...]) -> str | None:
     """A limit that is narrower than what the plan will know the quantity to."""
     found = next((p for p in predicted if _same(p.name, limit.quantity)), None)
     if found is None:
         return None
-    try:
-        uncertainty = converted(found.standard_uncertainty, found.unit, limit.unit)
-    except ValueError:
-        return None
+    uncertainty = converted(found.standard_uncertainty, found.unit, limit.unit)
     width = (
         0.5 * (limit.maximum - limit.minimum)
         if limit.maximum is not None and limit.minimum is not None
         else abs(limit.maximum if limit.maximum is not None else limit.minimum or 0.0)
     )
-    if uncertainty <= width:
+    sign_alone = width == 0.0 and None in (limit.minimum, limit.maximum)
+    if uncertainty <= width or sign_alone:
         return None
     return (
         f"the limit of {limit.quantity} cannot be resolved: ±{width:.3g} {limit.unit} is asked for, the plan's "

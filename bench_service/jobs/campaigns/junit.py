@@ -1,7 +1,8 @@
 """A run as JUnit XML, for a CI system to read: the run is the document, a step a suite, a check a case.
 
 A check that missed its limit is a failure, a step without a verdict an error, a step left out is skipped. A step that
-has no check of its own still has one case, so that nothing is lost between the lines.
+has no check of its own still has one case, so that nothing is lost between the lines; a run whose verdict is no step's
+(it could not begin, was cancelled or ran out of time before a step) has a suite of its own for it.
 """
 
 import re
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that no XML 1.0 document can have."""
 
+RUN = "(run)"
+"""A suite's name that no step can have."""
+
 DECLARATION = b"<?xml version='1.0' encoding='utf-8'?>\n"
 
 
@@ -26,19 +30,39 @@ def document(run: CampaignRun) -> bytes:
     from junitparser import JUnitXml
 
     whole = JUnitXml(_text(f"{run.campaign.name} {run.unit}"))
-    for step in run.steps:
-        whole.add_testsuite(_suite(run, step))
+    suites = [_suite(run, step) for step in run.steps]
+    if not run.open and run.verdict in (None, Verdict.ERROR) and not any(suite.errors for suite in suites):
+        suites.append(_of_the_run(run))
+    for suite in suites:
+        whole.add_testsuite(suite)
     whole.update_statistics()
     whole._elem.attrib.pop("skipped")  # pyright: ignore[reportPrivateUsage]  Jenkins' schema has it at suites alone
     return DECLARATION + whole.tostring()
 
 
-def _suite(run: CampaignRun, step: StepRun) -> "TestSuite":
+def _of_the_run(run: CampaignRun) -> "TestSuite":
+    """One error: the run itself, which gave no verdict, and no step that says so."""
+    from junitparser import Error, TestCase
+
+    suite = _dated(run, RUN, run.started_at)
+    case = TestCase(RUN, f"{run.campaign.name}.{RUN}", _seconds(run.started_at, run.finished_at))
+    case.result = [Error(_text(run.reason or "no verdict"), run.state.value.capitalize())]
+    suite.add_testcase(case)
+    suite.update_statistics()
+    return suite
+
+
+def _dated(run: CampaignRun, name: str, at: datetime | None) -> "TestSuite":
     from junitparser import TestSuite
 
-    suite = TestSuite(step.name)
-    suite.timestamp = (step.started_at or run.created_at).strftime("%Y-%m-%dT%H:%M:%S")
+    suite = TestSuite(name)
+    suite.timestamp = (at or run.created_at).strftime("%Y-%m-%dT%H:%M:%S")
     suite.hostname = run.bench
+    return suite
+
+
+def _suite(run: CampaignRun, step: StepRun) -> "TestSuite":
+    suite = _dated(run, step.name, step.started_at)
     properties = {
         "campaign": run.campaign.name,
         "campaign_run": run.id,
@@ -53,8 +77,12 @@ def _suite(run: CampaignRun, step: StepRun) -> "TestSuite":
     for name, value in properties.items():
         if value is not None:
             suite.add_property(name, _text(str(value)))
-    for case in _cases(run, step):
+    cases = _cases(run, step)
+    if step.warnings:
+        cases[-1].system_out = _text("\n".join(step.warnings))
+    for case in cases:
         suite.add_testcase(case)
+    suite.update_statistics()
     return suite
 
 

@@ -16,7 +16,7 @@ from bench_service.jobs.campaigns import transitions
 from bench_service.jobs.campaigns.campaign import Campaign
 from bench_service.jobs.campaigns.run import CampaignRun, RunRequest
 from bench_service.jobs.campaigns.schedule import Missed, Overlap, Schedule, latest_due, next_start
-from bench_service.jobs.errors import ServiceError, StorageFailure, StorageFull
+from bench_service.jobs.errors import IdempotencyConflict, NotFound, ServiceError, StorageFailure, StorageFull
 from bench_service.jobs.request import fingerprint
 from bench_service.jobs.store import Stores
 from bench_service.jobs.stored import Idempotency, Page
@@ -56,7 +56,14 @@ class Scheduler:
         self._prepared = prepared
 
     def add(self, request: ScheduleRequest, key: str | None = None) -> Schedule:
-        """Raises `BadParameter` for a time that never comes, and what the run itself would be refused for."""
+        """Raises `BadParameter` for a time that never comes, and what the run itself would be refused for.
+
+        A key of a schedule that was removed since is used up: `IdempotencyConflict`.
+        """
+        idempotency = None if key is None else Idempotency(f"schedules:{key}", fingerprint(request))
+        known = self._stores.keys.made(idempotency, "schedule")
+        if known is not None:
+            return self._kept(known)
         at = now()
         next_at = next_start(request.cron, request.time_zone, at)
         run = self._prepared(RunRequest(request.campaign, request.unit, request.bench, labels=request.labels))
@@ -75,8 +82,13 @@ class Scheduler:
             labels=request.labels,
             next_at=next_at if request.enabled else None,
         )
-        idempotency = None if key is None else Idempotency(f"schedules:{key}", fingerprint(request))
         return self._stores.campaigns.add_schedule(schedule, idempotency)
+
+    def _kept(self, schedule_id: str) -> Schedule:
+        try:
+            return self.get(schedule_id)
+        except NotFound as error:
+            raise IdempotencyConflict(f"this key made schedule {schedule_id}, which was removed since") from error
 
     def enable(self, schedule_id: str, enabled: bool) -> Schedule:
         """Switch a schedule on or off; starts that passed while it was off are not made up. Raises `NotFound`."""

@@ -53,6 +53,10 @@ class CampaignStore(Protocol):
         limit: int = 50,
     ) -> Page[CampaignRun]: ...
 
+    def counts(self) -> dict[tuple[str, str, str], int]:
+        """How many runs there are, by campaign, state and verdict ("" where there is none)."""
+        ...
+
     def open_runs(self) -> tuple[CampaignRun, ...]:
         """Runs that have not ended, oldest first."""
         ...

@@ -86,11 +86,14 @@ def judged(run: CampaignRun, index: int, judgement: Judgement, result_id: str, a
 
 
 def failed(
-    run: CampaignRun, index: int, state: StepState, reason: str, at: datetime, hopeless: bool = False
+    run: CampaignRun, index: int, state: StepState, reason: str, at: datetime, final: bool = False
 ) -> CampaignRun:
-    """A step's attempt gave no verdict: it is tried again where it may be and can help, else it has ended in error."""
+    """A step's attempt gave no verdict: it is tried again where that is allowed, unless it is `final`.
+
+    That is a refusal that would be the same again, and a person's will. Else the step has ended in error.
+    """
     step = run.steps[index]
-    if step.attempt <= run.step_of(index).retries and not run.cancel_requested and not hopeless:
+    if step.attempt <= run.step_of(index).retries and not run.cancel_requested and not final:
         again = replace(
             step,
             state=StepState.QUEUED,
