@@ -147,7 +147,8 @@ class Dispatcher:
             never = Failure("NeverBegan", "the service ended after it had chosen this job and before it began")
             self._stores.queue.requeue(job.id, now(), None, never, spend=False)
         else:
-            self._stores.jobs.transition(job.id, JobState.INTERRUPTED, at=now(), failure=found.gone)
+            to = JobState.CANCELLED if now_running.cancel_requested else JobState.INTERRUPTED
+            self._stores.jobs.transition(job.id, to, at=now(), failure=found.gone)
 
     def _tell(self, queue: BenchQueue) -> None:
         """Note in the events of the queue's first job why it does not start, once for each reason."""

@@ -17,7 +17,7 @@ from dbos import DBOS, DBOSConfig, Serializer, SetWorkflowID
 from pydantic import TypeAdapter
 
 from bench_service.jobs.dispatcher import Unfinished
-from bench_service.jobs.errors import ServiceError
+from bench_service.jobs.errors import ServiceError, StorageFailure, StorageFull
 from bench_service.jobs.job import Failure, Job
 from bench_service.jobs.runner import JobRunner, StepOutcome
 from bench_service.jobs.session import ShuttingDown
@@ -171,12 +171,15 @@ class Engine:
                 return
 
     def _end(self, job_id: str, outcome: StepOutcome) -> None:
-        """Note a bad end, as soon as it can be: while the disk is full the job waits, and the bench is safe already."""
+        """Note a bad end, as soon as it can be: while the disk is full the job waits, and the bench is safe already.
+
+        What no waiting helps against is left to the dispatcher, which sees a job whose workflow has ended.
+        """
         while True:
             try:
                 self._runner.end_early(job_id, outcome)
                 return
-            except ServiceError as error:
+            except (StorageFull, StorageFailure) as error:
                 log.warning("the end of job %s cannot be noted yet: %s", job_id, error)
             if self._ending.wait(RETRY_S):
                 raise ShuttingDown

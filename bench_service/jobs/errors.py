@@ -14,6 +14,7 @@ ServiceError
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
+    └── DamagedRecording  what is stored of a recording is not what was written
 """
 
 from collections.abc import Sequence
@@ -86,3 +87,7 @@ class StorageFull(ServiceError):
 
 class StorageFailure(ServiceError):
     """The database failed."""
+
+
+class DamagedRecording(StorageFailure):
+    """What is stored of a recording is not what was written."""

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from threading import Event
 from typing import Any
 
 from bench_service.jobs.driver import BenchDriver
 from bench_service.jobs.errors import ServiceError, StorageFailure
-from bench_service.jobs.job import FINAL, Failure, Job, JobState
+from bench_service.jobs.job import Failure, Job, JobState
 from bench_service.jobs.live import LiveBoard
 from bench_service.jobs.live_tap import LiveTap
 from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
@@ -95,7 +96,7 @@ class JobRunner:
             jobs.station_done(job_id, index, now(), {})
             return StepOutcome()
         job = jobs.get(job_id)
-        if job.cancel_requested or job.state in FINAL or self._stop_wanted(job_id):
+        if job.cancel_requested or job.state is not JobState.RUNNING or self._stop_wanted(job_id):
             return StepOutcome(cancelled=True)
         if job.pause_requested:
             return StepOutcome(paused=True)
@@ -105,7 +106,10 @@ class JobRunner:
         if not self._lease_held():
             return StepOutcome(Failure("LeaseLost", "another process may drive this bench now", index))
         try:
-            info = self._session_of(job).record(index)
+            session = self._session_of(job)
+            if self._ending.is_set():  # since the bench was being opened, when there was nobody to tell
+                raise ShuttingDown
+            info = session.record(index)
         except Stopped:
             return StepOutcome(cancelled=True)
         except (BenchError, DomainError, ServiceError) as error:
@@ -148,7 +152,7 @@ class JobRunner:
     def conclude(self, job_id: str) -> StepOutcome:
         """Analyse, store the result with what it found, and end the job with the verdict; may be repeated."""
         job = self._stores.jobs.get(job_id)
-        if job.state in FINAL:  # a crash came after its end was noted
+        if job.state is not JobState.RUNNING:  # a crash came after its end was noted, or it is another attempt's by now
             return StepOutcome()
         procedure = self._planner.procedure(job.procedure)
         try:
@@ -169,7 +173,7 @@ class JobRunner:
     def end_early(self, job_id: str, outcome: StepOutcome) -> Job:
         """End a job that was cancelled or failed, or put it aside; its complete recordings are kept."""
         job = self._stores.jobs.get(job_id)
-        if job.state in FINAL:
+        if job.state is not JobState.RUNNING:  # its end was noted, though the answer to that was lost
             return job
         self._stores.recordings.interrupt_open(job_id)
         if outcome.paused:
@@ -234,17 +238,13 @@ class JobRunner:
     def _session_of(self, job: Job) -> BenchSession:
         if self._session is not None and self._session.job.id == job.id:
             return self._session
+        procedure = self._planner.procedure(job.procedure)  # before a link is taken that nobody would give back
         self._stores.recordings.interrupt_open(job.id)
         checkpoint = self._stores.recordings.checkpoint(job.id)
         bench = self._driver.open(job.unit, job.seed, checkpoint, BenchNeeds.of(job.stations), job.id)
-        self._session = BenchSession(
-            job,
-            self._planner.procedure(job.procedure),
-            bench,
-            self._stores.recordings,
-            lambda: self._stop_wanted(job.id),
-            None if self._live is None else LiveTap(job, bench, self._live),
-        )
+        live = None if self._live is None else LiveTap(job, bench, self._live)
+        stop_wanted = partial(self._stop_wanted, job.id)
+        self._session = BenchSession(job, procedure, bench, self._stores.recordings, stop_wanted, live)
         return self._session
 
 

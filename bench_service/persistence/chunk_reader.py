@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from sqlalchemy import select
 
 from bench_service.formats.chunk import UnreadableChunk, decode_chunk
-from bench_service.jobs.errors import StorageFailure
+from bench_service.jobs.errors import DamagedRecording
 from bench_service.persistence.database import Database
 from bench_service.persistence.tables import ChunkRow
 from procedures.core.recording import RawArray
@@ -25,7 +25,7 @@ class ChunkReader:
     chunk_rows: int
 
     def blocks(self, names: Sequence[str], start: int, stop: int) -> Iterator[RawArray]:
-        """Samples start…stop (half open) of the named channels. Raises `StorageFailure`, naming the chunk."""
+        """Samples start…stop (half open) of the named channels. Raises `DamagedRecording`, naming the chunk."""
         if stop <= start:
             return
         for number in range(start // self.chunk_rows, (stop - 1) // self.chunk_rows + 1):
@@ -52,5 +52,5 @@ class ChunkReader:
         except UnreadableChunk as error:
             raise self._failure(number, f"cannot be read: {error}") from error
 
-    def _failure(self, number: int, what: str) -> StorageFailure:
-        return StorageFailure(f"chunk {number} of recording {self.recording_id} {what}")
+    def _failure(self, number: int, what: str) -> DamagedRecording:
+        return DamagedRecording(f"chunk {number} of recording {self.recording_id} {what}")

@@ -132,8 +132,8 @@ class SqlJobStore:
             row = found_job(session, job_id, lock=True)
             if JobState(row.state) is JobState.RUNNING:
                 wanted = row.pause_requested
-                move_job(session, row, JobState.PAUSED, at)
-                if not wanted:
+                move_job(session, row, JobState.CANCELLED if row.cancel_requested else JobState.PAUSED, at)
+                if not wanted and row.state == JobState.PAUSED.value:
                     move_job(session, row, JobState.QUEUED, at)
             return job_of_row(row)
 
@@ -145,6 +145,8 @@ class SqlJobStore:
                 append_event(session, job_id, "note", at, {"pause_requested": False})
                 return job_of_row(row)
             job = job_of_row(row)
+            if job.state is JobState.RUNNING:
+                raise IllegalTransition(f"job {job_id} is running, and nobody asked it to pause: nothing is to resume")
             if job.state in FINAL and not job.resumable:
                 why = "" if job.failure is None else f" ({job.failure.kind}: {job.failure.message})"
                 raise IllegalTransition(f"job {job_id} is {row.state}{why}; it cannot be resumed")

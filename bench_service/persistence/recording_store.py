@@ -1,5 +1,6 @@
 """Raw samples in SQL: rows that say what a recording is, chunks that hold it. Must not know who records, or why."""
 
+import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -12,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from bench_service.formats.chunk import sample_type
 from bench_service.formats.content_hash import ContentHash
-from bench_service.jobs.errors import NotFound
+from bench_service.jobs.errors import DamagedRecording, NotFound
 from bench_service.jobs.stored import NewRecording, Page, RecordingState, StoredRecording
 from bench_service.persistence.chunk_reader import ChunkReader
 from bench_service.persistence.database import Database
@@ -21,6 +22,8 @@ from bench_service.persistence.recording_rows import info_of_row, stored_of_row
 from bench_service.persistence.recording_writer import SqlRecordingWriter
 from bench_service.persistence.tables import ChunkRow, RecordingRow
 from procedures.core.recording import RawArray, RecordingInfo
+
+log = logging.getLogger(__name__)
 
 _OPEN = RecordingState.OPEN.value
 _COMPLETE = RecordingState.COMPLETE.value
@@ -93,7 +96,7 @@ class SqlRecordingStore:
         query = (
             select(RecordingRow.checkpoint)
             .where(RecordingRow.job_id == job_id, RecordingRow.state == _COMPLETE)
-            .order_by(RecordingRow.id.desc())
+            .order_by(RecordingRow.station_index.desc())  # ids follow the clock, which may have been set back
             .limit(1)
         )
         with self._database.read() as session:
@@ -119,17 +122,25 @@ class SqlRecordingStore:
         return len(left_open)
 
     def _interrupt(self, recording_id: str) -> None:
-        """Close a recording whose writer is gone; the hash is made from the chunks, the writer took its own along."""
+        """Close a recording whose writer is gone; the hash is made from the chunks, the writer took its own along.
+
+        One that is damaged has none: that must not keep its job from ending.
+        """
         with self._database.read() as session:
             row = _found(session, recording_id, with_open=True)
             info, reader, dtype = info_of_row(row), self._reader(row), sample_type(row.sample_type)
         digest = ContentHash(info.channels, info.rate_hz, dtype)
-        for block in reader.blocks([c.name for c in info.channels], 0, info.count):
-            digest.update(block)
+        try:
+            for block in reader.blocks([c.name for c in info.channels], 0, info.count):
+                digest.update(block)
+            content_hash = digest.hexdigest()
+        except DamagedRecording as damage:
+            log.error("recording %s is closed without a hash: %s", recording_id, damage)
+            content_hash = ""
         with self._database.write() as session:
             row = _found(session, recording_id, with_open=True)
             if row.state == _OPEN:
-                row.content_hash = digest.hexdigest()
+                row.content_hash = content_hash
                 row.state = RecordingState.INTERRUPTED.value
 
     def _reader(self, row: RecordingRow) -> ChunkReader:

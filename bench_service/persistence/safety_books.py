@@ -10,6 +10,7 @@ from sqlalchemy import select
 
 from bench_service import wall_clock
 from bench_service.jobs.errors import NotFound
+from bench_service.jobs.stored import BenchStop
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.job_store import SqlJobStore
 from bench_service.persistence.tables import BenchStopRow
@@ -37,9 +38,7 @@ class SqlSafetyBooks:
         SqlUnitStore(self._database).confirm_safe(self._bench_id, wall_clock.now(), by)
 
     def stop(self, reason: str) -> None:
-        with self._database.write() as session:
-            if session.get(BenchStopRow, self._bench_id) is None:
-                session.add(BenchStopRow(bench=self._bench_id, at=wall_clock.now(), reason=reason, safe_by=""))
+        SqlUnitStore(self._database).stop_bench(BenchStop(self._bench_id, wall_clock.now(), reason))
 
     def note(self, by: str, text: str, job: str | None) -> None:
         at = wall_clock.now()

@@ -14,6 +14,7 @@ from bench_service.jobs.errors import NotFound
 from bench_service.jobs.stored import BenchStop
 from bench_service.persistence.correction_rows import CORRECTION
 from bench_service.persistence.database import Database
+from bench_service.persistence.idempotency import again_after_conflict
 from bench_service.persistence.result_rows import TRIADS
 from bench_service.persistence.tables import BenchRow, BenchStopRow, CalibrationRow, UnitRow
 from bench_service.persistence.tables_around_jobs import CorrectionRow
@@ -41,8 +42,12 @@ class SqlUnitStore:
 
     def put_unit(self, unit: Unit) -> None:
         document = UNIT.dump_python(unit, mode="json", exclude=_JOINED)
-        with self._database.write() as session:
-            session.merge(UnitRow(serial=unit.serial, document=document, updated_at=wall_clock.now()))
+
+        def once() -> None:
+            with self._database.write() as session:
+                session.merge(UnitRow(serial=unit.serial, document=document, updated_at=wall_clock.now()))
+
+        again_after_conflict(once)
 
     def unit(self, serial: str) -> Unit:
         with self._database.read() as session:
@@ -58,8 +63,12 @@ class SqlUnitStore:
 
     def put_bench(self, bench: BenchDescription, mounted: Sequence[str] = ()) -> None:
         document = {**BENCH.dump_python(bench, mode="json"), "mounted": list(mounted)}
-        with self._database.write() as session:
-            session.merge(BenchRow(id=bench.id, document=document, updated_at=wall_clock.now()))
+
+        def once() -> None:
+            with self._database.write() as session:
+                session.merge(BenchRow(id=bench.id, document=document, updated_at=wall_clock.now()))
+
+        again_after_conflict(once)
 
     def bench(self, bench_id: str) -> BenchDescription:
         return BENCH.validate_python(self._bench(bench_id))
@@ -80,11 +89,14 @@ class SqlUnitStore:
         return tuple(BENCH.validate_python(row.document) for row in rows)
 
     def stop_bench(self, stop: BenchStop) -> None:
-        with self._database.write() as session:
-            if session.get(BenchStopRow, stop.bench) is None:
-                row = BenchStopRow(bench=stop.bench, at=stop.at, reason=stop.reason)
-                row.safe_at, row.safe_by = stop.safe_at, stop.safe_by
-                session.add(row)
+        def once() -> None:
+            with self._database.write() as session:
+                if session.get(BenchStopRow, stop.bench) is None:
+                    row = BenchStopRow(bench=stop.bench, at=stop.at, reason=stop.reason)
+                    row.safe_at, row.safe_by = stop.safe_at, stop.safe_by
+                    session.add(row)
+
+        again_after_conflict(once)
 
     def confirm_safe(self, bench_id: str, at: datetime, by: str) -> None:
         query = update(BenchStopRow).where(BenchStopRow.bench == bench_id, BenchStopRow.safe_at.is_(None))

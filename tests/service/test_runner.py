@@ -1,12 +1,15 @@
 """Steps of a job that end badly: the lease is lost, the bench cannot be made safe, the engine does not start."""
 
 from collections.abc import Callable, Generator
+from dataclasses import replace
 from datetime import timedelta
+from pathlib import Path
 from threading import Event
 from typing import Any
 
 import pytest
 
+from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
 from bench_service.jobs.directory import BenchDirectory
 from bench_service.jobs.dispatcher import Dispatcher, Unfinished
@@ -14,13 +17,14 @@ from bench_service.jobs.errors import NotReady
 from bench_service.jobs.job import Failure, Job, JobState
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.request import JobRequest
-from bench_service.jobs.runner import JobRunner
+from bench_service.jobs.runner import JobRunner, StepOutcome
 from bench_service.jobs.safety import SafetyDesk
 from bench_service.jobs.service import BenchService
+from bench_service.jobs.session import ShuttingDown
 from bench_service.jobs.store import Stores
 from bench_service.jobs.worker import Worker
 from bench_service.persistence import open_stores
-from bench_service.wall_clock import now, pause
+from bench_service.wall_clock import new_id, now, pause
 from procedures.bench import Bench, BenchNeeds
 from procedures.bench.errors import DeviceFault
 from tests.service.client import FAST
@@ -189,3 +193,59 @@ def test_a_job_that_was_queued_again_while_the_dispatcher_looked_stays_queued(st
     pause(0.5)
     dispatcher.shut_down()
     assert stores.jobs.get(job.id).state is JobState.QUEUED
+
+
+def test_an_attempt_whose_end_was_noted_already_ends_nothing_more(stores: Stores) -> None:
+    """The answer to its last note was lost with the database: the workflow says it again."""
+    runner, job = prepared(stores, SimulatedDriver("sim"), lambda: True)
+    why = Failure("Disconnected", "a test")
+    stores.queue.requeue(job.id, now(), None, why, spend=False)
+    events = len(stores.jobs.events(job.id))
+    again = StepOutcome(Failure("Disconnected", "a test"))
+    assert runner.end_early(job.id, again).state is JobState.QUEUED
+    assert runner.conclude(job.id).good
+    assert runner.acquire(job.id, 0).cancelled
+    assert len(stores.jobs.events(job.id)) == events
+    assert stores.results.list(job_id=job.id).items == ()
+
+
+def test_a_procedure_that_this_version_lacks_leaves_the_bench_to_the_next_job(stores: Stores, tmp_path: Path) -> None:
+    driver = SimulatedDriver("sim", register=DeviceRegister(tmp_path, "sim"))
+    runner, job = prepared(stores, driver, lambda: True)
+    runner.end_early(job.id, StepOutcome(cancelled=True))
+    stranger = replace(job, id=new_id(), procedure="of_a_newer_service")
+    for each in (stranger, replace(job, id=new_id())):
+        stores.jobs.add(replace(each, state=JobState.QUEUED))
+        entry = stores.queue.look("sim", now()).next()
+        assert entry is not None
+        assert runner.claim(entry) is not None
+        outcome = runner.acquire(each.id, 0)
+        assert outcome.good is (each is not stranger), outcome
+        assert runner.make_safe(each.id).good
+        runner.end_early(each.id, StepOutcome(cancelled=True) if outcome.good else outcome)
+    failure = stores.jobs.get(stranger.id).failure
+    assert failure is not None
+    assert (failure.kind, "of_a_newer_service" in failure.message) == ("NotFound", True)
+
+
+def test_a_service_that_is_asked_to_end_while_a_bench_is_opened_records_nothing(stores: Stores) -> None:
+    asked: list[JobRunner] = []
+
+    class SlowDriver(SimulatedDriver):
+        def open(
+            self,
+            unit: str,
+            seed: int | None,
+            checkpoint: dict[str, Any] | None,
+            needs: BenchNeeds,
+            job: str | None = None,
+        ) -> Bench:
+            asked[0].shut_down()
+            return super().open(unit, seed, checkpoint, needs, job)
+
+    runner, job = prepared(stores, SlowDriver("sim"), lambda: True)
+    asked.append(runner)
+    with pytest.raises(ShuttingDown):
+        runner.acquire(job.id, 0)
+    assert stores.recordings.of_job(job.id) == ()
+    assert runner.make_safe(job.id).good

@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import timedelta, timezone
 from itertools import product
+from threading import Barrier
 
 import pytest
 
@@ -155,11 +156,40 @@ def test_a_job_is_put_aside_and_taken_up_again_as_its_next_attempt(stores: Store
     stores.jobs.resume(late.id, now())  # while its bench is made safe
     back = stores.jobs.put_aside(late.id, now())
     assert (back.state, back.attempt) == (JobState.QUEUED, 2)
+    with pytest.raises(IllegalTransition, match="is running, and nobody asked it to pause"):
+        stores.jobs.resume(stores.jobs.add(new_job(state=JobState.RUNNING)).id, now())
     for state in FINAL:
         ended = stores.jobs.add(new_job(state=state))
         for verb in (stores.jobs.request_pause, stores.jobs.resume):
             with pytest.raises(IllegalTransition, match=f"is {state.value}"):
                 verb(ended.id, now())
+
+
+@pytest.mark.parametrize("taken_back", [False, True])
+def test_a_cancel_while_a_job_is_put_aside_goes_first(stores: Stores, new_job: NewJob, taken_back: bool) -> None:
+    job = stores.jobs.add(new_job(state=JobState.RUNNING, created_at=now()))
+    stores.jobs.request_pause(job.id, now())
+    if taken_back:
+        stores.jobs.resume(job.id, now())
+    stores.jobs.request_cancel(job.id, now())  # while its bench is made safe
+    ended = stores.jobs.put_aside(job.id, now())
+    assert (ended.state, ended.attempt, ended.cancel_requested) == (JobState.CANCELLED, 1, True)
+
+
+def test_people_who_stop_a_bench_at_once_all_stop_it(stores: Stores, new_job: NewJob) -> None:
+    with ThreadPoolExecutor(8) as people:
+        for _ in range(12):
+            at_once = Barrier(8)
+
+            def press(who: int, together: Barrier = at_once) -> None:
+                together.wait(20)
+                stores.units.stop_bench(BenchStop("sim", now(), f"person {who}"))
+
+            list(people.map(press, range(8)))
+            stop = stores.units.bench_stop("sim")
+            assert stop is not None
+            assert stop.reason.startswith("person")
+            stores.units.release_bench("sim")
 
 
 def test_a_bench_stays_stopped_until_it_is_released(stores: Stores) -> None:

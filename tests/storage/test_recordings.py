@@ -262,6 +262,34 @@ def test_a_damaged_chunk_is_noticed_and_named(
         list(stores.recordings.load(info.id).blocks())
 
 
+def test_a_damaged_recording_that_is_left_open_can_be_closed(
+    stores: Stores, database: Database, new_recording: New, samples: Samples, new_job: Callable[..., Job]
+) -> None:
+    job = stores.jobs.add(new_job())
+    writer = stores.recordings.open(new_recording(job_id=job.id, station=Station(0, "up")))
+    writer.write(samples(2 * ROWS + 1))
+    with database.write() as session:
+        row = session.scalars(sa.select(ChunkRow).where(ChunkRow.number == 0)).one()
+        row.payload = row.payload[:-1]
+    assert stores.recordings.interrupt_open(job.id) == 1
+    (left,) = stores.recordings.list(job_id=job.id).items
+    assert (left.state, left.info.content_hash) == (RecordingState.INTERRUPTED, "")
+    assert stores.recordings.interrupt_open(job.id) == 0
+
+
+def test_a_job_goes_on_from_its_last_station_whatever_the_clock_said(
+    stores: Stores, new_recording: New, samples: Samples, new_job: Callable[..., Job], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = stores.jobs.add(new_job())
+    ids = iter(["01a20354-0000-7000-8000-000000000002", "01a20354-0000-7000-8000-000000000001"])
+    monkeypatch.setattr("bench_service.wall_clock.new_id", lambda: next(ids))
+    for index in range(2):
+        writer = stores.recordings.open(new_recording(job_id=job.id, station=Station(index, "up")))
+        writer.write(samples(20))
+        writer.seal({"station": index})
+    assert stores.recordings.checkpoint(job.id) == {"station": 1}
+
+
 def test_what_cannot_be_a_recording_is_refused(stores: Stores, new_recording: New, samples: Samples) -> None:
     channels = new_recording().channels
     for changes in ({"channels": ()}, {"channels": (channels[0], channels[0])}, {"rate_hz": float("nan")}):
