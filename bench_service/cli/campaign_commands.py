@@ -8,6 +8,7 @@ import typer
 from rich.console import Console
 
 from bench_service.cli.client import answer, call, connect, segment
+from bench_service.cli.files import check_folder, whole_file
 from bench_service.cli.options import AsJson, Server, console, errors, parameter
 from bench_service.cli.refusal import Refused
 
@@ -40,18 +41,18 @@ def run_campaign(
 ) -> int:
     """Run a campaign on a unit and wait for its verdict. Exit code: 0 pass, 1 fail, 2 error."""
     from bench_service.cli.campaign_tables import run_table
-    from bench_service.cli.watching import exit_code, watch_campaign
+    from bench_service.cli.watching import CAMPAIGN_RUN, exit_code, watch_campaign
 
     body = {"unit": unit, "bench": bench, "seed": seed, "labels": _labels(label), "parameters": _step_parameters(set_)}
-    if junit is not None and not junit.absolute().parent.is_dir():
-        raise Refused(f"{junit} cannot be written: there is no folder {junit.parent}")
+    if junit is not None:
+        check_folder(junit)
     if key is not None and not (key.isascii() and key.isprintable()):
         raise Refused(f"--key {key!r}: letters, digits and signs of ASCII are needed")
     headers = {} if key is None else {"Idempotency-Key": key}
     with connect(context.obj, server, drive=True) as client:
-        run = call(client, "POST", f"/api/v1/campaigns/{segment(name)}/runs", json=body, headers=headers)
+        run = call(client, "POST", f"/api/v1/campaigns/{segment(name)}/runs", CAMPAIGN_RUN, json=body, headers=headers)
         run = watch_campaign(client, run, errors)
-        report = call(client, "GET", f"/api/v1/campaign-runs/{run['id']}/report")
+        report = call(client, "GET", f"/api/v1/campaign-runs/{run['id']}/report", ("run",))
         if junit is not None:
             _write_junit(client, run["id"], junit)
     if as_json:
@@ -79,7 +80,9 @@ def list_campaigns(context: typer.Context, server: Server = None, as_json: AsJso
 def show_campaign(context: typer.Context, name: str, server: Server = None) -> None:
     """A campaign as JSON, fit to be changed and added under another name."""
     with connect(context.obj, server, drive=False) as client:
-        console.print_json(json.dumps(call(client, "GET", f"/api/v1/campaigns/{segment(name)}")["campaign"]))
+        console.print_json(
+            json.dumps(call(client, "GET", f"/api/v1/campaigns/{segment(name)}", ("campaign",))["campaign"])
+        )
 
 
 @campaigns.command("add")
@@ -93,7 +96,14 @@ def add_campaign(
     """Store a campaign; what can never work is refused, what may not is warned of."""
     with connect(context.obj, server, drive=False) as client:
         headers = {"Content-Type": "application/json"}
-        made = call(client, "POST", "/api/v1/campaigns", content=file.read_bytes(), headers=headers)
+        made = call(
+            client,
+            "POST",
+            "/api/v1/campaigns",
+            ("name", "warnings", "duration_s"),
+            content=file.read_bytes(),
+            headers=headers,
+        )
     for warning in made["warnings"]:
         console.print(warning, style="yellow", markup=False, soft_wrap=True)
     console.print(f"campaign {made['name']}, {made['duration_s'] / 3600:.1f} h of bench time", soft_wrap=True)
@@ -112,7 +122,7 @@ def list_runs(
 
     query = {"limit": limit} | ({} if campaign is None else {"campaign": campaign})
     with connect(context.obj, server, drive=False) as client:
-        items = call(client, "GET", "/api/v1/campaign-runs", params=query)["items"]
+        items = call(client, "GET", "/api/v1/campaign-runs", ("items",), params=query)["items"]
     _show(items, as_json, runs_table)
 
 
@@ -141,7 +151,7 @@ def add_schedule(
         "overlap": overlap,
     }
     with connect(context.obj, server, drive=False) as client:
-        made = call(client, "POST", "/api/v1/schedules", json=body)
+        made = call(client, "POST", "/api/v1/schedules", ("id", "next_at"), json=body)
     console.print(f"schedule {made['id']}, next start {made['next_at']}", soft_wrap=True)
 
 
@@ -163,14 +173,12 @@ def remove_schedule(context: typer.Context, schedule: str, server: Server = None
 
 
 def _write_junit(client: "httpx.Client", run_id: str, file: Path) -> None:
-    """Whole or not at all: a CI system may be reading."""
     report = answer(client, "GET", f"/api/v1/campaign-runs/{run_id}/report", params={"format": "junit"})
-    partial = file.with_name(file.name + ".part")
     try:
-        partial.write_bytes(report.content)
-        partial.replace(file)
-    except OSError as error:
-        raise Refused(f"{file} cannot be written: {error.strerror}; the run is {run_id}") from error
+        with whole_file(file) as sink:
+            sink.write(report.content)
+    except Refused as error:
+        raise Refused(f"{error}; the run is {run_id}") from error
 
 
 def _step_parameters(texts: list[str]) -> dict[str, dict[str, Any]]:
@@ -198,7 +206,7 @@ def _all(client: "httpx.Client", path: str) -> list[dict[str, Any]]:
     items: list[dict[str, Any]] = []
     query: dict[str, Any] = {"limit": 500}
     while True:
-        page = call(client, "GET", path, params=query)
+        page = call(client, "GET", path, ("items", "next"), params=query)
         items += page["items"]
         if page["next"] is None:
             return items

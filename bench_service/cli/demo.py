@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from bench_service.cli.client import call
+from bench_service.cli.client import RESULT, call
 from bench_service.cli.tables import check_table, coefficient_table
-from bench_service.cli.watching import exit_code, watch
+from bench_service.cli.watching import JOB, exit_code, watch
 
 if TYPE_CHECKING:
     import httpx
@@ -22,11 +22,11 @@ def demonstrate(client: "httpx.Client", unit: str, seed: int, console: Console) 
 
 def _one(client: "httpx.Client", procedure: str, unit: str, seed: int, console: Console) -> int:
     body: dict[str, Any] = {"procedure": procedure, "unit": unit, "seed": seed}
-    job = watch(client, call(client, "POST", "/api/v1/jobs", json=body), console)
+    job = watch(client, call(client, "POST", "/api/v1/jobs", JOB, json=body), console)
     if job["state"] != "succeeded":
         console.print(f"[red]{job['state']}[/]: {job['error']}", soft_wrap=True)
         return 2
-    result = call(client, "GET", f"/api/v1/jobs/{job['id']}/result")
+    result = call(client, "GET", f"/api/v1/jobs/{job['id']}/result", RESULT)
     if procedure.startswith("calibration"):
         _show_coefficients(client, job, console)
     console.print(check_table(result["document"]))
@@ -40,8 +40,10 @@ def _one(client: "httpx.Client", procedure: str, unit: str, seed: int, console: 
 
 
 def _show_coefficients(client: "httpx.Client", job: dict[str, Any], console: Console) -> None:
-    newest = call(client, "GET", f"/api/v1/units/{job['unit']}/calibrations", params={"limit": 1})["items"][0]
-    truth = call(client, "GET", f"/api/v1/jobs/{job['id']}/truth")["triads"]
+    newest = call(client, "GET", f"/api/v1/units/{job['unit']}/calibrations", ("items",), params={"limit": 1})["items"][
+        0
+    ]
+    truth = call(client, "GET", f"/api/v1/jobs/{job['id']}/truth", ("triads",))["triads"]
     table, worst = coefficient_table(newest["triads"], truth)
     console.print(table)
     console.print(f"Largest of 24 errors: {worst:.2f} of its own standard uncertainty")

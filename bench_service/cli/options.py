@@ -1,6 +1,7 @@
 """What several commands take and say in the same words."""
 
 import json
+from math import isfinite
 from typing import Annotated, Any
 
 import typer
@@ -20,7 +21,15 @@ def parameter(text: str) -> tuple[str, Any]:
     name, separator, value = text.partition("=")
     if not separator or not name:
         raise Refused(f"--set {text}: expected name=value")
+
+    def finite(number: str) -> float:
+        if isfinite(found := float(number)):
+            return found
+        raise Refused(f"--set {name}: {number} is not a finite number")
+
     try:
-        return name, json.loads(value)
+        return name, json.loads(value, parse_float=finite, parse_constant=finite)
     except json.JSONDecodeError:
         return name, value
+    except ValueError as error:  # more digits than Python reads
+        raise Refused(f"--set {name}: {error}") from error

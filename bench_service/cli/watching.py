@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
 ENDED = ("succeeded", "failed", "cancelled", "interrupted")
 LOOK_S = 0.1
+JOB = ("id", "procedure", "unit", "state", "verdict", "progress", "page", "result", "error")
+CAMPAIGN_RUN = ("id", "campaign", "unit", "state", "verdict", "steps", "waiting", "reason", "warnings")
+"""What commands read of a job and of a campaign's run."""
 
 
 def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict[str, Any]:
@@ -22,7 +25,7 @@ def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict
         bar = progress.add_task(f"{job['procedure']} {job['unit']}", total=job["progress"]["stations"] or 1)
         while job["state"] not in ENDED:
             pause(LOOK_S)
-            job = call(client, "GET", f"/api/v1/jobs/{job['id']}")
+            job = call(client, "GET", f"/api/v1/jobs/{job['id']}", JOB)
             progress.update(bar, completed=job["progress"]["station"])
         if job["state"] == "succeeded":
             progress.update(bar, completed=job["progress"]["stations"] or 1)
@@ -46,4 +49,4 @@ def watch_campaign(client: "httpx.Client", run: dict[str, Any], console: Console
             if run["state"] in ENDED:
                 return run
             pause(LOOK_S)
-            run = call(client, "GET", f"/api/v1/campaign-runs/{run['id']}")
+            run = call(client, "GET", f"/api/v1/campaign-runs/{run['id']}", CAMPAIGN_RUN)
