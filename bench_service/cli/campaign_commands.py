@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from bench_service.cli.client import answer, call, connect, segment
 from bench_service.cli.files import check_folder, whole_file
-from bench_service.cli.options import AsJson, Server, console, errors, parameter
+from bench_service.cli.options import AsJson, Server, console, errors, parameter, wide
 from bench_service.cli.refusal import Refused
 
 if TYPE_CHECKING:
@@ -58,11 +57,11 @@ def run_campaign(
     if as_json:
         print(json.dumps(report, indent=2))
     else:
-        _wide().print(run_table(run))
+        wide().print(run_table(run))
         for warning in run["warnings"]:
-            console.print(warning, style="yellow", markup=False, soft_wrap=True)
+            console.print(warning, style="yellow", soft_wrap=True)
         why = f": {run['reason']}" if run["reason"] else ""
-        console.print(f"verdict {run['verdict']}, run {run['id']} {run['state']}{why}", markup=False, soft_wrap=True)
+        console.print(f"verdict {run['verdict']}, run {run['id']} {run['state']}{why}", soft_wrap=True)
     return exit_code(run["verdict"])
 
 
@@ -105,7 +104,7 @@ def add_campaign(
             headers=headers,
         )
     for warning in made["warnings"]:
-        console.print(warning, style="yellow", markup=False, soft_wrap=True)
+        console.print(warning, style="yellow", soft_wrap=True)
     console.print(f"campaign {made['name']}, {made['duration_s'] / 3600:.1f} h of bench time", soft_wrap=True)
 
 
@@ -217,8 +216,4 @@ def _show(items: list[dict[str, Any]], as_json: bool, table: Any) -> None:
     if as_json:
         print(json.dumps(items, indent=2))
     else:
-        _wide().print(table(items))
-
-
-def _wide() -> Console:
-    return Console(width=max(console.width, 140))
+        wide().print(table(items))

@@ -11,12 +11,11 @@ from typing import Annotated, Any
 
 import typer
 from pydantic import ValidationError
-from rich.console import Console
 
 from bench_service.cli import campaign_commands
 from bench_service.cli.client import RESULT, call, check, connect, segment
 from bench_service.cli.files import check_folder, text_of, whole_file
-from bench_service.cli.options import AsJson, Server, console, errors, parameter
+from bench_service.cli.options import AsJson, Server, console, errors, parameter, wide
 from bench_service.cli.refusal import Refused
 from bench_service.jobs.errors import ServiceError
 from bench_service.settings import Settings
@@ -38,7 +37,7 @@ def run_command_line(settings: Settings, arguments: list[str] | None = None) -> 
     try:
         code = app(arguments, standalone_mode=False, obj=settings)
     except (Refused, ServiceError) as error:
-        errors.print(f"bench: {error}", style="red", markup=False, soft_wrap=True)
+        errors.print(f"bench: {error}", style="red", soft_wrap=True)
         return 2
     except typer.Abort:
         return 2
@@ -61,7 +60,7 @@ def _unforeseen(settings: Settings, error: Exception) -> None:
     log.debug("the command failed", exc_info=error)
     about = " ".join(str(error).split()) or "no more is known"
     what = f"unforeseen {type(error).__name__}: {about} (BENCH_LOG_LEVEL=debug shows where)"
-    errors.print(f"bench: {what}", style="red", markup=False, soft_wrap=True)
+    errors.print(f"bench: {what}", style="red", soft_wrap=True)
 
 
 @app.command()
@@ -265,7 +264,7 @@ def jobs(
     if as_json:
         print(json.dumps(page, indent=2))
     else:
-        Console(width=max(console.width, 140)).print(job_table(page["items"]))
+        wide().print(job_table(page["items"]))
 
 
 def _with(settings: Settings, **given: Any) -> Settings:

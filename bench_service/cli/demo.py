@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
+from rich.text import Text
 
 from bench_service.cli.client import RESULT, call
 from bench_service.cli.tables import check_table, coefficient_table
@@ -24,18 +25,18 @@ def _one(client: "httpx.Client", procedure: str, unit: str, seed: int, console: 
     body: dict[str, Any] = {"procedure": procedure, "unit": unit, "seed": seed}
     job = watch(client, call(client, "POST", "/api/v1/jobs", JOB, json=body), console)
     if job["state"] != "succeeded":
-        console.print(f"[red]{job['state']}[/]: {job['error']}", soft_wrap=True)
+        console.print(f"{job['state']}: {job['error']}", style="red", soft_wrap=True)
         return 2
     result = call(client, "GET", f"/api/v1/jobs/{job['id']}/result", RESULT)
     if procedure.startswith("calibration"):
         _show_coefficients(client, job, console)
     console.print(check_table(result["document"]))
     for warning in result["document"]["warnings"]:
-        console.print(f"[yellow]{warning}[/]", soft_wrap=True)
+        console.print(warning, style="yellow", soft_wrap=True)
     colour = {"pass": "green", "fail": "red"}.get(job["verdict"], "yellow")
-    console.print(
-        f"{procedure}: verdict [bold {colour}]{job['verdict']}[/], page {client.base_url}{job['page']}", soft_wrap=True
-    )
+    verdict = Text(str(job["verdict"]), style=f"bold {colour}")
+    page = f", page {client.base_url}{job['page']}"
+    console.print(Text.assemble(f"{procedure}: verdict ", verdict, page), soft_wrap=True)
     return exit_code(job["verdict"])
 
 

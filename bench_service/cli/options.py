@@ -9,8 +9,9 @@ from rich.console import Console
 
 from bench_service.cli.refusal import Refused
 
-console = Console()
-errors = Console(stderr=True)
+console = Console(markup=False, emoji=False)
+errors = Console(stderr=True, markup=False, emoji=False)
+"""Texts come from people and from the service, with brackets and colons that are no markup: colours are styles."""
 
 Server = Annotated[str | None, typer.Option(help="Address of a service; without it, work in this process")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables")]
@@ -33,3 +34,8 @@ def parameter(text: str) -> tuple[str, Any]:
         return name, value
     except ValueError as error:  # more digits than Python reads
         raise Refused(f"--set {name}: {error}") from error
+
+
+def wide() -> Console:
+    """A console for tables: wide enough for their columns where the terminal is narrow, or none."""
+    return Console(width=max(console.width, 140), markup=False, emoji=False)

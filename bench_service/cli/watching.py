@@ -20,7 +20,7 @@ CAMPAIGN_RUN = ("id", "campaign", "unit", "state", "verdict", "steps", "waiting"
 
 def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict[str, Any]:
     """Follow a job until it has ended; the job as it then is."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console) as progress:
         bar = progress.add_task(f"{job['procedure']} {job['unit']}", total=job["progress"]["stations"] or 1)
         while job["state"] not in ENDED:
@@ -39,8 +39,8 @@ def exit_code(verdict: str | None) -> int:
 
 def watch_campaign(client: "httpx.Client", run: dict[str, Any], console: Console) -> dict[str, Any]:
     """Follow a campaign's run until it has ended; what it waits for is shown beside the bar."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, TextColumn("{task.fields[doing]}"), console=console) as progress:
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, TextColumn("{task.fields[doing]}", markup=False), console=console) as progress:
         bar = progress.add_task(f"{run['campaign']} {run['unit']}", total=len(run["steps"]), doing="")
         while True:
             ended = [step for step in run["steps"] if step["finished_at"] or step["state"] == "skipped"]
