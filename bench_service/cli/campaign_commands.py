@@ -1,15 +1,19 @@
 """``bench campaign`` and ``bench schedule``: acceptance in one command, with an exit code that a CI system can read."""
 
 import json
+from functools import partial
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from bench_service.cli.client import answer, call, connect, segment
-from bench_service.cli.files import check_folder, whole_file
-from bench_service.cli.options import AsJson, Server, console, errors, parameter, wide
+from bench_service.cli.files import clear_place, whole_file
+from bench_service.cli.options import AsJson, Server, console, errors, notice, parameter, wide
+from bench_service.cli.patience import patiently
 from bench_service.cli.refusal import Refused
+from bench_service.wall_clock import new_id
 
 if TYPE_CHECKING:
     import httpx
@@ -42,18 +46,23 @@ def run_campaign(
     from bench_service.cli.campaign_tables import run_table
     from bench_service.cli.watching import CAMPAIGN_RUN, exit_code, watch_campaign
 
-    body = {"unit": unit, "bench": bench, "seed": seed, "labels": _labels(label), "parameters": _step_parameters(set_)}
     if junit is not None:
-        check_folder(junit)
+        clear_place(junit)
+    body = {"unit": unit, "bench": bench, "seed": seed, "labels": _labels(label), "parameters": _step_parameters(set_)}
     if key is not None and not (key.isascii() and key.isprintable()):
         raise Refused(f"--key {key!r}: letters, digits and signs of ASCII are needed")
-    headers = {} if key is None else {"Idempotency-Key": key}
+    key = new_id() if key is None else key  # so that there is a way back to every run
     with connect(context.obj, server, drive=True) as client:
+        headers = {"Idempotency-Key": key}
         run = call(client, "POST", f"/api/v1/campaigns/{segment(name)}/runs", CAMPAIGN_RUN, json=body, headers=headers)
-        run = watch_campaign(client, run, errors)
-        report = call(client, "GET", f"/api/v1/campaign-runs/{run['id']}/report", ("run",))
+        again = f"the same command with --key {quote(key)} waits for it again"
+        goes_on = f"The service has run {run['id']} and goes on with it: {again}"
+        run = watch_campaign(client, run, errors, goes_on)
+        path = f"/api/v1/campaign-runs/{run['id']}/report"
+        report = patiently(partial(call, client, "GET", path, ("run",)), notice, goes_on)
         if junit is not None:
-            _write_junit(client, run["id"], junit)
+            ask = partial(answer, client, "GET", path, params={"format": "junit"})
+            _write_junit(patiently(ask, notice, goes_on).content, run["id"], junit)
     if as_json:
         print(json.dumps(report, indent=2))
     else:
@@ -171,11 +180,10 @@ def remove_schedule(context: typer.Context, schedule: str, server: Server = None
         answer(client, "DELETE", f"/api/v1/schedules/{segment(schedule)}")
 
 
-def _write_junit(client: "httpx.Client", run_id: str, file: Path) -> None:
-    report = answer(client, "GET", f"/api/v1/campaign-runs/{run_id}/report", params={"format": "junit"})
+def _write_junit(content: bytes, run_id: str, file: Path) -> None:
     try:
         with whole_file(file) as sink:
-            sink.write(report.content)
+            sink.write(content)
     except Refused as error:
         raise Refused(f"{error}; the run is {run_id}") from error
 

@@ -7,13 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from bench_service.cli.refusal import Refused
+from bench_service.cli.refusal import Away, Refused
 from bench_service.settings import Settings
 
 if TYPE_CHECKING:
     import httpx  # at run time where it is used: a server that starts needs no client
 
 TIMEOUT_S = 600.0
+NOT_NOW = (502, 503, 504)
+"""Statuses of a service that is not ready, and of a proxy whose service is away."""
 SHOWN = 120
 """How much of an answer that nobody expected is shown [characters]."""
 
@@ -36,7 +38,7 @@ def connect(settings: Settings, server: str | None, drive: bool) -> Generator["h
     except httpx.InvalidURL as error:
         raise Refused(f"--server {server}: {error}") from error
     except httpx.RequestError as error:
-        raise Refused(f"{error.request.url} does not answer: {error}") from error
+        raise _away(error) from error
 
 
 def _address(server: str) -> "httpx.URL":
@@ -82,12 +84,17 @@ def call(client: "httpx.Client", method: str, path: str, fields: Sequence[str], 
 
 
 def answer(client: "httpx.Client", method: str, path: str, **options: Any) -> "httpx.Response":
-    """A good answer, whatever is in it. Raises `Refused` with what the service said."""
+    """A good answer, whatever is in it. Raises `Refused` with what the service said, `Away` where it may yet answer."""
+    import httpx
+
     try:
         request = client.build_request(method, path, **options)
     except ValueError as error:  # a number or a letter that JSON cannot hold
         raise Refused(f"what was given cannot be sent: {error}") from error
-    response = client.send(request)
+    try:
+        response = client.send(request)
+    except httpx.RequestError as error:
+        raise _away(error) from error
     check(response)
     return response
 
@@ -96,7 +103,7 @@ def check(response: "httpx.Response") -> None:
     """Raises `Refused` for an answer that is not good, with what the service said, and for one of something else."""
     if not response.is_success:
         response.read()
-        raise Refused(_sentence(response))
+        raise (Away if response.status_code in NOT_NOW else Refused)(_sentence(response))
     if response.headers.get("content-type", "").startswith("text/html"):  # nothing that is asked for here is a page
         response.read()
         raise Refused(_no_service(response))
@@ -105,6 +112,10 @@ def check(response: "httpx.Response") -> None:
 def segment(name: str) -> str:
     """A name as one segment of a path, whatever is in it."""
     return quote(name, safe="")
+
+
+def _away(error: "httpx.RequestError") -> Away:
+    return Away(f"{error.request.url} does not answer: {str(error) or type(error).__name__}")
 
 
 def _sentence(response: "httpx.Response") -> str:

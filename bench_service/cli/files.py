@@ -22,6 +22,17 @@ def check_folder(file: Path) -> None:
         raise Refused(f"{file} cannot be written: there is no folder {file.parent}")
 
 
+def clear_place(file: Path) -> None:
+    """No file of an earlier command is left here, to be taken for that of this one. Raises `Refused`."""
+    check_folder(file)
+    try:
+        if file.exists() and not file.is_file():
+            raise Refused(f"{file} cannot be written: it is no ordinary file")
+        file.unlink(missing_ok=True)
+    except OSError as error:
+        raise Refused(f"an old {file} cannot be removed: {error.strerror}") from error
+
+
 @contextmanager
 def whole_file(file: Path) -> Generator[BinaryIO]:
     """A file to write that is there at the end of the block, and not at all where that fails: a CI system may be

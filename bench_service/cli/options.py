@@ -36,6 +36,11 @@ def parameter(text: str) -> tuple[str, Any]:
         raise Refused(f"--set {name}: {error}") from error
 
 
+def notice(text: str) -> None:
+    """Tell something on standard error that is no failure, above a progress bar where there is one."""
+    errors.print(text, style="yellow", soft_wrap=True)
+
+
 def wide() -> Console:
     """A console for tables: wide enough for their columns where the terminal is narrow, or none."""
     return Console(width=max(console.width, 140), markup=False, emoji=False)

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from email.message import Message
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 Answer = tuple[int, str, str]
@@ -10,11 +11,12 @@ Answer = tuple[int, str, str]
 
 
 @contextmanager
-def answering(say: Callable[[str, str], Answer]) -> Generator[str]:
-    """A server's address; `say` answers a method and a path with its query."""
+def answering(say: Callable[[str, str], Answer], hear: Callable[[Message], object] = len) -> Generator[str]:
+    """A server's address; `say` answers a method and a path with its query, `hear` is told the headers of each."""
 
     class Handler(BaseHTTPRequestHandler):
         def answer(self) -> None:
+            hear(self.headers)
             self.rfile.read(int(self.headers.get("Content-Length", 0)))
             status, kind, text = say(self.command, self.path)
             content = text.encode()
