@@ -1,15 +1,19 @@
 """``bench campaign`` and ``bench schedule``: acceptance in one command, with an exit code that a CI system can read."""
 
 import json
+from functools import partial
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from bench_service.cli.client import answer, call, connect, segment
-from bench_service.cli.options import AsJson, Server, console, errors, parameter
+from bench_service.cli.files import clear_place, whole_file
+from bench_service.cli.options import AsJson, Server, console, errors, notice, parameter, wide
+from bench_service.cli.patience import patiently
 from bench_service.cli.refusal import Refused
+from bench_service.wall_clock import new_id
 
 if TYPE_CHECKING:
     import httpx
@@ -40,28 +44,33 @@ def run_campaign(
 ) -> int:
     """Run a campaign on a unit and wait for its verdict. Exit code: 0 pass, 1 fail, 2 error."""
     from bench_service.cli.campaign_tables import run_table
-    from bench_service.cli.watching import exit_code, watch_campaign
+    from bench_service.cli.watching import CAMPAIGN_RUN, exit_code, watch_campaign
 
+    if junit is not None:
+        clear_place(junit)
     body = {"unit": unit, "bench": bench, "seed": seed, "labels": _labels(label), "parameters": _step_parameters(set_)}
-    if junit is not None and not junit.absolute().parent.is_dir():
-        raise Refused(f"{junit} cannot be written: there is no folder {junit.parent}")
     if key is not None and not (key.isascii() and key.isprintable()):
         raise Refused(f"--key {key!r}: letters, digits and signs of ASCII are needed")
-    headers = {} if key is None else {"Idempotency-Key": key}
+    key = new_id() if key is None else key  # so that there is a way back to every run
     with connect(context.obj, server, drive=True) as client:
-        run = call(client, "POST", f"/api/v1/campaigns/{segment(name)}/runs", json=body, headers=headers)
-        run = watch_campaign(client, run, errors)
-        report = call(client, "GET", f"/api/v1/campaign-runs/{run['id']}/report")
+        headers = {"Idempotency-Key": key}
+        run = call(client, "POST", f"/api/v1/campaigns/{segment(name)}/runs", CAMPAIGN_RUN, json=body, headers=headers)
+        again = f"the same command with --key {quote(key)} waits for it again"
+        goes_on = f"The service has run {run['id']} and goes on with it: {again}"
+        run = watch_campaign(client, run, errors, goes_on)
+        path = f"/api/v1/campaign-runs/{run['id']}/report"
+        report = patiently(partial(call, client, "GET", path, ("run",)), notice, goes_on)
         if junit is not None:
-            _write_junit(client, run["id"], junit)
+            ask = partial(answer, client, "GET", path, params={"format": "junit"})
+            _write_junit(patiently(ask, notice, goes_on).content, run["id"], junit)
     if as_json:
         print(json.dumps(report, indent=2))
     else:
-        _wide().print(run_table(run))
+        wide().print(run_table(run))
         for warning in run["warnings"]:
-            console.print(warning, style="yellow", markup=False, soft_wrap=True)
+            console.print(warning, style="yellow", soft_wrap=True)
         why = f": {run['reason']}" if run["reason"] else ""
-        console.print(f"verdict {run['verdict']}, run {run['id']} {run['state']}{why}", markup=False, soft_wrap=True)
+        console.print(f"verdict {run['verdict']}, run {run['id']} {run['state']}{why}", soft_wrap=True)
     return exit_code(run["verdict"])
 
 
@@ -79,7 +88,9 @@ def list_campaigns(context: typer.Context, server: Server = None, as_json: AsJso
 def show_campaign(context: typer.Context, name: str, server: Server = None) -> None:
     """A campaign as JSON, fit to be changed and added under another name."""
     with connect(context.obj, server, drive=False) as client:
-        console.print_json(json.dumps(call(client, "GET", f"/api/v1/campaigns/{segment(name)}")["campaign"]))
+        console.print_json(
+            json.dumps(call(client, "GET", f"/api/v1/campaigns/{segment(name)}", ("campaign",))["campaign"])
+        )
 
 
 @campaigns.command("add")
@@ -93,9 +104,16 @@ def add_campaign(
     """Store a campaign; what can never work is refused, what may not is warned of."""
     with connect(context.obj, server, drive=False) as client:
         headers = {"Content-Type": "application/json"}
-        made = call(client, "POST", "/api/v1/campaigns", content=file.read_bytes(), headers=headers)
+        made = call(
+            client,
+            "POST",
+            "/api/v1/campaigns",
+            ("name", "warnings", "duration_s"),
+            content=file.read_bytes(),
+            headers=headers,
+        )
     for warning in made["warnings"]:
-        console.print(warning, style="yellow", markup=False, soft_wrap=True)
+        console.print(warning, style="yellow", soft_wrap=True)
     console.print(f"campaign {made['name']}, {made['duration_s'] / 3600:.1f} h of bench time", soft_wrap=True)
 
 
@@ -112,7 +130,7 @@ def list_runs(
 
     query = {"limit": limit} | ({} if campaign is None else {"campaign": campaign})
     with connect(context.obj, server, drive=False) as client:
-        items = call(client, "GET", "/api/v1/campaign-runs", params=query)["items"]
+        items = call(client, "GET", "/api/v1/campaign-runs", ("items",), params=query)["items"]
     _show(items, as_json, runs_table)
 
 
@@ -141,7 +159,7 @@ def add_schedule(
         "overlap": overlap,
     }
     with connect(context.obj, server, drive=False) as client:
-        made = call(client, "POST", "/api/v1/schedules", json=body)
+        made = call(client, "POST", "/api/v1/schedules", ("id", "next_at"), json=body)
     console.print(f"schedule {made['id']}, next start {made['next_at']}", soft_wrap=True)
 
 
@@ -162,15 +180,12 @@ def remove_schedule(context: typer.Context, schedule: str, server: Server = None
         answer(client, "DELETE", f"/api/v1/schedules/{segment(schedule)}")
 
 
-def _write_junit(client: "httpx.Client", run_id: str, file: Path) -> None:
-    """Whole or not at all: a CI system may be reading."""
-    report = answer(client, "GET", f"/api/v1/campaign-runs/{run_id}/report", params={"format": "junit"})
-    partial = file.with_name(file.name + ".part")
+def _write_junit(content: bytes, run_id: str, file: Path) -> None:
     try:
-        partial.write_bytes(report.content)
-        partial.replace(file)
-    except OSError as error:
-        raise Refused(f"{file} cannot be written: {error.strerror}; the run is {run_id}") from error
+        with whole_file(file) as sink:
+            sink.write(content)
+    except Refused as error:
+        raise Refused(f"{error}; the run is {run_id}") from error
 
 
 def _step_parameters(texts: list[str]) -> dict[str, dict[str, Any]]:
@@ -198,7 +213,7 @@ def _all(client: "httpx.Client", path: str) -> list[dict[str, Any]]:
     items: list[dict[str, Any]] = []
     query: dict[str, Any] = {"limit": 500}
     while True:
-        page = call(client, "GET", path, params=query)
+        page = call(client, "GET", path, ("items", "next"), params=query)
         items += page["items"]
         if page["next"] is None:
             return items
@@ -209,8 +224,4 @@ def _show(items: list[dict[str, Any]], as_json: bool, table: Any) -> None:
     if as_json:
         print(json.dumps(items, indent=2))
     else:
-        _wide().print(table(items))
-
-
-def _wide() -> Console:
-    return Console(width=max(console.width, 140))
+        wide().print(table(items))

@@ -2,22 +2,23 @@
 
 from typing import Any
 
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 COLOURS = {"pass": "green", "fail": "red", "error": "yellow"}
 
 
 def run_table(run: dict[str, Any]) -> Table:
-    """A run step by step: what became of it, and which checks failed."""
+    """A run step by step: what became of it, which checks failed, and what it warns of."""
     table = _table(
         "step", "does", "state", "verdict", "checks", "what to know", title=f"{run['campaign']} {run['unit']}"
     )
     for step in run["steps"]:
         bad = [c["name"] for c in step["checks"] if not c["passed"]]
-        told = "; ".join(filter(None, [step["reason"], f"missed: {', '.join(bad)}" if bad else ""]))
+        missed = f"missed: {', '.join(bad)}" if bad else ""
+        told = "\n".join(filter(None, [step["reason"], missed, *step["warnings"]]))
         passed = f"{len(step['checks']) - len(bad)}/{len(step['checks'])}"
-        table.add_row(step["name"], step["does"], step["state"], _verdict(step["verdict"]), passed, escape(told))
+        table.add_row(step["name"], step["does"], step["state"], _verdict(step["verdict"]), passed, told)
     return table
 
 
@@ -26,7 +27,7 @@ def campaign_table(items: list[dict[str, Any]]) -> Table:
     table = _table("campaign", "title", "steps", "")
     for item in items:
         steps = ", ".join(step["name"] for step in item["campaign"]["steps"])
-        table.add_row(item["name"], escape(item["campaign"]["title"]), steps, "shipped" if item["shipped"] else "")
+        table.add_row(item["name"], item["campaign"]["title"], steps, "shipped" if item["shipped"] else "")
     return table
 
 
@@ -34,7 +35,7 @@ def runs_table(items: list[dict[str, Any]]) -> Table:
     """Runs, newest first."""
     table = _table("run", "campaign", "unit", "state", "verdict", "asked for", "what to know")
     for run in items:
-        told = escape(run["waiting"] or run["reason"])
+        told = run["waiting"] or run["reason"]
         row = (run["id"], run["campaign"], run["unit"], run["state"], _verdict(run["verdict"]))
         table.add_row(*row, run["created_at"][:19].replace("T", " "), told)
     return table
@@ -45,8 +46,8 @@ def schedule_table(items: list[dict[str, Any]]) -> Table:
     table = _table("schedule", "campaign", "unit", "cron", "zone", "next, UTC", "last outcome")
     for one in items:
         next_at = (one["next_at"] or "off")[:16].replace("T", " ")
-        row = (one["id"], one["campaign"], one["unit"], escape(one["cron"]), one["time_zone"], next_at)
-        table.add_row(*row, escape(one["last_outcome"]))
+        row = (one["id"], one["campaign"], one["unit"], one["cron"], one["time_zone"], next_at)
+        table.add_row(*row, one["last_outcome"])
     return table
 
 
@@ -57,5 +58,5 @@ def _table(*columns: str, title: str | None = None) -> Table:
     return table
 
 
-def _verdict(verdict: str | None) -> str:
-    return "–" if verdict is None else f"[{COLOURS[verdict]}]{verdict}[/]"
+def _verdict(verdict: str | None) -> Text:
+    return Text("–" if verdict is None else verdict, style=COLOURS.get(verdict or "", ""))

@@ -1,19 +1,26 @@
 """One client for both ways: a server's address, or the same application in this process."""
 
 import tempfile
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from bench_service.cli.refusal import Refused
+from bench_service.cli.refusal import Away, Refused
 from bench_service.settings import Settings
 
 if TYPE_CHECKING:
     import httpx  # at run time where it is used: a server that starts needs no client
 
 TIMEOUT_S = 600.0
+NOT_NOW = (502, 503, 504)
+"""Statuses of a service that is not ready, and of a proxy whose service is away."""
+SHOWN = 120
+"""How much of an answer that nobody expected is shown [characters]."""
+
+RESULT = ("id", "verdict", "document")
+"""What commands read of a result."""
 
 
 @contextmanager
@@ -31,7 +38,19 @@ def connect(settings: Settings, server: str | None, drive: bool) -> Generator["h
     except httpx.InvalidURL as error:
         raise Refused(f"--server {server}: {error}") from error
     except httpx.RequestError as error:
-        raise Refused(f"{error.request.url} does not answer: {error}") from error
+        raise _away(error) from error
+
+
+def _address(server: str) -> "httpx.URL":
+    """Where the service is. Raises `Refused` for what no resolver would take."""
+    import httpx
+
+    url = httpx.URL(server)
+    try:
+        url.host.encode("idna")
+    except UnicodeError as error:
+        raise Refused(f"--server {server}: {url.host!r} is no name of a host") from error
+    return url
 
 
 @contextmanager
@@ -39,7 +58,7 @@ def _client(settings: Settings, server: str | None, drive: bool) -> Generator["h
     import httpx
 
     if server is not None:
-        with httpx.Client(base_url=server, timeout=TIMEOUT_S) as client:
+        with httpx.Client(base_url=_address(server), timeout=TIMEOUT_S) as client:
             yield client
         return
     from bench_service.cli.serving import serving  # a quarter of a second that a client of a server does not need
@@ -55,17 +74,39 @@ def _client(settings: Settings, server: str | None, drive: bool) -> Generator["h
             yield client
 
 
-def call(client: "httpx.Client", method: str, path: str, **options: Any) -> Any:
-    """The JSON of a good answer. Raises `Refused` with what the service said."""
-    return answer(client, method, path, **options).json()
+def call(client: "httpx.Client", method: str, path: str, fields: Sequence[str], **options: Any) -> Any:
+    """The JSON object of a good answer, with at least these fields. Raises `Refused` with what the service said."""
+    response = answer(client, method, path, **options)
+    found = _json(response)
+    if not isinstance(found, dict) or not all(name in found for name in fields):
+        raise Refused(_no_service(response))
+    return found
 
 
 def answer(client: "httpx.Client", method: str, path: str, **options: Any) -> "httpx.Response":
-    """A good answer, whatever is in it. Raises `Refused` with what the service said."""
-    response = client.request(method, path, **options)
-    if not response.is_success:
-        raise Refused(sentence(response))
+    """A good answer, whatever is in it. Raises `Refused` with what the service said, `Away` where it may yet answer."""
+    import httpx
+
+    try:
+        request = client.build_request(method, path, **options)
+    except ValueError as error:  # a number or a letter that JSON cannot hold
+        raise Refused(f"what was given cannot be sent: {error}") from error
+    try:
+        response = client.send(request)
+    except httpx.RequestError as error:
+        raise _away(error) from error
+    check(response)
     return response
+
+
+def check(response: "httpx.Response") -> None:
+    """Raises `Refused` for an answer that is not good, with what the service said, and for one of something else."""
+    if not response.is_success:
+        response.read()
+        raise (Away if response.status_code in NOT_NOW else Refused)(_sentence(response))
+    if response.headers.get("content-type", "").startswith("text/html"):  # nothing that is asked for here is a page
+        response.read()
+        raise Refused(_no_service(response))
 
 
 def segment(name: str) -> str:
@@ -73,11 +114,41 @@ def segment(name: str) -> str:
     return quote(name, safe="")
 
 
-def sentence(response: "httpx.Response") -> str:
-    """A problem document in words."""
+def _away(error: "httpx.RequestError") -> Away:
+    return Away(f"{error.request.url} does not answer: {str(error) or type(error).__name__}")
+
+
+def _sentence(response: "httpx.Response") -> str:
+    """A problem document in words; of anything else, who answered it and how it begins."""
+    problem = _json(response)
+    if isinstance(problem, dict):
+        found = problem.get("errors")
+        fields = [_field(one) for one in found if isinstance(one, dict)] if isinstance(found, list) else []
+        words = "; ".join(filter(None, fields)) or problem.get("detail")
+        if words and isinstance(words, str):
+            return words
+    return f"{response.url} answered {_beginning(response)}"
+
+
+def _field(one: dict[str, Any]) -> str:
+    given = f" = {one['value']!r}" if "value" in one else ""
+    return ": ".join(filter(None, [f"{one.get('field', '')}{given}", str(one.get("message", ""))]))
+
+
+def _no_service(response: "httpx.Response") -> str:
+    return f"{response.url} is no bench service: it answered {_beginning(response)}"
+
+
+def _beginning(response: "httpx.Response") -> str:
+    """Status and the first words, in one line."""
+    text = " ".join(response.text.split())
+    shown = text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
+    return f"{response.status_code} {response.reason_phrase}: {shown or 'nothing'}"
+
+
+def _json(response: "httpx.Response") -> Any:
+    """What the answer holds; None where that is no JSON."""
     try:
-        problem = response.json()
-    except ValueError:
-        return f"{response.status_code}: {response.text[:200]}"
-    fields = [f"{e['field']} = {e['value']!r}: {e['message']}" for e in problem.get("errors", [])]
-    return "; ".join(fields) or problem.get("detail", response.text[:200])
+        return response.json()
+    except (ValueError, RecursionError):
+        return None

@@ -4,21 +4,23 @@ Tables and progress bars are imported by the commands that show them: a server t
 """
 
 import json
+import logging
 import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from pydantic import ValidationError
-from rich.console import Console
 
 from bench_service.cli import campaign_commands
-from bench_service.cli.client import call, connect, segment, sentence
-from bench_service.cli.options import AsJson, Server, console, errors, parameter
+from bench_service.cli.client import RESULT, call, check, connect, segment
+from bench_service.cli.files import check_folder, text_of, whole_file
+from bench_service.cli.options import AsJson, Server, console, errors, parameter, wide
 from bench_service.cli.refusal import Refused
 from bench_service.jobs.errors import ServiceError
 from bench_service.settings import Settings
 
+log = logging.getLogger(__name__)
 HELP = "Test bench for inertial navigation units. Exit code: 0 pass, 1 fail, 2 error."
 app = typer.Typer(
     no_args_is_help=True,
@@ -35,16 +37,30 @@ def run_command_line(settings: Settings, arguments: list[str] | None = None) -> 
     try:
         code = app(arguments, standalone_mode=False, obj=settings)
     except (Refused, ServiceError) as error:
-        errors.print(f"bench: {error}", style="red", markup=False, soft_wrap=True)
+        errors.print(f"bench: {error}", style="red", soft_wrap=True)
         return 2
     except typer.Abort:
         return 2
+    except SystemExit as ended:  # whoever read the output has gone, or no server could start; 1 would be a verdict
+        return 2 if ended.code else 0
     except Exception as error:
         if hasattr(error, "show") and hasattr(error, "exit_code"):  # a usage error of the command line itself
             error.show()  # pyright: ignore[reportAttributeAccessIssue]
             return 2
-        raise
+        _unforeseen(settings, error)
+        return 2
     return int(code or 0)
+
+
+def _unforeseen(settings: Settings, error: Exception) -> None:
+    """One sentence of what nobody foresaw; where it happened is for the log."""
+    from bench_service.cli.logs import set_up
+
+    set_up(settings, "warning")
+    log.debug("the command failed", exc_info=error)
+    about = " ".join(str(error).split()) or "no more is known"
+    what = f"unforeseen {type(error).__name__}: {about} (BENCH_LOG_LEVEL=debug shows where)"
+    errors.print(f"bench: {what}", style="red", soft_wrap=True)
 
 
 @app.command()
@@ -142,12 +158,12 @@ def run(
 ) -> int:
     """Run a procedure on a unit and wait for its verdict."""
     from bench_service.cli.tables import check_table
-    from bench_service.cli.watching import exit_code, watch
+    from bench_service.cli.watching import JOB, exit_code, watch
 
     body = {"procedure": procedure, "unit": unit, "parameters": dict(map(parameter, set_)), "seed": seed}
     with connect(context.obj, server, drive=True) as client:
-        job = watch(client, call(client, "POST", "/api/v1/jobs", json=body), errors)
-        result = call(client, "GET", f"/api/v1/jobs/{job['id']}/result") if job["result"] else None
+        job = watch(client, call(client, "POST", "/api/v1/jobs", JOB, json=body), errors)
+        result = call(client, "GET", f"/api/v1/jobs/{job['id']}/result", RESULT) if job["result"] else None
     if as_json:
         print(json.dumps({"job": job, "result": result}, indent=2))
     elif result is None:
@@ -166,10 +182,10 @@ def import_(
     server: Server = None,
 ) -> None:
     """Import a recorded file, or several that are columns of one recording."""
+    data = {"description": text_of(description)}
     with connect(context.obj, server, drive=False) as client:
         parts = [("files", (path.name, path.read_bytes(), "application/octet-stream")) for path in files]
-        data = {"description": description.read_text(encoding="utf-8")}
-        recording = call(client, "POST", "/api/v1/recordings", files=parts, data=data)
+        recording = call(client, "POST", "/api/v1/recordings", ("id",), files=parts, data=data)
     console.print_json(json.dumps(recording))
 
 
@@ -194,7 +210,7 @@ def analyse(
         "parameters": dict(map(parameter, set_)),
     }
     with connect(context.obj, server, drive=False) as client:
-        result = call(client, "POST", "/api/v1/analyses", json=body)
+        result = call(client, "POST", "/api/v1/analyses", RESULT, json=body)
     if as_json:
         print(json.dumps(result, indent=2))
     else:
@@ -207,7 +223,9 @@ def analyse(
 def export(
     context: typer.Context,
     recording: str,
-    output: Annotated[Path, typer.Option("--output", "-o", help="File to write; its ending is the format")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", dir_okay=False, help="File to write; its ending is the format")
+    ],
     channels: Annotated[str | None, typer.Option(help="Names, separated by commas; all without it")] = None,
     start_s: Annotated[float | None, typer.Option(help="From this second of the recording")] = None,
     stop_s: Annotated[float | None, typer.Option(help="Up to this second of the recording")] = None,
@@ -216,18 +234,15 @@ def export(
     """Take a recording's samples out as .csv, .parquet or .arrow."""
     options: dict[str, Any] = {"channels": channels, "start_s": start_s, "stop_s": stop_s}
     query = {"format": output.suffix.removeprefix("."), **{k: v for k, v in options.items() if v is not None}}
-    partial = output.with_name(output.name + ".part")
+    check_folder(output)
     with (
         connect(context.obj, server, drive=False) as client,
         client.stream("GET", f"/api/v1/recordings/{segment(recording)}/data", params=query) as response,
     ):
-        if not response.is_success:
-            response.read()
-            raise Refused(sentence(response))
-        with partial.open("wb") as sink:
+        check(response)
+        with whole_file(output) as sink:
             for piece in response.iter_bytes():
                 sink.write(piece)
-    partial.replace(output)
     console.print(f"{output}: {output.stat().st_size} bytes")
 
 
@@ -245,11 +260,11 @@ def jobs(
 
     query = {k: v for k, v in {"state": state, "unit": unit, "limit": limit}.items() if v is not None}
     with connect(context.obj, server, drive=False) as client:
-        page = call(client, "GET", "/api/v1/jobs", params=query)
+        page = call(client, "GET", "/api/v1/jobs", ("items",), params=query)
     if as_json:
         print(json.dumps(page, indent=2))
     else:
-        Console(width=max(console.width, 140)).print(job_table(page["items"]))
+        wide().print(job_table(page["items"]))
 
 
 def _with(settings: Settings, **given: Any) -> Settings:

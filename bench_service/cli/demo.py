@@ -3,10 +3,11 @@
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
+from rich.text import Text
 
-from bench_service.cli.client import call
+from bench_service.cli.client import RESULT, call
 from bench_service.cli.tables import check_table, coefficient_table
-from bench_service.cli.watching import exit_code, watch
+from bench_service.cli.watching import JOB, exit_code, watch
 
 if TYPE_CHECKING:
     import httpx
@@ -22,26 +23,28 @@ def demonstrate(client: "httpx.Client", unit: str, seed: int, console: Console) 
 
 def _one(client: "httpx.Client", procedure: str, unit: str, seed: int, console: Console) -> int:
     body: dict[str, Any] = {"procedure": procedure, "unit": unit, "seed": seed}
-    job = watch(client, call(client, "POST", "/api/v1/jobs", json=body), console)
+    job = watch(client, call(client, "POST", "/api/v1/jobs", JOB, json=body), console)
     if job["state"] != "succeeded":
-        console.print(f"[red]{job['state']}[/]: {job['error']}", soft_wrap=True)
+        console.print(f"{job['state']}: {job['error']}", style="red", soft_wrap=True)
         return 2
-    result = call(client, "GET", f"/api/v1/jobs/{job['id']}/result")
+    result = call(client, "GET", f"/api/v1/jobs/{job['id']}/result", RESULT)
     if procedure.startswith("calibration"):
         _show_coefficients(client, job, console)
     console.print(check_table(result["document"]))
     for warning in result["document"]["warnings"]:
-        console.print(f"[yellow]{warning}[/]", soft_wrap=True)
+        console.print(warning, style="yellow", soft_wrap=True)
     colour = {"pass": "green", "fail": "red"}.get(job["verdict"], "yellow")
-    console.print(
-        f"{procedure}: verdict [bold {colour}]{job['verdict']}[/], page {client.base_url}{job['page']}", soft_wrap=True
-    )
+    verdict = Text(str(job["verdict"]), style=f"bold {colour}")
+    page = f", page {client.base_url}{job['page']}"
+    console.print(Text.assemble(f"{procedure}: verdict ", verdict, page), soft_wrap=True)
     return exit_code(job["verdict"])
 
 
 def _show_coefficients(client: "httpx.Client", job: dict[str, Any], console: Console) -> None:
-    newest = call(client, "GET", f"/api/v1/units/{job['unit']}/calibrations", params={"limit": 1})["items"][0]
-    truth = call(client, "GET", f"/api/v1/jobs/{job['id']}/truth")["triads"]
+    newest = call(client, "GET", f"/api/v1/units/{job['unit']}/calibrations", ("items",), params={"limit": 1})["items"][
+        0
+    ]
+    truth = call(client, "GET", f"/api/v1/jobs/{job['id']}/truth", ("triads",))["triads"]
     table, worst = coefficient_table(newest["triads"], truth)
     console.print(table)
     console.print(f"Largest of 24 errors: {worst:.2f} of its own standard uncertainty")

@@ -3,6 +3,7 @@
 from typing import Any
 
 from rich.table import Table
+from rich.text import Text
 
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.units import DISPLAY
@@ -41,7 +42,7 @@ def check_table(document: dict[str, Any]) -> Table:
         limit = check["limit"]
         bounds = [f"≥ {limit['minimum']:.4g}"] if limit["minimum"] is not None else []
         bounds += [f"≤ {limit['maximum']:.4g}"] if limit["maximum"] is not None else []
-        outcome = "[green]pass[/]" if check["passed"] else "[red]fail[/]"
+        outcome = Text("pass", style="green") if check["passed"] else Text("fail", style="red")
         table.add_row(check["name"], f"{check['value']:.4g}", ", ".join(bounds), limit["unit"], outcome)
     return table
 

@@ -1,11 +1,14 @@
 """Watching a job to its end, with a progress bar for a person."""
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from bench_service.cli.client import call
+from bench_service.cli.options import notice
+from bench_service.cli.patience import patiently
 from bench_service.wall_clock import pause
 
 if TYPE_CHECKING:
@@ -13,16 +16,24 @@ if TYPE_CHECKING:
 
 ENDED = ("succeeded", "failed", "cancelled", "interrupted")
 LOOK_S = 0.1
+"""How often to look [s]."""
+LOOK_TIMEOUT_S = 15.0
+"""How long one look may take [s]: a service that hangs is away too."""
+JOB = ("id", "procedure", "unit", "state", "verdict", "progress", "page", "result", "error")
+CAMPAIGN_RUN = ("id", "campaign", "unit", "state", "verdict", "steps", "waiting", "reason", "warnings")
+"""What commands read of a job and of a campaign's run."""
 
 
 def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict[str, Any]:
-    """Follow a job until it has ended; the job as it then is."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console) as progress:
-        bar = progress.add_task(f"{job['procedure']} {job['unit']}", total=job["progress"]["stations"] or 1)
+    """Follow a job until it has ended; the job as it then is. Raises `Refused` where the service is away for long."""
+    page = f"{str(client.base_url).rstrip('/')}{job['page']}"
+    goes_on = f"The service has job {job['id']} and goes on with it: {page} shows it, `bench jobs` lists it"
+    with _progress(console) as progress:
+        bar = progress.add_task(f"{job['procedure']} {job['unit']}", total=job["progress"]["stations"] or 1, doing="")
         while job["state"] not in ENDED:
             pause(LOOK_S)
-            job = call(client, "GET", f"/api/v1/jobs/{job['id']}")
+            ask = partial(call, client, "GET", f"/api/v1/jobs/{job['id']}", JOB, timeout=LOOK_TIMEOUT_S)
+            job = patiently(ask, notice, goes_on)
             progress.update(bar, completed=job["progress"]["station"])
         if job["state"] == "succeeded":
             progress.update(bar, completed=job["progress"]["stations"] or 1)
@@ -34,10 +45,12 @@ def exit_code(verdict: str | None) -> int:
     return {"pass": 0, "fail": 1}.get(verdict or "", 2)
 
 
-def watch_campaign(client: "httpx.Client", run: dict[str, Any], console: Console) -> dict[str, Any]:
-    """Follow a campaign's run until it has ended; what it waits for is shown beside the bar."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, TextColumn("{task.fields[doing]}"), console=console) as progress:
+def watch_campaign(client: "httpx.Client", run: dict[str, Any], console: Console, goes_on: str) -> dict[str, Any]:
+    """Follow a campaign's run until it has ended; what it waits for is shown beside the bar.
+
+    Raises `Refused` with `goes_on` where the service is away for long.
+    """
+    with _progress(console) as progress:
         bar = progress.add_task(f"{run['campaign']} {run['unit']}", total=len(run["steps"]), doing="")
         while True:
             ended = [step for step in run["steps"] if step["finished_at"] or step["state"] == "skipped"]
@@ -46,4 +59,12 @@ def watch_campaign(client: "httpx.Client", run: dict[str, Any], console: Console
             if run["state"] in ENDED:
                 return run
             pause(LOOK_S)
-            run = call(client, "GET", f"/api/v1/campaign-runs/{run['id']}")
+            path = f"/api/v1/campaign-runs/{run['id']}"
+            ask = partial(call, client, "GET", path, CAMPAIGN_RUN, timeout=LOOK_TIMEOUT_S)
+            run = patiently(ask, notice, goes_on)
+
+
+def _progress(console: Console) -> Progress:
+    """Names and reasons come from people: no markup."""
+    name, doing = (TextColumn(text, markup=False) for text in ("{task.description}", "{task.fields[doing]}"))
+    return Progress(name, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), doing, console=console)

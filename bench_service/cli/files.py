@@ -1,0 +1,50 @@
+"""Files that a command reads and writes."""
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from bench_service.cli.refusal import Refused
+
+
+def text_of(file: Path) -> str:
+    """All of a text file. Raises `Refused`."""
+    try:
+        return file.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise Refused(f"{file} is not UTF-8 text: {error.reason} at byte {error.start}") from error
+
+
+def check_folder(file: Path) -> None:
+    """Raises `Refused` where there is no folder for the file: before there is anything to lose."""
+    if not file.absolute().parent.is_dir():
+        raise Refused(f"{file} cannot be written: there is no folder {file.parent}")
+
+
+def clear_place(file: Path) -> None:
+    """No file of an earlier command is left here, to be taken for that of this one. Raises `Refused`."""
+    check_folder(file)
+    try:
+        if file.exists() and not file.is_file():
+            raise Refused(f"{file} cannot be written: it is no ordinary file")
+        file.unlink(missing_ok=True)
+    except OSError as error:
+        raise Refused(f"an old {file} cannot be removed: {error.strerror}") from error
+
+
+@contextmanager
+def whole_file(file: Path) -> Generator[BinaryIO]:
+    """A file to write that is there at the end of the block, and not at all where that fails: a CI system may be
+    reading. Raises `Refused`.
+    """
+    partial = file.with_name(file.name + ".part")
+    try:
+        try:
+            with partial.open("wb") as sink:
+                yield sink
+            partial.replace(file)
+        finally:
+            partial.unlink(missing_ok=True)
+    except OSError as error:
+        raise Refused(f"{file} cannot be written: {error.strerror}") from error

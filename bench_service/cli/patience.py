@@ -1,0 +1,38 @@
+"""Waiting for a service that is away for a while: restarted, or behind a link that is down."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from bench_service.cli.refusal import Away, Refused
+from bench_service.wall_clock import monotonic_s, now, pause
+
+PATIENCE_S = 60.0
+"""How long a service may be away [s]; a restart takes a few."""
+AGAIN_S = 0.5
+"""How long to wait before it is asked again [s]."""
+
+Found = TypeVar("Found")
+
+
+def patiently(ask: Callable[[], Found], say: Callable[[str], object], goes_on: str) -> Found:
+    """What `ask` gives, asked again while the service is away; `ask` must change nothing.
+
+    `goes_on`: what becomes of that which is asked about when we give up, and how to look at it again.
+    Raises `Refused` with it after `PATIENCE_S`, and whatever else `ask` raises at once.
+    """
+    begun, begun_s = now(), monotonic_s()
+    said = False
+    while True:
+        try:
+            found = ask()
+        except Away as error:
+            if monotonic_s() - begun_s > PATIENCE_S:
+                raise Refused(f"{error}; waited for {PATIENCE_S:.0f} s. {goes_on}") from error
+            if not said:
+                say(f"{error}; waiting since {begun:%H:%M:%S} UTC, for {PATIENCE_S:.0f} s at most")
+                said = True
+            pause(AGAIN_S)
+            continue
+        if said:
+            say("the service answers again")
+        return found

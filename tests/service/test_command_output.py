@@ -1,0 +1,126 @@
+"""What commands print of a service's texts: as they are, for brackets and colons are no markup, and all of them."""
+
+import json
+from typing import Any
+
+import pytest
+
+from bench_service.cli.commands import run_command_line
+from bench_service.settings import Settings
+from tests.service.answering import Answer, answering
+
+EVIL = "cable [/dev/ttyS0] [red]x[/] :smile:"
+BELOW = "trend of gyro.b_x over 10 results: one point beyond 3σ"
+TOO_FEW = "3 earlier results, 8 are needed to judge it"
+LIMIT = {"minimum": 1.0, "maximum": None, "unit": EVIL}
+STEP = {
+    "name": EVIL,
+    "does": EVIL,
+    "state": "succeeded",
+    "verdict": "fail",
+    "checks": [{"name": EVIL, "passed": False}, {"name": "other", "passed": True}],
+    "warnings": [BELOW, TOO_FEW],
+    "reason": f"why: {EVIL}",
+    "started_at": "2026-01-01T00:00:00Z",
+    "finished_at": "2026-01-01T00:00:00Z",
+}
+RUN = {
+    "id": "r1",
+    "campaign": EVIL,
+    "unit": EVIL,
+    "state": "running",
+    "verdict": None,
+    "steps": [{**STEP, "state": "running", "finished_at": None}],
+    "waiting": f"bench stopped: {EVIL}",
+    "reason": "",
+    "warnings": [EVIL],
+    "created_at": "2026-01-01T00:00:00Z",
+}
+ENDED = {**RUN, "state": "succeeded", "verdict": "fail", "steps": [STEP], "waiting": EVIL, "reason": EVIL}
+JOB = {
+    "id": "j1",
+    "procedure": EVIL,
+    "unit": EVIL,
+    "state": "running",
+    "verdict": None,
+    "progress": {"station": 0, "stations": 1},
+    "page": "/jobs/j1",
+    "result": None,
+    "error": None,
+    "created_at": "2026-01-01T00:00:00Z",
+}
+JOB_ENDED = {**JOB, "state": "succeeded", "verdict": "fail", "result": "x"}
+CHECK = {"name": EVIL, "passed": False, "value": 0.5, "limit": LIMIT}
+RESULT = {"id": "x", "verdict": "fail", "document": {"checks": [CHECK], "warnings": [EVIL]}}
+CAMPAIGN = {"name": EVIL, "shipped": False, "campaign": {"title": EVIL, "steps": [{"name": EVIL}]}}
+SCHEDULE = {
+    "id": "s1",
+    "campaign": EVIL,
+    "unit": EVIL,
+    "cron": "* * * * *",
+    "time_zone": EVIL,
+    "next_at": None,
+    "last_outcome": EVIL,
+}
+
+
+def service(method: str, path: str) -> Answer:
+    known: dict[str, Any] = {
+        "GET /api/v1/jobs": {"items": [JOB]},
+        "POST /api/v1/jobs": JOB,
+        "GET /api/v1/jobs/j1": JOB_ENDED,
+        "GET /api/v1/jobs/j1/result": RESULT,
+        "POST /api/v1/analyses": RESULT,
+        "GET /api/v1/campaigns": {"items": [CAMPAIGN], "next": None},
+        "POST /api/v1/campaigns/good/runs": RUN,
+        "GET /api/v1/campaign-runs": {"items": [RUN, ENDED]},
+        "GET /api/v1/campaign-runs/r1": ENDED,
+        "GET /api/v1/campaign-runs/r1/report": {"run": ENDED},
+        "GET /api/v1/schedules": {"items": [SCHEDULE], "next": None},
+    }
+    return 200, "application/json", json.dumps(known[f"{method} {path.partition('?')[0]}"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "shown", "beside_the_bar"),
+    [
+        (("jobs",), 0, 2, 0),
+        (("run", "no_operation", "--unit", "U"), 1, 2, 2),
+        (("analyse", "noise_analysis"), 1, 2, 0),
+        (("campaign", "list"), 0, 3, 0),
+        (("campaign", "runs"), 0, 6, 0),
+        (("schedule", "list"), 0, 4, 0),
+        (("campaign", "run", "good", "--unit", "U"), 1, 8, 3),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
+)
+def test_texts_with_brackets_are_shown_as_they_are(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    code: int,
+    shown: int,
+    beside_the_bar: int,
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")
+    with answering(service) as address:
+        done = run_command_line(Settings.model_validate({}), [*arguments, "--server", address])
+    out, err = capsys.readouterr()
+    assert done == code, err
+    assert (out.count(EVIL), err.count(EVIL)) == (shown, beside_the_bar)
+
+
+def test_every_warning_of_a_step_is_in_the_table_of_a_run(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "300")
+    with answering(service) as address:
+        assert (
+            run_command_line(
+                Settings.model_validate({}), ["campaign", "run", "good", "--unit", "U", "--server", address]
+            )
+            == 1
+        )
+    out = capsys.readouterr().out
+    told = [line for line in out.splitlines() if BELOW in line or TOO_FEW in line or f"missed: {EVIL}" in line]
+    assert len(told) == 3, out
