@@ -76,6 +76,8 @@ class Problem(BaseModel):
     lost: list[Shown] = Field(default_factory=list[Shown], description="Combinations that a plan cannot determine")
 
 
+MOST_FIELDS = 100
+"""Of a megabyte of wrong fields so many are told."""
 _NO_BODY = FieldError(field="body", message="UTF-8 text of one JSON document is expected")
 _TOO_LONG = FieldError(field="body", message=f"at most {BODY_BYTES} bytes are taken")
 _UNREAD: dict[type, str] = {RecursionError: NOT_SO_DEEP, ValueError: A_NUMBER}
@@ -188,7 +190,7 @@ def _on_parameter_validation(request: Request, error: Exception) -> Response:
 def _invalid(request: Request, errors: Sequence[Any], prefix: str) -> Response:
     fields = [
         FieldError(field=_path(e["loc"], prefix), message=str(e["msg"]), value=_jsonable(e.get("input")))
-        for e in errors
+        for e in errors[:MOST_FIELDS]
         if not _follows(e, errors)
     ]
     detail = "; ".join(f"{f.field}: {f.message}" for f in fields[:5])

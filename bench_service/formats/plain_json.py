@@ -1,4 +1,4 @@
-"""JSON that UTF-8, XML and every database can hold and give back as it was: the one rule, and what breaks it.
+"""JSON that UTF-8 and every database can hold and give back as it was: the one rule, and what breaks it.
 
 `json.loads` takes more than that: NaN and 1e999, half of a surrogate pair (`"\\ud800"`), NUL, a thousand brackets.
 """
@@ -77,14 +77,20 @@ def read_back(stored: str | bytes) -> Any:
     """A stored document. Where a service that did not know the rule let in what it forbids, its escape is given."""
     text = stored if isinstance(stored, str) else stored.decode()
     found = json.loads(text)
-    return _mended(found) if _ESCAPED.search(text) else found
+    return mended(found) if _ESCAPED.search(text) else found
 
 
-def _mended(node: Any) -> Any:
+def mended(node: Any, room: int = 2 * DEPTH) -> Any:
+    """A document with each text as it is shown, and without what lies so deep in it that no answer could hold it.
+
+    `room`: levels; more than the rule's, as what was sent lies in documents of our own.
+    """
     if isinstance(node, str):
         return shown(node)
+    if isinstance(node, _NESTING) and room == 0:
+        return "…"
     if isinstance(node, list):
-        return [_mended(child) for child in node]
+        return [mended(child, room - 1) for child in node]
     if isinstance(node, dict):
-        return {shown(key): _mended(child) for key, child in node.items()}
+        return {shown(key): mended(child, room - 1) for key, child in node.items()}
     return node

@@ -1,4 +1,4 @@
-"""A body holds what UTF-8, XML and every database can hold, and is of a bounded length; nothing else is stored."""
+"""A body holds what UTF-8 and every database can hold, and is of a bounded length; nothing else is stored."""
 
 import json
 from collections.abc import Iterator
@@ -6,8 +6,10 @@ from typing import Any
 
 import httpx
 import pytest
+from fastapi import Request
 
 from bench_service.api.bodies import BODY_BYTES
+from bench_service.api.errors import FieldError, respond
 from bench_service.formats.plain_json import DEPTH
 from bench_service.jobs.audit import record
 from bench_service.jobs.campaigns.campaign import Campaign
@@ -128,6 +130,20 @@ def test_of_many_faults_the_first_are_told(client: Client) -> None:
     assert len(answer.content) < 10_000
 
 
+def test_of_a_megabyte_of_wrong_values_some_are_told(client: Client) -> None:
+    answer = client.preview(orientations=[[0, 361]] * 50_000)
+    assert refused(answer)["errors"][0]["field"] == "parameters.orientations.0.1"
+    assert len(answer.content) < 100_000
+
+
+def test_an_answer_can_be_sent_whatever_it_quotes() -> None:
+    field = FieldError(field="a\ud800", message="\udfff", value="1")
+    request = Request({"type": "http", "path": "/\ud800", "headers": []})
+    problem = json.loads(bytes(respond(request, 422, "\ud800 is none", "Invalid", [field], ["\ud800"]).body))
+    assert (problem["detail"], problem["instance"], problem["lost"]) == ("\\ud800 is none", "/\\ud800", ["\\ud800"])
+    assert (problem["errors"][0]["field"], problem["errors"][0]["message"]) == ("a\\ud800", "\\udfff")
+
+
 @pytest.mark.parametrize(
     ("changes", "field"),
     [
@@ -167,6 +183,7 @@ def test_what_an_older_service_let_in_does_not_close_a_list(client: Client, data
     stores, database = open_stores(database_url)
     unfit = {"a": "\ud800", "b": ["c\x00"]}
     record(stores.audit, "an older service", "submit", "/api/v1/jobs", "500", body=unfit)
+    record(stores.audit, "of brackets", "submit", "/api/v1/jobs", "503", body=json.loads(nested(400)))
     stores.campaigns.add(Campaign.model_validate(named("older", {**IGNORED, "parameters": unfit})), now())
     database.dispose()
     shown = {"a": "\\ud800", "b": ["c\\u0000"]}
@@ -174,6 +191,8 @@ def test_what_an_older_service_let_in_does_not_close_a_list(client: Client, data
     assert campaign["steps"][0]["parameters"] == shown
     (entry,) = client.http.get("/api/v1/audit", params={"who": "an older service"}).json()["items"]
     assert entry["detail"] == {"body": shown}
+    (entry,) = client.http.get("/api/v1/audit", params={"who": "of brackets"}).json()["items"]
+    assert "…" in str(entry["detail"])
     assert_lists_answer(client)
 
 
