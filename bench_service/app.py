@@ -5,7 +5,7 @@ from contextlib import ExitStack, asynccontextmanager
 from functools import partial
 from importlib.metadata import version
 
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
@@ -13,6 +13,7 @@ from bench_service.api import (
     analyses,
     audit,
     benches,
+    bodies,
     campaigns,
     errors,
     event_stream,
@@ -150,6 +151,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         version=version("bench-service"),
         lifespan=lifespan,
         generate_unique_id_function=lambda route: route.name,
+        dependencies=[Depends(bodies.only_plain_json)],
     )
     app.state.service = service
     app.state.hub = EventHub(service.stores.jobs, service.live, event_stream.FRAMES)
@@ -158,6 +160,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         app.include_router(module.router)
     app.include_router(routes.router)
     app.include_router(campaign_pages.router)
+    app.add_middleware(bodies.Bounded)
     errors.install(app)
     metrics.install(app, service)
     app.add_middleware(audit.Audited, trail=service.stores.audit)

@@ -14,7 +14,9 @@ router = APIRouter(prefix="/api/v1", tags=["analyses"])
 
 
 @router.post(
-    "/analyses", status_code=201, responses={**problems(404, 409, 507), **made(201, "result_id", "read_result_by_id")}
+    "/analyses",
+    status_code=201,
+    responses={**problems(404, 409, 413, 507), **made(201, "result_id", "read_result_by_id")},
 )
 def run_method(
     body: AnalysisSubmission, service: Service, response: Response, key: IdempotencyKey = None

@@ -9,15 +9,17 @@ from pydantic import BaseModel, Field
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from bench_service.api.bodies import is_json
 from bench_service.api.dependencies import NO_CONTROL_CHARACTERS, REQUESTED_BY, WHO_LENGTH, After, Limit, Service
 from bench_service.api.errors import FieldError, problems, respond
+from bench_service.formats.plain_json import faults, mended, shown
 from bench_service.jobs.audit import AuditEntry, AuditTrail, record
 from bench_service.jobs.log_context import request_id
 
 router = APIRouter(prefix="/api/v1/audit", tags=["audit"])
 
 READING = ("GET", "HEAD", "OPTIONS")
-BODY_BYTES = 8192
+NOTED_BYTES = 8192
 """A JSON body up to this size is part of the entry; of a longer one, and of files, only the size."""
 
 
@@ -34,7 +36,8 @@ class AuditView(BaseModel):
 
     @classmethod
     def of(cls, entry: AuditEntry) -> "AuditView":
-        return cls(**vars(entry))
+        said = mended(entry.detail)  # of an older service's entry, a thousand brackets would close the whole trail
+        return cls(**{**vars(entry), "detail": said})
 
 
 class AuditPage(BaseModel):
@@ -97,7 +100,7 @@ class Audited:
         if act.noted or route is None or status == 405:
             return
         act.noted = True
-        target = headers.get(b"location", b"").decode() or act.request.url.path
+        target = headers.get(b"location", b"").decode() or shown(act.request.scope["path"])
         await run_in_threadpool(record, self._trail, act.who, route.name, target, str(status), **act.detail())
 
 
@@ -108,7 +111,7 @@ class _Act:
         self.request = request
         self.who = who
         self.noted = False
-        self._is_json = request.headers.get("content-type", "").startswith("application/json")
+        self._is_json = is_json(request.headers.get("content-type"))
         self._body = b""
         self._bytes = 0
 
@@ -116,21 +119,27 @@ class _Act:
         """A piece of the body passes."""
         piece: bytes = message.get("body", b"")
         self._bytes += len(piece)
-        if self._is_json and self._bytes <= BODY_BYTES:
+        if self._is_json and self._bytes <= NOTED_BYTES:
             self._body += piece
 
     def detail(self) -> dict[str, Any]:
-        """What matters of the request; never the contents of files."""
-        found: dict[str, Any] = {"request": request_id(), "path": self.request.url.path}
+        """What matters of the request; never the contents of files, nor what could not be read back."""
+        found: dict[str, Any] = {"request": request_id(), "path": shown(self.request.scope["path"])}
         if self.request.url.query:
             found["query"] = self.request.url.query[:500]
-        if self._is_json and 0 < self._bytes <= BODY_BYTES:
-            try:
-                body = json.loads(self._body, parse_constant=str)
-                json.dumps(body, allow_nan=False)  # what no database takes, 1e999 or a thousand brackets, is left out
-                found["body"] = body
-            except (ValueError, RecursionError):
-                found["bytes"] = self._bytes
+        body = self._document()
+        if body is not None:
+            found["body"] = body
         elif self._bytes:
             found["bytes"] = self._bytes
         return found
+
+    def _document(self) -> Any:
+        """The body where it is JSON that everything can hold, and not too long."""
+        if not (self._is_json and 0 < self._bytes <= NOTED_BYTES):
+            return None
+        try:
+            body = json.loads(self._body)
+        except (ValueError, RecursionError):
+            return None
+        return body if next(faults(body), None) is None else None

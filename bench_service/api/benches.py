@@ -140,7 +140,7 @@ def _view(service: BenchService, bench_id: str) -> BenchView:
     )
 
 
-@router.get("")
+@router.get("", responses=problems())
 def list_benches(service: Service) -> list[BenchView]:
     """Every bench that a worker of this database has registered."""
     return [_view(service, bench_id) for bench_id in service.benches.ids()]
@@ -177,7 +177,7 @@ def read_queue(bench_id: str, service: Service) -> QueueView:
     return QueueView(bench=queue.bench, running=queue.running, driven_by=holder, entries=entries)
 
 
-@router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 507))
+@router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 413, 507))
 def stop(bench_id: str, service: Service, body: StopRequest | None = None) -> Stopping:
     """Software stop: end the running job, stop the table, switch the unit off; until the bench is released.
 

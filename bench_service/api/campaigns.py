@@ -56,7 +56,7 @@ def list_campaigns(service: Service, after: After = None, limit: Limit = 50) -> 
     return CampaignPage(items=[CampaignView.of(campaign) for campaign in page.items], next=page.next)
 
 
-@router.post("/campaigns", status_code=201, responses=problems(404, 409, 507))
+@router.post("/campaigns", status_code=201, responses=problems(404, 409, 413, 507))
 def add_campaign(body: Campaign, service: Service, response: Response, key: IdempotencyKey = None) -> CampaignMade:
     """Store a campaign. Every step is looked at first: what can never work is refused, what may not is warned of."""
     campaign = service.campaigns.add(body, key)
@@ -70,7 +70,7 @@ def read_campaign(name: CampaignName, service: Service) -> CampaignView:
     return CampaignView.of(service.campaigns.campaign(name))
 
 
-@router.put("/campaigns/{name}", responses=problems(404, 409, 507))
+@router.put("/campaigns/{name}", responses=problems(404, 409, 413, 507))
 def replace_campaign(name: CampaignName, body: Campaign, service: Service) -> CampaignMade:
     """Change a campaign; runs that were asked for before keep the one that they have."""
     if body.name != name:
@@ -79,7 +79,7 @@ def replace_campaign(name: CampaignName, body: Campaign, service: Service) -> Ca
     return CampaignMade.of(campaign, service.campaigns.examine(campaign))
 
 
-@router.post("/campaigns/{name}/preview", responses=problems(404))
+@router.post("/campaigns/{name}/preview", responses=problems(404, 413))
 def preview_campaign(name: CampaignName, body: CampaignOn, service: Service) -> CampaignPreview:
     """What the campaign would do on a unit: steps left out, times, limits out of reach. Nothing moves."""
     campaign = service.campaigns.campaign(name)
@@ -97,7 +97,7 @@ def preview_campaign(name: CampaignName, body: CampaignOn, service: Service) -> 
 @router.post(
     "/campaigns/{name}/runs",
     status_code=202,
-    responses={**problems(404, 409, 507), **made(202, "run_id", *OF_A_RUN)},
+    responses={**problems(404, 409, 413, 507), **made(202, "run_id", *OF_A_RUN)},
 )
 def start_campaign(
     name: CampaignName, body: RunSubmission, service: Service, response: Response, key: IdempotencyKey = None

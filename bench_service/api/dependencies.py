@@ -19,18 +19,19 @@ async def _hub(request: Request) -> EventHub:
 
 Hub = Annotated[EventHub, Depends(_hub)]
 Service = Annotated[BenchService, Depends(_service)]
+NO_CONTROL_CHARACTERS = re.compile(r"^[^\x00-\x1f\x7f]+$")
 IdempotencyKey = Annotated[
     str | None,
     Header(
         alias="Idempotency-Key",
         min_length=1,
         max_length=200,
+        pattern=NO_CONTROL_CHARACTERS.pattern,
         description="A create that is repeated with the same key and body gives what the first one made",
     ),
 ]
 REQUESTED_BY = "X-Requested-By"
 WHO_LENGTH = 200
-NO_CONTROL_CHARACTERS = re.compile(r"^[^\x00-\x1f\x7f]+$")
 RequestedBy = Annotated[
     str | None,
     Header(

@@ -1,18 +1,19 @@
 """One table from errors to status codes, and problem+json (RFC 9457) for all of them."""
 
-import math
 from asyncio import CancelledError
 from collections.abc import Sequence
 from http import HTTPStatus
-from typing import Any
+from typing import Annotated, Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from bench_service.api.bodies import BODY_BYTES
+from bench_service.formats.plain_json import A_NUMBER, NOT_SO_DEEP, is_finite, shown
 from bench_service.jobs.errors import (
     AlreadyReserved,
     BenchBusy,
@@ -51,11 +52,15 @@ STATUS: dict[type[Exception], int] = {
 """An error's status is that of its nearest ancestor here."""
 
 
+Shown = Annotated[str, BeforeValidator(shown)]
+"""Whatever a message quotes, it can be sent."""
+
+
 class FieldError(BaseModel):
     """One field that is not as it must be."""
 
-    field: str = Field(description="Path of the field, for example parameters.dwell_s")
-    message: str = Field(description="What is wrong, with the allowed range")
+    field: Shown = Field(description="Path of the field, for example parameters.dwell_s")
+    message: Shown = Field(description="What is wrong, with the allowed range")
     value: Any = Field(default=None, description="What was given; text where JSON has no such number")
 
 
@@ -65,13 +70,18 @@ class Problem(BaseModel):
     type: str = Field("about:blank", description="Kind of error, a relative reference")
     title: str
     status: int
-    detail: str
-    instance: str = ""
+    detail: Shown
+    instance: Shown = ""
     errors: list[FieldError] = Field(default_factory=list[FieldError])
-    lost: list[str] = Field(default_factory=list[str], description="Combinations that a plan cannot determine")
+    lost: list[Shown] = Field(default_factory=list[Shown], description="Combinations that a plan cannot determine")
 
 
+MOST_FIELDS = 100
+"""Of a megabyte of wrong fields so many are told."""
 _NO_BODY = FieldError(field="body", message="UTF-8 text of one JSON document is expected")
+_TOO_LONG = FieldError(field="body", message=f"at most {BODY_BYTES} bytes are taken")
+_UNREAD: dict[type, str] = {RecursionError: NOT_SO_DEEP, ValueError: A_NUMBER}
+"""What is allowed instead where `json.loads` itself gave up, at a thousand brackets or at an integer of 4300 digits."""
 
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
@@ -180,7 +190,7 @@ def _on_parameter_validation(request: Request, error: Exception) -> Response:
 def _invalid(request: Request, errors: Sequence[Any], prefix: str) -> Response:
     fields = [
         FieldError(field=_path(e["loc"], prefix), message=str(e["msg"]), value=_jsonable(e.get("input")))
-        for e in errors
+        for e in errors[:MOST_FIELDS]
         if not _follows(e, errors)
     ]
     detail = "; ".join(f"{f.field}: {f.message}" for f in fields[:5])
@@ -197,9 +207,12 @@ def _follows(error: Any, errors: Sequence[Any]) -> bool:
 
 def _on_http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    kind = HTTPStatus(error.status_code).phrase.replace(" ", "")
-    fields = [_NO_BODY] if error.status_code == 400 else []
-    response = respond(request, error.status_code, str(error.detail), kind, fields)
+    status = error.status_code
+    if status == 400 and (allowed := _UNREAD.get(type(error.__cause__))) is not None:
+        return respond(request, 422, f"body: {allowed}", "Invalid", [FieldError(field="body", message=allowed)])
+    kind = HTTPStatus(status).phrase.replace(" ", "")
+    fields = {400: [_NO_BODY], 413: [_TOO_LONG]}.get(status, [])
+    response = respond(request, status, str(error.detail), kind, fields)
     response.headers.update(error.headers or {})
     return response
 
@@ -217,7 +230,7 @@ def respond(
         title=HTTPStatus(status).phrase,
         status=status,
         detail=detail,
-        instance=request.url.path,
+        instance=request.scope["path"],
         errors=list(errors),
         lost=list(lost),
     )
@@ -232,9 +245,7 @@ def _path(location: Sequence[str | int], prefix: str) -> str:
 
 def _jsonable(value: Any) -> Any:
     """The offending value where JSON can say it, else its text, cut to a readable length."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return repr(value)
-    if value is None or isinstance(value, bool | int | float):
+    if value is None or isinstance(value, bool) or (isinstance(value, int | float) and is_finite(value)):
         return value
-    text = value if isinstance(value, str) else repr(value)
+    text = shown(value if isinstance(value, str) else repr(value))
     return text if len(text) <= 200 else text[:200] + "…"

@@ -17,7 +17,7 @@ class Health(BaseModel):
     notes: list[str] = Field(default_factory=list[str], description="What a person should know: a stopped bench")
 
 
-@router.get("/healthz")
+@router.get("/healthz", responses=problems())
 async def healthz(service: Service) -> Health:
     """The process answers, whatever its threads are busy with."""
     return Health(code_version=service.code_version)

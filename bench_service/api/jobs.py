@@ -40,7 +40,7 @@ OF_A_JOB = (
     "",
     status_code=202,
     responses={
-        **problems(404, 409, 507),
+        **problems(404, 409, 413, 507),
         **made(
             202,
             "job_id",
@@ -111,32 +111,32 @@ def read_job(job_id: str, service: Service) -> JobView:
     return _view(service, service.stores.jobs.get(job_id))
 
 
-@router.patch("/{job_id}", responses=problems(404, 409, 507))
+@router.patch("/{job_id}", responses=problems(404, 409, 413, 507))
 def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
     """Change the priority of a queued job, and with it its place in the queue."""
     return _view(service, service.set_priority(job_id, body.priority))
 
 
-@router.post("/{job_id}/cancel", status_code=202, responses=problems(404, 409))
+@router.post("/{job_id}/cancel", status_code=202, responses=problems(404, 409, 507))
 def cancel(job_id: str, service: Service) -> JobView:
     """End a job: a queued one at once, a running one as soon as its bench is safe. Its recordings are kept."""
     return _view(service, service.cancel(job_id))
 
 
-@router.post("/{job_id}/pause", status_code=202, responses=problems(404, 409))
+@router.post("/{job_id}/pause", status_code=202, responses=problems(404, 409, 507))
 def pause(job_id: str, service: Service) -> JobView:
     """Put a job aside: a queued one at once, a running one before its next station. The bench is then safe and free."""
     return _view(service, service.pause(job_id))
 
 
-@router.post("/{job_id}/answer", status_code=202, responses=problems(404, 409))
+@router.post("/{job_id}/answer", status_code=202, responses=problems(404, 409, 413, 507))
 def answer(job_id: str, body: PromptAnswer, service: Service, requested_by: RequestedBy = None) -> JobView:
     """Say that what the job asks of the person at the bench (`prompt`) is done, or refuse it."""
     said = Answer(body.done, body.remark, requested_by or "")
     return _view(service, service.stores.prompts.answer(job_id, said, now()))
 
 
-@router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409))
+@router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409, 507))
 def resume(job_id: str, service: Service) -> JobView:
     """Queue a paused, interrupted or resumable failed job again; it goes on with the stations that remain."""
     return _view(service, service.resume(job_id))
@@ -186,7 +186,7 @@ def read_truth(job_id: str, service: Service) -> Truth:
     return Truth(job=job_id, triads=list(service.truth(job_id)))
 
 
-@router.post("/{job_id}/analyses", status_code=201, responses=problems(404, 409, 507))
+@router.post("/{job_id}/analyses", status_code=201, responses=problems(404, 409, 413, 507))
 def analyse_again(
     job_id: str, body: Reanalysis, service: Service, response: Response, key: IdempotencyKey = None
 ) -> ResultView:

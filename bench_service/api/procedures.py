@@ -21,7 +21,7 @@ def _view(entry: Procedure[Parameters, Outcome] | Method[Parameters, Outcome]) -
     )
 
 
-@router.get("/procedures")
+@router.get("/procedures", responses=problems())
 def list_procedures(service: Service) -> list[ProcedureView]:
     """Every procedure, with the JSON Schemas of its parameters and its result."""
     return [_view(procedure) for procedure in service.planner.catalog.values()]
@@ -33,7 +33,7 @@ def read_procedure(name: str, service: Service) -> ProcedureView:
     return _view(service.planner.procedure(name))
 
 
-@router.post("/procedures/{name}/preview", responses=problems(404))
+@router.post("/procedures/{name}/preview", responses=problems(404, 413))
 def preview(name: str, request: PreviewRequest, service: Service) -> Preview:
     """Stations, duration, predicted uncertainties and warnings of a plan; axis limits that it passes as violations."""
     plan = service.planner.plan(name, request.unit, request.parameters, request.bench)
@@ -52,7 +52,7 @@ def preview(name: str, request: PreviewRequest, service: Service) -> Preview:
     )
 
 
-@router.get("/methods", tags=["analyses"])
+@router.get("/methods", tags=["analyses"], responses=problems())
 def list_methods(service: Service) -> list[ProcedureView]:
     """Every method that can be run on recordings or calibrations, with its JSON Schemas."""
     return [_view(method) for method in service.analyses.methods.values()]

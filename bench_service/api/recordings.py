@@ -7,12 +7,14 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import StreamingResponse
 from pydantic import ValidationError
 
+from bench_service.api.bodies import refuse_unfit
 from bench_service.api.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.errors import made, problems
 from bench_service.api.schemas import RecordingPage, RecordingView
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.export import ExportFormat, export, extract
 from bench_service.formats.import_file import ImportFile
+from bench_service.formats.plain_json import shown
 from procedures.core.errors import BadParameter
 
 router = APIRouter(prefix="/api/v1/recordings", tags=["recordings"])
@@ -88,11 +90,12 @@ def import_recording(
         raise RequestValidationError(
             [{**e, "loc": ("description", *e["loc"])} for e in error.errors(include_url=False, include_context=False)]
         ) from error
+    refuse_unfit(wanted.model_dump(mode="json"), "description")
     limit: int = request.app.state.max_import_bytes
     size = sum(file.size or 0 for file in files)
     if size > limit:
         raise BadParameter("files", f"{size} bytes", f"at most {limit} bytes (BENCH_MAX_IMPORT_MB)")
-    parts = [ImportFile(file.filename or f"file {number}", file.file) for number, file in enumerate(files)]
+    parts = [ImportFile(shown(file.filename or f"file {number}"), file.file) for number, file in enumerate(files)]
     info = service.analyses.import_recording(parts, wanted, key)
     response.headers["Location"] = f"/api/v1/recordings/{info.id}"
     return RecordingView.of(service.stores.recordings.get(info.id))

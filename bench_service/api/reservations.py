@@ -73,7 +73,7 @@ class ReservationPage(BaseModel):
 @router.post(
     "",
     status_code=201,
-    responses={**problems(404, 409, 507), **made(201, "reservation_id", "read_reservation", "end_reservation")},
+    responses={**problems(404, 409, 413, 507), **made(201, "reservation_id", "read_reservation", "end_reservation")},
 )
 def reserve(
     body: ReservationSubmission, service: Service, response: Response, key: IdempotencyKey = None

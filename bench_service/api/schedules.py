@@ -56,7 +56,9 @@ def list_schedules(service: Service, after: After = None, limit: Limit = 50) -> 
     return SchedulePage(items=[ScheduleView.of(schedule) for schedule in page.items], next=page.next)
 
 
-@router.post("", status_code=201, responses={**problems(404, 409, 507), **made(201, "schedule_id", *OF_A_SCHEDULE)})
+@router.post(
+    "", status_code=201, responses={**problems(404, 409, 413, 507), **made(201, "schedule_id", *OF_A_SCHEDULE)}
+)
 def add_schedule(
     body: ScheduleSubmission, service: Service, response: Response, key: IdempotencyKey = None
 ) -> ScheduleView:
@@ -73,7 +75,7 @@ def read_schedule(schedule_id: str, service: Service) -> ScheduleView:
     return ScheduleView.of(service.campaigns.schedules.get(schedule_id))
 
 
-@router.patch("/{schedule_id}", responses=problems(404, 507))
+@router.patch("/{schedule_id}", responses=problems(404, 413, 507))
 def change_schedule(schedule_id: str, body: ScheduleChange, service: Service) -> ScheduleView:
     """Switch a schedule off or on; starts that pass while it is off are not made up."""
     return ScheduleView.of(service.campaigns.schedules.enable(schedule_id, body.enabled))

@@ -18,7 +18,7 @@ router = APIRouter(prefix="/api/v1/units", tags=["units"])
 Serial = Annotated[str, Path(pattern=SERIAL)]
 
 
-@router.get("")
+@router.get("", responses=problems())
 def list_units(service: Service) -> list[UnitView]:
     """Every unit that is known."""
     return [UnitView.of(unit) for unit in service.stores.units.units()]
@@ -30,7 +30,7 @@ def read_unit(serial: str, service: Service) -> UnitView:
     return UnitView.of(service.stores.units.unit(serial))
 
 
-@router.put("/{serial}", responses=problems(507))
+@router.put("/{serial}", responses=problems(413, 507))
 def declare_unit(serial: Serial, body: UnitDeclaration, service: Service) -> UnitView:
     """Declare a unit or change what is declared. Its recordings, results and calibrations stay."""
     service.stores.units.put_unit(

@@ -1,1 +1,4 @@
-"""Recordings as bytes: chunks at rest, files going out, files coming in. Knows no SQL, no HTTP and no jobs."""
+"""Recordings as bytes: chunks at rest, files going out, files coming in; and JSON that everything can hold.
+
+Knows no SQL, no HTTP and no jobs.
+"""

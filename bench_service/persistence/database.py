@@ -21,6 +21,7 @@ from sqlalchemy.orm import Session
 from sqlalchemy.pool import QueuePool
 
 from bench_service import wall_clock
+from bench_service.formats.plain_json import read_back
 from bench_service.jobs.errors import StorageFailure, StorageFull
 
 BUSY_S = 30.0
@@ -31,6 +32,10 @@ LEAVE_S = 1.0
 _NEWS = "news"
 _SQLITE_FULL = frozenset({sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_SHMSIZE})
 _POSTGRES_FULL = frozenset({"53100"})
+_JSON: dict[str, Any] = {
+    "json_serializer": partial(json.dumps, allow_nan=False),
+    "json_deserializer": read_back,
+}
 
 
 class Conflict(StorageFailure):
@@ -116,7 +121,7 @@ def connect(database_url: str) -> Database:
                 pool_pre_ping=True,
                 pool_size=8,
                 connect_args={"connect_timeout": 10},
-                json_serializer=partial(json.dumps, allow_nan=False),
+                **_JSON,
             )
         )
 
@@ -134,9 +139,7 @@ def _sqlite_engine(database_url: str, file: str | None) -> Engine:
         Path(file).parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StorageFailure(f"the folder of {file} cannot be made: {error.strerror}") from error
-    engine = create_engine(
-        database_url, connect_args={"timeout": BUSY_S}, json_serializer=partial(json.dumps, allow_nan=False)
-    )
+    engine = create_engine(database_url, connect_args={"timeout": BUSY_S}, **_JSON)
     event.listen(engine, "connect", _prepare_sqlite)
     event.listen(engine, "begin", _begin_sqlite)
     _switch_to_wal(engine)

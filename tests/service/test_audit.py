@@ -54,7 +54,7 @@ def test_a_bench_stop_is_in_the_trail_and_so_is_a_body_that_was_refused(client: 
     assert [(e["action"], e["outcome"]) for e in found] == [
         ("stop", "202"),
         ("release", "200"),
-        ("submit", "400"),
+        ("submit", "422"),
         ("submit", "422"),
     ]
     assert found[0]["detail"]["body"] == {"reason": "smoke"}

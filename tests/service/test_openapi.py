@@ -4,7 +4,7 @@ import re
 import socket
 import subprocess
 import sys
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -75,13 +75,37 @@ def test_every_good_answer_with_json_is_modelled(document: dict[str, Any]) -> No
                 assert "$ref" in schema or "$ref" in schema.get("items", {}), where
 
 
-def test_every_path_parameter_answers_for_an_id_that_is_none(document: dict[str, Any]) -> None:
-    without = [
+def without(document: dict[str, Any], status: str, may_give_it: Callable[[str, dict[str, Any]], bool]) -> list[str]:
+    """The operations that may give a status and do not say so."""
+    return [
         where
         for where, operation in operations(document)
-        if "{" in where and "404" not in operation["responses"] and not where.startswith("PUT")
+        if may_give_it(where, operation) and status not in operation["responses"]
     ]
-    assert without == []
+
+
+def test_every_path_parameter_answers_for_an_id_that_is_none(document: dict[str, Any]) -> None:
+    assert without(document, "404", lambda where, _: "{" in where and not where.startswith("PUT")) == []
+
+
+@pytest.mark.parametrize("status", ["400", "422", "503"])
+def test_every_operation_says_that_an_address_may_be_refused_and_the_database_fail(
+    document: dict[str, Any], status: str
+) -> None:
+    assert without(document, status, lambda *_: True) == []
+
+
+def test_every_operation_that_writes_says_that_the_disk_may_be_full(document: dict[str, Any]) -> None:
+    assert without(document, "507", lambda where, _: not where.startswith("GET") and "preview" not in where) == []
+
+
+def test_every_operation_that_takes_a_document_says_that_it_may_be_too_long(document: dict[str, Any]) -> None:
+    def takes_a_document(_where: str, operation: dict[str, Any]) -> bool:
+        return "application/json" in operation.get("requestBody", {}).get("content", {})
+
+    assert without(document, "413", takes_a_document) == []
+    says_so = [where for where, operation in operations(document) if "413" in operation["responses"]]
+    assert len(says_so) == sum(takes_a_document(where, operation) for where, operation in operations(document))
 
 
 def references(node: Any) -> Iterator[str]:

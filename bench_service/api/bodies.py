@@ -1,0 +1,86 @@
+"""What a body may be, for every route: of a bounded length, and JSON that everything can hold."""
+
+from email.message import Message as Header
+from itertools import islice
+
+from fastapi import Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.params import Form
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from bench_service.formats.plain_json import faults
+
+BODY_BYTES = 1_000_000
+"""Largest body of a route that takes no files; one that does bounds them itself, and they go to disk as they come."""
+TOLD = 20
+"""So many faults of a body are told at most."""
+
+
+def is_json(content_type: str | None) -> bool:
+    """Whether a body of this type is read as JSON: as FastAPI decides it."""
+    header = Header()
+    header["content-type"] = content_type or ""
+    kind = header.get_content_subtype()
+    return header.get_content_maintype() == "application" and (kind == "json" or kind.endswith("+json"))
+
+
+async def only_plain_json(request: Request) -> None:
+    """Dependency of every route: refuses a JSON body that not everything can hold, by field, before it is used.
+
+    Raises `RequestValidationError`.
+    """
+    if _takes_json(request.scope) and is_json(request.headers.get("content-type")) and await request.body():
+        await run_in_threadpool(refuse_unfit, await request.json(), "body")  # a megabyte of zeros takes 0.3 s
+
+
+def refuse_unfit(document: object, place: str) -> None:
+    """Raises `RequestValidationError` with what in a document, sent as `place`, not everything can hold."""
+    found = list(islice(faults(document), TOLD))
+    if found:
+        raise RequestValidationError(
+            [{"type": "unfit", "loc": (place, *f.path), "msg": f.allowed, "input": f.value} for f in found]
+        )
+
+
+class Bounded:
+    """Pure ASGI: a body that is too long is refused before it is read, or as soon as it has come so far."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        came = 0
+
+        async def receive_so_much() -> Message:
+            nonlocal came
+            if not _takes_json(scope):  # asked here: before the body is read, no route is found yet
+                return await receive()
+            _refuse_longer(_declared_bytes(scope))
+            message = await receive()
+            came += len(message.get("body", b""))
+            _refuse_longer(came)
+            return message
+
+        await self._app(scope, receive_so_much, send)
+
+
+def _takes_json(scope: Scope) -> bool:
+    """Whether the route has a body, and one that is no form."""
+    field = getattr(scope.get("route"), "body_field", None)
+    return field is not None and not isinstance(field.field_info, Form)
+
+
+def _declared_bytes(scope: Scope) -> int:
+    declared = Headers(scope=scope).get("content-length", "")
+    return int(declared) if declared.isdecimal() else 0
+
+
+def _refuse_longer(size: int) -> None:
+    if size > BODY_BYTES:  # of FastAPI's reading of a body, this kind of error alone comes out as it is
+        raise HTTPException(413, f"the body has {size} bytes or more: at most {BODY_BYTES} bytes are taken")
