@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from bench_service.cli.commands import run_command_line
+from bench_service.cli.options import console, errors
 from bench_service.settings import Settings
 from tests.service.answering import Answer, answering
 
@@ -81,6 +82,13 @@ def service(method: str, path: str) -> Answer:
     return 200, "application/json", json.dumps(known[f"{method} {path.partition('?')[0]}"])
 
 
+@pytest.fixture(autouse=True)
+def _a_wide_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the width was when the consoles were made: then rich asks its environment."""
+    for each in (console, errors):
+        monkeypatch.setattr(each, "_width", 400)
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "shown", "beside_the_bar"),
     [
@@ -96,13 +104,11 @@ def service(method: str, path: str) -> Answer:
 )
 def test_texts_with_brackets_are_shown_as_they_are(
     capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
     arguments: tuple[str, ...],
     code: int,
     shown: int,
     beside_the_bar: int,
 ) -> None:
-    monkeypatch.setenv("COLUMNS", "400")
     with answering(service) as address:
         done = run_command_line(Settings.model_validate({}), [*arguments, "--server", address])
     out, err = capsys.readouterr()
@@ -111,9 +117,8 @@ def test_texts_with_brackets_are_shown_as_they_are(
 
 
 def test_every_warning_of_a_step_is_in_the_table_of_a_run(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setenv("COLUMNS", "300")
     with answering(service) as address:
         assert (
             run_command_line(

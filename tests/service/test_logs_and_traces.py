@@ -139,7 +139,7 @@ def test_lines_about_a_campaigns_jobs_name_its_run_and_those_about_other_jobs_no
         assert any(message.endswith("queued") for message in messages), "said by the conductor"
         assert any(message.startswith("ended as") for message in messages), "said by the worker"
         queued = next(line for line in about if line["message"].endswith("queued"))
-        assert queued["step"] == step["name"]
+        assert queued["campaign_step"] == step["name"]
     assert all("campaign" not in line for line in lines if line.get("job") == alone["id"])
 
 
