@@ -189,6 +189,20 @@ def storage_errors() -> Generator[None, None, None]:
         raise StorageFailure(f"a value cannot be stored, or not be read again: {error}") from error
 
 
+def in_our_words(error: Exception) -> Exception:
+    """An error of a database or its driver that others met, as `StorageFull`, `Conflict` or `StorageFailure`; any other
+    error as it is."""
+    if not isinstance(error, (SQLAlchemyError, sqlite3.Error)):
+        return error
+    try:
+        with storage_errors():
+            raise error
+    except StorageFull as full:
+        return full
+    except StorageFailure as failure:
+        return failure
+
+
 def is_full(error: BaseException | None) -> bool:
     """Whether a driver's error says that there is no room left."""
     if isinstance(error, sqlite3.Error):
