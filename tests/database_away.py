@@ -4,7 +4,7 @@ import os
 import signal
 import socket
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Lock, Thread
@@ -79,7 +79,7 @@ def _close(end: socket.socket) -> None:
 
 
 @contextmanager
-def hung(data: Path) -> Iterator[None]:
+def hung(data: Path) -> Generator[None]:
     """All processes of the Postgres that has its data in a folder are stopped, and go on at the end."""
     postmaster = int((data / "postmaster.pid").read_text().splitlines()[0])
     os.kill(postmaster, signal.SIGSTOP)  # first: it makes no more children

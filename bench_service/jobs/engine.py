@@ -139,10 +139,10 @@ class Engine:
 
         Its `DBOSClient` has a setting for this; for an application only the field behind it can be set.
         """
-        books = self._dbos._sys_db
+        books = self._dbos._sys_db  # pyright: ignore[reportPrivateUsage]
         if not hasattr(books, "_retry_connection_errors"):
             raise RuntimeError("this DBOS cannot be told not to wait for its database: see Engine.launch")
-        books._retry_connection_errors = False
+        books._retry_connection_errors = False  # pyright: ignore[reportPrivateUsage]
 
     def _run_job(self, job_id: str, attempt: int) -> None:
         runner = self._runner

@@ -12,6 +12,7 @@ from bench_service.jobs.job import Job
 from bench_service.jobs.live import PUBLISH_S
 from bench_service.jobs.live_tap import LiveTap
 from bench_service.jobs.observed import ObservedBench
+from bench_service.jobs.question import Question
 from bench_service.jobs.store import RecordingStore
 from bench_service.jobs.stored import NewRecording
 from bench_service.jobs.watchdog import Patience, Watchdog
@@ -31,6 +32,8 @@ UNWIND_S = 2.0
 """How long a procedure may take to leave a verb that was cancelled [s, real time]."""
 STOP_CHECK_S = 0.2
 """How long a move, a settle or a recording may go on before a stop that was asked for is seen [s, real time]."""
+ANSWER_S = 0.1
+"""How long a look waits for the answer whether a stop was asked for; a later one is seen by a later look [s]."""
 
 
 class ShuttingDown(BaseException):
@@ -57,7 +60,7 @@ class BenchSession:
         self._watchdog = Watchdog(bench.clock, bench.description.simulated, PATIENCE)
         self._bench = ObservedBench(bench, self._watchdog)
         self._recordings = recordings
-        self._stop_wanted = stop_wanted
+        self._stop_wanted = Question("stop", stop_wanted)
         self._streams: AsyncIterator[Stream] | None = None
         self._next = -1
         self._shutting_down = threading.Event()
@@ -129,7 +132,7 @@ class BenchSession:
             if stoppable and self._shutting_down.is_set():
                 self._cancel(future, "the service ended while a device did not answer")
                 raise ShuttingDown
-            if stoppable and self._stop_wanted():
+            if stoppable and self._stop_wanted.ask(ANSWER_S):
                 self._cancel(future, "a stop came while a device did not answer")
                 raise Stopped("stopped by an operator")
 

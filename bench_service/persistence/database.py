@@ -27,6 +27,15 @@ BUSY_S = 30.0
 """How long a writer waits for another one."""
 LEAVE_S = 1.0
 """How long the end waits for connections that are in use [s]."""
+TCP = {
+    "connect_timeout": 10,
+    "keepalives_idle": 5,
+    "keepalives_interval": 2,
+    "keepalives_count": 3,
+    "tcp_user_timeout": 10_000,
+}
+"""A server that cannot be reached any more is given up after ten seconds [s, user timeout in ms]; over a Unix socket
+nothing of it applies. One that is reached and hangs is waited for: who must not wait asks in a thread of its own."""
 
 _NEWS = "news"
 _SQLITE_FULL = frozenset({sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_SHMSIZE})
@@ -115,7 +124,7 @@ def connect(database_url: str) -> Database:
                 url,
                 pool_pre_ping=True,
                 pool_size=8,
-                connect_args={"connect_timeout": 10},
+                connect_args=TCP,
                 json_serializer=partial(json.dumps, allow_nan=False),
             )
         )
