@@ -9,18 +9,21 @@ from typing import Any
 
 import pytest
 
+from bench_service.cli.client import connect
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.jobs import session
 from bench_service.jobs.processes import Driving
 from bench_service.jobs.runner import StepOutcome
-from bench_service.jobs.session import ShuttingDown
+from bench_service.jobs.session import BenchSession, ShuttingDown
 from bench_service.jobs.supervisor import Supervisor
 from bench_service.persistence import acquire_lease, open_stores
 from bench_service.persistence.safety_books import SqlSafetyBooks
+from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from procedures.bench import Bench
 from tests.chaos.databases import OwnPostgres, database
 from tests.database_away import hung
+from tests.service.client import Client
 from tests.service.test_runner import prepared
 from tests.service.test_safety import abandoned
 from tests.service.test_supervisor import GONE, Watch, identity, state, worker
@@ -109,3 +112,33 @@ def test_a_worker_sees_its_devices_and_its_own_end(
         go_on.set()
     runner.end_early(job.id, StepOutcome(cancelled=True))
     opened.dispose()
+
+
+def test_a_living_worker_gives_the_station_up_and_the_job_goes_on_after(
+    postgres: OwnPostgres, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where the thread that drives the bench is the one that waits, because it stores samples."""
+    monkeypatch.setattr(session, "HANGS_S", 1.0)
+    record, begun = BenchSession.record, Event()
+
+    def recorded(driving: BenchSession, index: int) -> Any:
+        if index == 1:
+            begun.set()
+        return record(driving, index)
+
+    monkeypatch.setattr(BenchSession, "record", recorded)
+    settings = Settings(database_url=postgres.url, device_folder=tmp_path, real_time_factor=200.0)
+    with connect(settings, None, drive=True) as http:
+        client = Client(http)
+        job = client.submit(seed=1, parameters={"dwell_s": 200.0, "settle_s": 0.5})
+        assert begun.wait(30)
+        pause(0.2)
+        with hung(postgres.data):
+            assert not state(tmp_path).safe
+            begun_s = monotonic_s()
+            while not state(tmp_path).safe:
+                assert monotonic_s() - begun_s < 7.0, "the worker waits for the database"
+                pause(0.02)
+        ended = client.wait(job["id"])
+        assert (ended["state"], ended["attempt"]) == ("succeeded", 2), ended["error"]
+        assert "the database has not answered for 1 s" in http.get(f"/api/v1/jobs/{job['id']}/events").text
