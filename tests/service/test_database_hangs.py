@@ -14,6 +14,7 @@ from bench_service.drivers.registered import RegisteredDevices
 from bench_service.jobs import session
 from bench_service.jobs.processes import Driving
 from bench_service.jobs.runner import StepOutcome
+from bench_service.jobs.service import BenchService
 from bench_service.jobs.session import BenchSession, ShuttingDown
 from bench_service.jobs.supervisor import Supervisor
 from bench_service.persistence import acquire_lease, open_stores
@@ -88,6 +89,14 @@ def test_a_worker_sees_its_devices_and_its_own_end(
     def change(bench: Bench) -> None:
         bench.turntable._table.move_to = move
 
+    services: list[BenchService] = []
+    begin = BenchService.begin
+
+    def begun(service: BenchService) -> None:
+        services.append(service)
+        begin(service)
+
+    monkeypatch.setattr(BenchService, "begin", begun)
     stores, opened = open_stores(postgres.url)
     driver = FailingDriver(tmp_path, change)
     runner, job = prepared(stores, driver, lambda: True)
@@ -111,6 +120,7 @@ def test_a_worker_sees_its_devices_and_its_own_end(
                 pause(0.02)
         go_on.set()
     runner.end_early(job.id, StepOutcome(cancelled=True))
+    services[0].stop()
     opened.dispose()
 
 
