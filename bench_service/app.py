@@ -49,6 +49,7 @@ from bench_service.jobs.tracing import traces_to
 from bench_service.jobs.worker import Worker
 from bench_service.pages import campaign_pages, figures, routes
 from bench_service.persistence import BenchLease, acquire_lease, engine_database, lease_holder, open_stores
+from bench_service.persistence.database import in_our_words
 from bench_service.persistence.host_files import HostFiles
 from bench_service.settings import Settings
 
@@ -125,7 +126,7 @@ def _engine(settings: Settings, runner: JobRunner) -> JobEngine:
     from bench_service.jobs.engine import Engine
 
     books = engine_database(settings.database_url, settings.bench_id)
-    return Engine(*books, settings.bench_id, runner)
+    return Engine(*books, settings.bench_id, runner, in_our_words)
 
 
 def _dispatcher(

@@ -71,7 +71,10 @@ class Engine:
         connection: dict[str, Any],
         bench_id: str,
         runner: JobRunner,
+        understood: Callable[[Exception], Exception],
     ) -> None:
+        """`understood`: an error of the engine's own books in our words, any other error as it is."""
+        self._understood = understood
         self._version = f"{bench_id}:{PROCEDURE_ABI}"
         self._runner = runner
         self._last = StepOutcome()
@@ -89,7 +92,7 @@ class Engine:
             "max_executor_threads": 8,
             "notification_listener_polling_interval_sec": 1.0,
         }
-        DBOS(config=config)
+        self._dbos = DBOS(config=config)
 
         @DBOS.workflow(name="run_job", max_recovery_attempts=MAX_RECOVERIES)
         def run_job(job_id: str, attempt: int) -> None:
@@ -102,6 +105,7 @@ class Engine:
         """Start working; jobs that a dead process left go on. The bench's lease must be held."""
         DBOS.listen_queues([])
         DBOS.launch()
+        self._never_wait_for_the_database()
 
     def run(self, job: Job) -> None:
         """Run a claimed job to its end. Raises `ShuttingDown`, or what kept its workflow from being written."""
@@ -130,6 +134,16 @@ class Engine:
             self._one_at_a_time.release()
         DBOS.destroy(destroy_registry=True)
 
+    def _never_wait_for_the_database(self) -> None:
+        """While the database is away DBOS would block a step until it is back, and the bench would stay as it is.
+
+        Its `DBOSClient` has a setting for this; for an application only the field behind it can be set.
+        """
+        books = self._dbos._sys_db  # pyright: ignore[reportPrivateUsage]
+        if not hasattr(books, "_retry_connection_errors"):
+            raise RuntimeError("this DBOS cannot be told not to wait for its database: see Engine.launch")
+        books._retry_connection_errors = False  # pyright: ignore[reportPrivateUsage]
+
     def _run_job(self, job_id: str, attempt: int) -> None:
         runner = self._runner
         if self._ending.is_set():
@@ -140,21 +154,16 @@ class Engine:
             if count < 0:
                 return
             outcome = self._stations(job_id, count)
-            if count > 0:
-                safe = self._checked("safe", lambda: runner.make_safe(job_id))
-                outcome = outcome if not outcome.good else safe
+            if outcome.good and count > 0:
+                outcome = self._checked("safe", lambda: runner.make_safe(job_id))
             if outcome.good:  # no step of its own: it may be repeated, and its end is in our own books
                 outcome = runner.conclude(job_id)
         except ShuttingDown:
             self._make_safe(job_id)
             raise
-        except Exception as error:  # a defect, or books that cannot be kept: the job must still end, and the bench safe
-            log.exception("job %s failed inside the service", job_id)
+        except Exception as error:  # the job must still end, and the bench be safe
             self._make_safe(job_id)
-            if isinstance(error, ServiceError):
-                unexpected = StepOutcome(Failure(type(error).__name__, str(error)))
-            else:
-                unexpected = StepOutcome(Failure("InternalError", f"{type(error).__name__}: {error}"))
+            unexpected = self._unexpected(job_id, error)
             outcome = unexpected if self._last.good else self._last
         if not outcome.good:
             self._end(job_id, outcome)
@@ -194,12 +203,29 @@ class Engine:
         return OUTCOME.validate_python(_step(name, run))
 
     def _stations(self, job_id: str, count: int) -> StepOutcome:
-        runner = self._runner
         for index in range(count):
-            outcome = self._checked(f"station {index}", lambda k=index: runner.acquire(job_id, k))
+            outcome = self._checked(f"station {index}", lambda k=index: self._station(job_id, k))
             if not outcome.good:
                 return outcome
         return StepOutcome()
+
+    def _station(self, job_id: str, index: int) -> StepOutcome:
+        """Record one. After any but a good one the bench is safe before the engine notes it, which may take long."""
+        try:
+            outcome = self._runner.acquire(job_id, index)
+        except Exception as error:
+            outcome = self._unexpected(job_id, error)
+        if not outcome.good:
+            self._make_safe(job_id)
+        return outcome
+
+    def _unexpected(self, job_id: str, raised: Exception) -> StepOutcome:
+        """A defect, or books that cannot be kept."""
+        error = self._understood(raised)
+        refused = isinstance(error, ServiceError)
+        log.error("job %s failed inside the service: %s", job_id, error, exc_info=None if refused else error)
+        kind = type(error).__name__
+        return StepOutcome(Failure(kind, str(error)) if refused else Failure("InternalError", f"{kind}: {error}"))
 
 
 def _workflow_id(job: Job) -> str:

@@ -8,10 +8,12 @@ from concurrent.futures import Future
 from contextlib import aclosing
 from typing import Any, TypeVar
 
+from bench_service.jobs.errors import StorageFailure
 from bench_service.jobs.job import Job
 from bench_service.jobs.live import PUBLISH_S
 from bench_service.jobs.live_tap import LiveTap
 from bench_service.jobs.observed import ObservedBench
+from bench_service.jobs.question import Question
 from bench_service.jobs.store import RecordingStore
 from bench_service.jobs.stored import NewRecording
 from bench_service.jobs.watchdog import Patience, Watchdog
@@ -31,6 +33,11 @@ UNWIND_S = 2.0
 """How long a procedure may take to leave a verb that was cancelled [s, real time]."""
 STOP_CHECK_S = 0.2
 """How long a move, a settle or a recording may go on before a stop that was asked for is seen [s, real time]."""
+HANGS_S = 10.0
+"""How long the database may leave that question unanswered, before the station is given up: meanwhile no stop would be
+seen, and nothing stored [s]. One that refuses has answered."""
+ANSWER_S = 0.1
+"""How long a look waits for the answer whether a stop was asked for; a later one is seen by a later look [s]."""
 
 
 class ShuttingDown(BaseException):
@@ -57,7 +64,8 @@ class BenchSession:
         self._watchdog = Watchdog(bench.clock, bench.description.simulated, PATIENCE)
         self._bench = ObservedBench(bench, self._watchdog)
         self._recordings = recordings
-        self._stop_wanted = stop_wanted
+        self._stop_wanted = Question("stop", stop_wanted)
+        self._unanswered_s = 0.0
         self._streams: AsyncIterator[Stream] | None = None
         self._next = -1
         self._shutting_down = threading.Event()
@@ -121,7 +129,8 @@ class BenchSession:
                 if future.done():  # this moment, or its own error was one
                     return future.result()
             now_s = monotonic_s()
-            silence = self._watchdog.silence(now_s - looked_s, 2 * STOP_CHECK_S)
+            passed_s = now_s - looked_s
+            silence = self._watchdog.silence(passed_s, 2 * STOP_CHECK_S)
             looked_s = now_s
             if silence is not None:
                 self._cancel(future, silence)
@@ -129,9 +138,20 @@ class BenchSession:
             if stoppable and self._shutting_down.is_set():
                 self._cancel(future, "the service ended while a device did not answer")
                 raise ShuttingDown
-            if stoppable and self._stop_wanted():
-                self._cancel(future, "a stop came while a device did not answer")
-                raise Stopped("stopped by an operator")
+            if stoppable:
+                self._look_for_stop(future, min(passed_s, 2 * STOP_CHECK_S))
+
+    def _look_for_stop(self, future: "Future[Any]", passed_s: float) -> None:
+        """Raises `Stopped`, and `StorageFailure` where nobody can say any more whether a stop was asked for."""
+        wanted = self._stop_wanted.ask(ANSWER_S)
+        if wanted:
+            self._cancel(future, "a stop came while a device did not answer")
+            raise Stopped("stopped by an operator")
+        self._unanswered_s = 0.0 if wanted is not None else self._unanswered_s + passed_s
+        if self._unanswered_s > HANGS_S:
+            why = f"the database has not answered for {HANGS_S:g} s"
+            self._cancel(future, why)
+            raise StorageFailure(why)
 
     def _cancel(self, future: "Future[Any]", why: str) -> None:
         """Cancel a coroutine on the bench's loop and wait until it has unwound, or is lost."""

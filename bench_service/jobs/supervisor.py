@@ -13,6 +13,7 @@ from typing import Protocol
 from bench_service.jobs.devices import BenchDevices, DeviceState
 from bench_service.jobs.errors import BenchBusy, ServiceError
 from bench_service.jobs.processes import Driving, ProcessIdentity, Watch
+from bench_service.jobs.question import Question
 from bench_service.wall_clock import monotonic_s
 from procedures.bench.errors import BenchError, DeviceBusy
 
@@ -22,6 +23,8 @@ STOP_LOOK_S = 0.5
 """How often the database is asked whether the bench is stopped [s]."""
 HUNG_S = 10.0
 """How long a worker may leave a stop unanswered before it is killed [s]."""
+ANSWER_S = 0.1
+"""How long a look waits for the database's answer [s]; one that comes later is seen by a later look."""
 LEASE_S = 0.8
 """How long the lease of a dead worker is waited for [s]: then the devices' own link, exclusive too, must do."""
 AGAIN_S = 1.0
@@ -79,7 +82,9 @@ class Supervisor:
         self._hung_s = hung_s
         self._linger_s = linger_s
         self._by = f"the supervisor, {ProcessIdentity.own()}"
+        self._asked_books = Question("books", self._ask_books)
         self._unsaid: list[tuple[str, str | None]] = []
+        self._unsaid_stop: str | None = None
         self._stopped = False
         self._confirmed = False
         self._told_not_safe = False
@@ -105,7 +110,7 @@ class Supervisor:
         alive = driving is not None and driving.alive
         if state is not None and state.safe:  # whoever made it so
             self._told_not_safe, self._first_try_s = False, None
-        self._look_for_stop(now_s, state)
+        self._look_for_stop(now_s)
         if alive:
             self._gone_since_s = None
             self._look_for_hang(now_s, driving, state)
@@ -121,28 +126,37 @@ class Supervisor:
 
     def _may_leave(self, now_s: float, driving: Driving | None, state: DeviceState | None) -> bool:
         """After an orderly end at once; after a crash when it has lasted; but never from a bench that is not safe."""
-        if self._unsaid or (state is not None and not state.safe):
+        if self._unsaid or self._unsaid_stop is not None or (state is not None and not state.safe):
             return False
         assert self._gone_since_s is not None
         in_order = driving is not None and driving.ended
         return in_order or now_s - self._gone_since_s > self._linger_s
 
-    def _look_for_stop(self, now_s: float, state: DeviceState | None) -> None:
+    def _look_for_stop(self, now_s: float) -> None:
+        """Ask the database, and tell it; the last answer holds while it says nothing."""
         if now_s < self._next_stop_look_s and not self._unsaid:
             return
         self._next_stop_look_s = now_s + STOP_LOOK_S
         try:
-            self._stopped = self._books.stopped()
-            if not self._stopped:
-                self._confirmed = False
-            elif not self._confirmed and state is not None and state.safe:
-                self._books.confirm_safe(state.by)
-                self._confirmed = True
-            while self._unsaid:
-                self._books.note(self._by, *self._unsaid[0])
-                self._unsaid.pop(0)
+            self._asked_books.ask(ANSWER_S)
         except ServiceError as error:
             log.warning("the database does not answer the supervisor of bench %s: %s", self._bench_id, error)
+
+    def _ask_books(self) -> None:
+        """In a thread of its own: all that goes to the database."""
+        self._stopped = self._books.stopped()
+        state = self._devices.device_state()
+        if not self._stopped:
+            self._confirmed = False
+        elif not self._confirmed and state is not None and state.safe:
+            self._books.confirm_safe(state.by)
+            self._confirmed = True
+        if self._unsaid_stop is not None:
+            self._books.stop(self._unsaid_stop)
+            self._unsaid_stop = None
+        while self._unsaid:
+            self._books.note(self._by, *self._unsaid[0])
+            self._unsaid.pop(0)
 
     def _look_for_hang(self, now_s: float, driving: Driving | None, state: DeviceState | None) -> None:
         """A worker that lives, is told to stop, has the devices' link and leaves them unsafe, does not answer."""
@@ -203,12 +217,9 @@ class Supervisor:
         if self._told_not_safe:
             return
         reasons = "; ".join(map(str, failure.exceptions)) if isinstance(failure, ExceptionGroup) else str(failure)
-        self._say(f"could not be made safe: {reasons}", state.job)
-        try:
-            self._books.stop(f"could not be made safe: {reasons}")
-            self._told_not_safe = True
-        except ServiceError as error:
-            log.warning("the stop of bench %s cannot be noted yet: %s", self._bench_id, error)
+        self._unsaid_stop = f"could not be made safe: {reasons}"
+        self._say(self._unsaid_stop, state.job)
+        self._told_not_safe = True
 
     def _lease_within(self, seconds: float) -> Lease | None:
         """The bench's lease; None where it does not come in time, because a server does not know of a death yet, or

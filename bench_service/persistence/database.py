@@ -28,6 +28,15 @@ BUSY_S = 30.0
 """How long a writer waits for another one."""
 LEAVE_S = 1.0
 """How long the end waits for connections that are in use [s]."""
+TCP = {
+    "connect_timeout": 10,
+    "keepalives_idle": 5,
+    "keepalives_interval": 2,
+    "keepalives_count": 3,
+    "tcp_user_timeout": 10_000,
+}
+"""A server that cannot be reached any more is given up after ten seconds [s, user timeout in ms]; over a Unix socket
+nothing of it applies. One that is reached and hangs is waited for: who must not wait asks in a thread of its own."""
 
 _NEWS = "news"
 _SQLITE_FULL = frozenset({sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_SHMSIZE})
@@ -120,7 +129,7 @@ def connect(database_url: str) -> Database:
                 url,
                 pool_pre_ping=True,
                 pool_size=8,
-                connect_args={"connect_timeout": 10},
+                connect_args=TCP,
                 **_JSON,
             )
         )
@@ -190,6 +199,20 @@ def storage_errors() -> Generator[None, None, None]:
         raise StorageFailure(f"the database failed: {error}") from error
     except (ValueError, OverflowError) as error:
         raise StorageFailure(f"a value cannot be stored, or not be read again: {error}") from error
+
+
+def in_our_words(error: Exception) -> Exception:
+    """An error of a database or its driver that others met, as `StorageFull`, `Conflict` or `StorageFailure`; any other
+    error as it is."""
+    if not isinstance(error, (SQLAlchemyError, sqlite3.Error)):
+        return error
+    try:
+        with storage_errors():
+            raise error
+    except StorageFull as full:
+        return full
+    except StorageFailure as failure:
+        return failure
 
 
 def is_full(error: BaseException | None) -> bool:

@@ -10,7 +10,7 @@ from typing import Any
 
 from sqlalchemy import make_url
 
-from bench_service.persistence.database import connect
+from bench_service.persistence.database import TCP, connect
 
 
 class _Books(sqlite3.Connection):
@@ -22,7 +22,7 @@ class _Books(sqlite3.Connection):
 def engine_database(database_url: str, bench_id: str) -> tuple[str, dict[str, Any]]:
     """URL and connection options of the database of a bench's engine. An SQLite file is switched to WAL here."""
     if make_url(database_url).get_backend_name() != "sqlite":
-        return database_url, {}
+        return database_url, {"connect_args": {**TCP, "application_name": f"bench {bench_id} engine"[:63]}}
     beside = f"{database_url}.{bench_id}.jobs"
     connect(beside).dispose()
     return beside, {"connect_args": {"factory": _Books}}

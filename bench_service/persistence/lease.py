@@ -20,7 +20,7 @@ from sqlalchemy.pool import NullPool
 
 from bench_service import wall_clock
 from bench_service.jobs.errors import BenchBusy
-from bench_service.persistence.database import Database, storage_errors
+from bench_service.persistence.database import TCP, Database, storage_errors
 
 
 class BenchLease(Protocol):
@@ -154,12 +154,8 @@ class ServerLease:
             poolclass=NullPool,
             isolation_level="AUTOCOMMIT",
             connect_args={
-                "connect_timeout": 10,
+                **TCP,
                 "application_name": f"bench {bench_id} {role} pid {os.getpid()} on {socket.gethostname()}"[:63],
-                "keepalives_idle": 5,
-                "keepalives_interval": 2,
-                "keepalives_count": 3,
-                "tcp_user_timeout": 10_000,
             },
         )
         self._connection: Connection | None = self._locked()

