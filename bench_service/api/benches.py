@@ -10,6 +10,7 @@ from bench_service.api.errors import problems
 from bench_service.api.requests import StopRequest
 from bench_service.jobs.devices import DeviceState
 from bench_service.jobs.live import BenchLive
+from bench_service.jobs.queue import Place, QueueEntry
 from bench_service.jobs.safety import Safety
 from bench_service.jobs.service import BenchService
 from bench_service.wall_clock import now
@@ -100,6 +101,21 @@ class QueueEntryView(BaseModel):
     not_before: datetime | None = Field(description="It is not tried before this moment")
     reservation: str | None
 
+    @classmethod
+    def of(cls, entry: QueueEntry, place: Place) -> "QueueEntryView":
+        """As HTTP says it."""
+        return cls(
+            job=entry.job,
+            position=place.position,
+            ahead=place.ahead,
+            waiting=place.waiting,
+            priority=entry.priority,
+            unit=entry.unit,
+            queued_at=entry.queued_at,
+            not_before=entry.not_before,
+            reservation=entry.reservation,
+        )
+
 
 class QueueView(BaseModel):
     """A bench's queue, in the order in which its jobs start."""
@@ -157,23 +173,8 @@ def read_queue(bench_id: str, service: Service) -> QueueView:
     """The jobs that wait for a bench, in the order in which they start, and why each of them waits."""
     queue = service.queues.queue(bench_id)
     holder = service.benches.holder(bench_id)
-    entries: list[QueueEntryView] = []
-    for entry in queue.entries:
-        place = queue.place(entry.job, holder is not None)
-        assert place is not None  # it is one of the queue's own
-        entries.append(
-            QueueEntryView(
-                job=entry.job,
-                position=place.position,
-                ahead=place.ahead,
-                waiting=place.waiting,
-                priority=entry.priority,
-                unit=entry.unit,
-                queued_at=entry.queued_at,
-                not_before=entry.not_before,
-                reservation=entry.reservation,
-            )
-        )
+    places = queue.places(holder is not None)
+    entries = [QueueEntryView.of(entry, places[entry.job]) for entry in queue.entries]
     return QueueView(bench=queue.bench, running=queue.running, driven_by=holder, entries=entries)
 
 

@@ -115,7 +115,7 @@ class Dispatcher:
         """Claim and run the next job; False where there is none."""
         if not self._lease.held() and not self._lease.regain():
             return False
-        queue = self._stores.queue.look(self._bench_id, now())
+        queue = self._stores.queue.front(self._bench_id, now())
         if queue.running is not None:
             self._settle()
             return False

@@ -39,7 +39,7 @@ def row_of_job(job: Job) -> JobRow:
         pause_requested=job.pause_requested,
         attempt=job.attempt,
         deadline_at=job.deadline_at,
-        queued_at=job.queued_at,
+        queued_at=job.queued_at or job.created_at,
         not_before=job.not_before,
         retries=job.retries,
         retries_left=job.retries_left,
