@@ -145,7 +145,7 @@ def _view(service: BenchService, bench_id: str) -> BenchView:
         description=description,
         state="stopped" if stop else "idle" if running is None else "busy",
         stopped=None if stop is None else f"{stop.at.isoformat()}: {stop.reason}",
-        job=None if running is None else running.id,
+        job=running,
         units=[unit.serial for unit in service.benches.mounted(bench_id)],
         live=live,
         driver_seen_at=None if live is None else live.at,
@@ -185,7 +185,7 @@ def stop(bench_id: str, service: Service, body: StopRequest | None = None) -> St
     It is noted first, so it holds whoever is alive: a worker sees it, and in its place the bench's supervisor.
     """
     job, safety = service.stop_bench(bench_id, (body or StopRequest.model_validate({})).reason)
-    return Stopping(bench=bench_id, job=None if job is None else job.id, safety=SafetyView.of(safety))
+    return Stopping(bench=bench_id, job=job, safety=SafetyView.of(safety))
 
 
 @router.post("/{bench_id}/release", responses=problems(404, 409, 507))

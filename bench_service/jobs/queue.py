@@ -107,6 +107,16 @@ class BenchQueue:
                 yield reservation
 
 
+@dataclass(frozen=True)
+class RunningJob:
+    """The job that drives a bench, as far as it is known whatever version of the service stored it."""
+
+    id: str
+    attempt: int
+    procedure: str
+    unit: str
+
+
 class QueueStore(Protocol):
     """The queues of all benches, as they are kept. Every method is one transaction."""
 
@@ -126,7 +136,7 @@ class QueueStore(Protocol):
         """
         ...
 
-    def running(self, bench: str) -> Job | None:
+    def running(self, bench: str) -> RunningJob | None:
         """The job that drives a bench."""
         ...
 

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from bench_service.jobs.errors import IllegalTransition
 from bench_service.jobs.job import Failure, Job, JobState
-from bench_service.jobs.queue import BenchQueue, QueueEntry
+from bench_service.jobs.queue import BenchQueue, QueueEntry, RunningJob
 from bench_service.jobs.stored import BenchStop
 from bench_service.persistence.database import Database
 from bench_service.persistence.job_changes import append_event, found_job, move_job
@@ -39,7 +39,12 @@ _OPEN_JOBS = select(*_ENTRY, JobRow.state).where(_OF_BENCH, JobRow.state.in_((QU
 _FRONT = select(*_ENTRY).where(_OF_BENCH, JobRow.state == QUEUED).order_by(*_ORDER).limit(bindparam("limit"))
 _FURTHER = _FRONT.where(tuple_(*_ORDER) > tuple_(*(bindparam(f"last_{c.key}", type_=c.type) for c in _ORDER)))
 """Those that wait, from the first on, and from one on: in the order of an index, so the others are not touched."""
-_RUNNING = select(JobRow).where(_OF_BENCH, JobRow.state == RUNNING).order_by(JobRow.id).limit(1)
+_RUNNING = (
+    select(JobRow.id, JobRow.attempt, JobRow.procedure, JobRow.unit)
+    .where(_OF_BENCH, JobRow.state == RUNNING)
+    .order_by(JobRow.id)
+    .limit(1)
+)
 _STOP = select(BenchStopRow.at, BenchStopRow.reason).where(BenchStopRow.bench == bindparam("bench"))
 
 
@@ -80,10 +85,10 @@ class SqlQueueStore:
             move_job(session, row, JobState.RUNNING, at)
             return job_of_row(row)
 
-    def running(self, bench: str) -> Job | None:
+    def running(self, bench: str) -> RunningJob | None:
         with self._database.read() as session:
-            row = session.scalars(_RUNNING, {"bench": bench}).first()
-            return None if row is None else job_of_row(row)
+            row = session.execute(_RUNNING, {"bench": bench}).first()
+            return None if row is None else RunningJob(*row)
 
     def requeue(self, job_id: str, at: datetime, not_before: datetime | None, why: Failure, spend: bool) -> Job:
         with self._database.write() as session:
@@ -138,8 +143,8 @@ def _queue(
 
 
 def _running(session: Session, bench: str) -> str | None:
-    """The id of the job that drives a bench; nothing else of it is read."""
-    return session.scalar(_RUNNING.with_only_columns(JobRow.id), {"bench": bench})
+    """The id of the job that drives a bench."""
+    return session.scalar(_RUNNING, {"bench": bench})
 
 
 def _entries(session: Session, bench: str, limit: int, after: QueueEntry | None = None) -> tuple[QueueEntry, ...]:
