@@ -10,6 +10,7 @@ from bench_service.api.errors import problems
 from bench_service.api.requests import StopRequest
 from bench_service.jobs.devices import DeviceState
 from bench_service.jobs.live import BenchLive
+from bench_service.jobs.queue import Place, QueueEntry
 from bench_service.jobs.safety import Safety
 from bench_service.jobs.service import BenchService
 from bench_service.wall_clock import now
@@ -100,6 +101,21 @@ class QueueEntryView(BaseModel):
     not_before: datetime | None = Field(description="It is not tried before this moment")
     reservation: str | None
 
+    @classmethod
+    def of(cls, entry: QueueEntry, place: Place) -> "QueueEntryView":
+        """As HTTP says it."""
+        return cls(
+            job=entry.job,
+            position=place.position,
+            ahead=place.ahead,
+            waiting=place.waiting,
+            priority=entry.priority,
+            unit=entry.unit,
+            queued_at=entry.queued_at,
+            not_before=entry.not_before,
+            reservation=entry.reservation,
+        )
+
 
 class QueueView(BaseModel):
     """A bench's queue, in the order in which its jobs start."""
@@ -129,7 +145,7 @@ def _view(service: BenchService, bench_id: str) -> BenchView:
         description=description,
         state="stopped" if stop else "idle" if running is None else "busy",
         stopped=None if stop is None else f"{stop.at.isoformat()}: {stop.reason}",
-        job=None if running is None else running.id,
+        job=running,
         units=[unit.serial for unit in service.benches.mounted(bench_id)],
         live=live,
         driver_seen_at=None if live is None else live.at,
@@ -157,23 +173,8 @@ def read_queue(bench_id: str, service: Service) -> QueueView:
     """The jobs that wait for a bench, in the order in which they start, and why each of them waits."""
     queue = service.queues.queue(bench_id)
     holder = service.benches.holder(bench_id)
-    entries: list[QueueEntryView] = []
-    for entry in queue.entries:
-        place = queue.place(entry.job, holder is not None)
-        assert place is not None  # it is one of the queue's own
-        entries.append(
-            QueueEntryView(
-                job=entry.job,
-                position=place.position,
-                ahead=place.ahead,
-                waiting=place.waiting,
-                priority=entry.priority,
-                unit=entry.unit,
-                queued_at=entry.queued_at,
-                not_before=entry.not_before,
-                reservation=entry.reservation,
-            )
-        )
+    places = queue.places(holder is not None)
+    entries = [QueueEntryView.of(entry, places[entry.job]) for entry in queue.entries]
     return QueueView(bench=queue.bench, running=queue.running, driven_by=holder, entries=entries)
 
 
@@ -184,7 +185,7 @@ def stop(bench_id: str, service: Service, body: StopRequest | None = None) -> St
     It is noted first, so it holds whoever is alive: a worker sees it, and in its place the bench's supervisor.
     """
     job, safety = service.stop_bench(bench_id, (body or StopRequest.model_validate({})).reason)
-    return Stopping(bench=bench_id, job=None if job is None else job.id, safety=SafetyView.of(safety))
+    return Stopping(bench=bench_id, job=job, safety=SafetyView.of(safety))
 
 
 @router.post("/{bench_id}/release", responses=problems(404, 409, 507))

@@ -114,10 +114,18 @@ _SAME_IN_JOB = tuple(name for name in JobView.model_fields if name in Job.__data
 
 
 class JobPage(BaseModel):
-    """Jobs, newest first."""
+    """Jobs, newest first. Those that this version does not understand are left out, and named in its log."""
 
     items: list[JobView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")
+
+
+class ForeignJob(BaseModel):
+    """A job that was stored by a version whose words this one does not understand."""
+
+    id: str
+    state: JobState
+    waiting: str = Field(description="What is not understood, as a sentence")
 
 
 class EventView(BaseModel):

@@ -4,14 +4,15 @@ from collections.abc import AsyncIterator
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Response
-from fastapi.responses import StreamingResponse
+from fastapi.responses import JSONResponse, StreamingResponse
 
 from bench_service.api import event_stream
 from bench_service.api.dependencies import After, Hub, IdempotencyKey, Limit, RequestedBy, Service
 from bench_service.api.errors import made, problems
-from bench_service.api.job_schemas import JobPage, JobView
+from bench_service.api.job_schemas import ForeignJob, JobPage, JobView
 from bench_service.api.requests import JobChange, JobSubmission, PromptAnswer, Reanalysis
 from bench_service.api.schemas import ResultPage, ResultView, Truth
+from bench_service.jobs.errors import NotUnderstood
 from bench_service.jobs.event_hub import EventHub
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.prompts import Answer
@@ -105,7 +106,7 @@ def list_jobs(
     return JobPage(items=items, next=page.next)
 
 
-@router.get("/{job_id}", responses=problems(404))
+@router.get("/{job_id}", responses=problems(404, 409))
 def read_job(job_id: str, service: Service) -> JobView:
     """One job: everything that is known of it, its place in the queue and why it waits."""
     return _view(service, service.stores.jobs.get(job_id))
@@ -117,10 +118,25 @@ def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
     return _view(service, service.set_priority(job_id, body.priority))
 
 
-@router.post("/{job_id}/cancel", status_code=202, responses=problems(404, 409, 507))
-def cancel(job_id: str, service: Service) -> JobView:
-    """End a job: a queued one at once, a running one as soon as its bench is safe. Its recordings are kept."""
-    return _view(service, service.cancel(job_id))
+@router.post(
+    "/{job_id}/cancel",
+    status_code=202,
+    response_model=JobView,
+    responses={
+        **problems(404, 409, 507),
+        200: {"model": ForeignJob, "description": "Noted; the job is not understood here"},
+    },
+)
+def cancel(job_id: str, service: Service) -> JobView | JSONResponse:
+    """End a job: a queued one at once, a running one as soon as its bench is safe. Its recordings are kept.
+
+    One that this version does not understand is ended too; of it, only its state is told.
+    """
+    try:
+        return _view(service, service.cancel(job_id))
+    except NotUnderstood as error:
+        _, state = service.stores.jobs.last_event(job_id)
+        return JSONResponse(ForeignJob(id=job_id, state=state, waiting=str(error)).model_dump(mode="json"), 200)
 
 
 @router.post("/{job_id}/pause", status_code=202, responses=problems(404, 409, 507))
@@ -145,7 +161,7 @@ def resume(job_id: str, service: Service) -> JobView:
 @router.get(
     "/{job_id}/events",
     response_class=StreamingResponse,
-    responses={**problems(404), **event_stream.DOCUMENTED},
+    responses={**problems(404, 409), **event_stream.DOCUMENTED},
 )
 async def events(
     job_id: str,
@@ -164,7 +180,7 @@ async def _told(hub: EventHub, job_id: str, after: int) -> AsyncIterator[bytes]:
         yield frame
 
 
-@router.get("/{job_id}/result", responses={**problems(404), 304: {"description": "Not modified"}})
+@router.get("/{job_id}/result", responses={**problems(404, 409), 304: {"description": "Not modified"}})
 def read_result(
     job_id: str,
     service: Service,
@@ -180,7 +196,7 @@ def read_result(
     return ResultView.of(result)
 
 
-@router.get("/{job_id}/truth", responses=problems(404))
+@router.get("/{job_id}/truth", responses=problems(404, 409))
 def read_truth(job_id: str, service: Service) -> Truth:
     """What the simulated unit really was in this job; 404 on a real bench."""
     return Truth(job=job_id, triads=list(service.truth(job_id)))
@@ -196,7 +212,7 @@ def analyse_again(
     return ResultView.of(result)
 
 
-@router.get("/{job_id}/analyses", responses=problems(404))
+@router.get("/{job_id}/analyses", responses=problems(404, 409))
 def list_analyses(job_id: str, service: Service, after: After = None, limit: Limit = 50) -> ResultPage:
     """Every result of the job's recordings taken as a whole, newest first."""
     service.stores.jobs.get(job_id)

@@ -8,6 +8,8 @@ is looked at, so that no job stays running without anybody who runs it:
 - its workflow is this engine's and unfinished: the engine goes on with it by itself, and is waited for;
 - its workflow is of another version, or the engine gave it up: the job is interrupted, with the reason.
 
+A job that this version does not understand is interrupted too, and holds up nobody.
+
 While the bench's lease is lost (the database was restarted) nothing is claimed, and the lease is asked for again.
 """
 
@@ -17,9 +19,9 @@ from threading import Event, Thread
 from typing import Protocol
 
 from bench_service.jobs.driver import Lease
-from bench_service.jobs.errors import NotFound, ServiceError
-from bench_service.jobs.job import Failure, Job, JobState
-from bench_service.jobs.queue import BenchQueue, QueueEntry
+from bench_service.jobs.errors import NotFound, NotUnderstood, ServiceError
+from bench_service.jobs.job import Failure, Job
+from bench_service.jobs.queue import BenchQueue, QueueEntry, RunningJob
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.session import ShuttingDown
 from bench_service.jobs.store import Stores
@@ -52,7 +54,7 @@ class JobEngine(Protocol):
         """Run a claimed job to its end. Raises `ShuttingDown`, and whatever keeps it from running."""
         ...
 
-    def unfinished(self, job: Job) -> Unfinished:
+    def unfinished(self, job: RunningJob) -> Unfinished:
         """What became of a running job's workflow."""
         ...
 
@@ -115,7 +117,7 @@ class Dispatcher:
         """Claim and run the next job; False where there is none."""
         if not self._lease.held() and not self._lease.regain():
             return False
-        queue = self._stores.queue.look(self._bench_id, now())
+        queue = self._stores.queue.front(self._bench_id, now())
         if queue.running is not None:
             self._settle()
             return False
@@ -125,9 +127,8 @@ class Dispatcher:
             return False
         try:
             job = self._runner.claim(entry)
-        except (ValueError, NotFound) as error:  # stored by a version whose words are not understood any more
-            failure = Failure("NotUnderstood", f"this version cannot read the job: {error}")
-            self._stores.jobs.transition(entry.job, JobState.INTERRUPTED, at=now(), failure=failure)
+        except (NotUnderstood, NotFound) as error:  # its unit is not known, or its words are not
+            self._interrupt(entry.job, Failure(type(error).__name__, str(error)))
             return True
         if job is None:
             return False
@@ -143,12 +144,24 @@ class Dispatcher:
         now_running = self._stores.queue.running(self._bench_id)
         if found.alive or now_running is None or (now_running.id, now_running.attempt) != (job.id, job.attempt):
             return  # it goes on, or it came to its end or back into the queue between the two looks
-        if found.gone is None:
+        why = self._not_understood(job.id) or found.gone
+        if why is None:
             never = Failure("NeverBegan", "the service ended after it had chosen this job and before it began")
             self._stores.queue.requeue(job.id, now(), None, never, spend=False)
         else:
-            to = JobState.CANCELLED if now_running.cancel_requested else JobState.INTERRUPTED
-            self._stores.jobs.transition(job.id, to, at=now(), failure=found.gone)
+            self._interrupt(job.id, why)
+
+    def _not_understood(self, job_id: str) -> Failure | None:
+        """Why nobody here could go on with a job, whatever became of its workflow."""
+        try:
+            self._stores.jobs.get(job_id)
+        except NotUnderstood as error:
+            return Failure(type(error).__name__, str(error))
+        return None
+
+    def _interrupt(self, job_id: str, why: Failure) -> None:
+        log.warning("job %s is interrupted: %s: %s", job_id, why.kind, why.message)
+        self._stores.jobs.interrupt(job_id, now(), why)
 
     def _tell(self, queue: BenchQueue) -> None:
         """Note in the events of the queue's first job why it does not start, once for each reason."""

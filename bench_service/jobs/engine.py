@@ -17,8 +17,9 @@ from dbos import DBOS, DBOSConfig, Serializer, SetWorkflowID
 from pydantic import TypeAdapter
 
 from bench_service.jobs.dispatcher import Unfinished
-from bench_service.jobs.errors import ServiceError, StorageFailure, StorageFull
+from bench_service.jobs.errors import NotUnderstood, ServiceError, StorageFailure, StorageFull
 from bench_service.jobs.job import Failure, Job
+from bench_service.jobs.queue import RunningJob
 from bench_service.jobs.runner import JobRunner, StepOutcome
 from bench_service.jobs.session import ShuttingDown
 
@@ -113,7 +114,7 @@ class Engine:
             handle = DBOS.start_workflow(self._workflow, job.id, job.attempt)
         handle.get_result()
 
-    def unfinished(self, job: Job) -> Unfinished:
+    def unfinished(self, job: RunningJob) -> Unfinished:
         """What became of a running job's workflow."""
         status = DBOS.get_workflow_status(_workflow_id(job))
         if status is None:
@@ -188,6 +189,8 @@ class Engine:
             try:
                 self._runner.end_early(job_id, outcome)
                 return
+            except NotUnderstood:  # no end of ours can be noted: the dispatcher interrupts it
+                return
             except (StorageFull, StorageFailure) as error:
                 log.warning("the end of job %s cannot be noted yet: %s", job_id, error)
             if self._ending.wait(RETRY_S):
@@ -228,7 +231,7 @@ class Engine:
         return StepOutcome(Failure(kind, str(error)) if refused else Failure("InternalError", f"{kind}: {error}"))
 
 
-def _workflow_id(job: Job) -> str:
+def _workflow_id(job: Job | RunningJob) -> str:
     """Each attempt of a job is a workflow of its own."""
     return f"{job.id}/{job.attempt}"
 

@@ -11,6 +11,7 @@ ServiceError
 ├── NotReady             a job could not start here now
 ├── NotSafe              the bench's devices are not known to be safe
 ├── AlreadyReserved      somebody keeps this bench or unit
+├── NotUnderstood        a job was stored by a version whose words this one does not know
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
@@ -18,6 +19,8 @@ ServiceError
 """
 
 from collections.abc import Sequence
+
+from pydantic import ValidationError
 
 
 class ServiceError(Exception):
@@ -79,6 +82,21 @@ class AlreadyReserved(ServiceError):
 
 class NotMounted(ServiceError):
     """This bench does not have that unit."""
+
+
+class NotUnderstood(ServiceError):
+    """A job was stored by another version of the service, in words that this one does not know."""
+
+    def __init__(self, job_id: str, version: str, why: Exception) -> None:
+        """`why`: what its reader said; of a document with many faults, the first is told."""
+        fault = str(why)
+        if isinstance(why, ValidationError):
+            first = why.errors(include_url=False, include_input=False)[0]
+            fault = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+        super().__init__(
+            f"job {job_id} was stored by version {version} of the service, and this version does not understand it: "
+            f"{fault}"
+        )
 
 
 class StorageFull(ServiceError):

@@ -8,10 +8,12 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from bench_service.jobs.directory import BenchDirectory
-from bench_service.jobs.errors import NotFound, NotMounted
+from bench_service.jobs.errors import NotFound, NotMounted, NotUnderstood
+from bench_service.jobs.job import Job
 from bench_service.jobs.store import Stores
 from procedures import catalog
 from procedures.bench import BenchDescription
+from procedures.core.errors import DomainError
 from procedures.core.recording import Station
 from procedures.core.unit import Unit
 from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
@@ -89,6 +91,14 @@ class Planner:
     def refreshed(self, context: Context) -> Context:
         """The same bench, and the unit as it is known now: its noise, and the calibration that is current."""
         return replace(context, unit=self._stores.units.unit(context.unit.serial))
+
+
+def context_of(job: Job) -> Context:
+    """What was known of a job's unit and bench. Raises `NotUnderstood`."""
+    try:
+        return CONTEXT.validate_python(job.context)
+    except (ValueError, DomainError) as error:
+        raise NotUnderstood(job.id, job.code_version, error) from error
 
 
 def _violations(station: Station, bench: BenchDescription) -> tuple[str, ...]:

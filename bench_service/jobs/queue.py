@@ -75,23 +75,28 @@ class BenchQueue:
 
     def place(self, job_id: str, driven: bool) -> Place | None:
         """Where a job stands; None where it is not in the queue. `driven`: whether a worker drives the bench."""
-        ahead = [] if self.running is None else [self.running]
+        return self.places(driven).get(job_id)
+
+    def places(self, driven: bool) -> dict[str, Place]:
+        """Where every job of the queue stands, by its id, in order: one walk for all of them."""
+        places: dict[str, Place] = {}
+        ahead, last = (0, "") if self.running is None else (1, self.running)
         for number, entry in enumerate(self.entries, start=1):
             hold = self.hold(entry)
-            if entry.job == job_id:
-                return Place(number, len(ahead), hold or self._turn(ahead, driven))
+            places[entry.job] = Place(number, ahead, hold or self._turn(ahead, last, driven))
             if hold is None:
-                ahead.append(entry.job)
-        return None
+                ahead, last = ahead + 1, entry.job
+        return places
 
-    def _turn(self, ahead: list[str], driven: bool) -> str:
+    def _turn(self, ahead: int, last: str, driven: bool) -> str:
+        """Why a job that may start does not: `ahead` jobs go before it, and `last` is the last of them."""
         if not driven:
             return f"no worker drives bench {self.bench} now"
-        if not ahead:
+        if ahead == 0:
             return "it is next"
-        if self.running is not None and len(ahead) == 1:
+        if last == self.running:
             return f"behind job {self.running}, which runs"
-        return f"behind {len(ahead)} jobs; the last of them is {ahead[-1]}"
+        return f"behind {ahead} jobs; the last of them is {last}"
 
     def _of_others(self, entry: QueueEntry) -> Iterator[Reservation]:
         """Reservations of its bench or unit by another holder than that of the job's own reservation."""
@@ -102,11 +107,25 @@ class BenchQueue:
                 yield reservation
 
 
+@dataclass(frozen=True)
+class RunningJob:
+    """The job that drives a bench, as far as it is known whatever version of the service stored it."""
+
+    id: str
+    attempt: int
+    procedure: str
+    unit: str
+
+
 class QueueStore(Protocol):
     """The queues of all benches, as they are kept. Every method is one transaction."""
 
     def look(self, bench: str, at: datetime) -> BenchQueue:
         """A bench's queue now."""
+        ...
+
+    def front(self, bench: str, at: datetime) -> BenchQueue:
+        """The same with its first entries only: so many that `next` answers as for the whole; none while a job runs."""
         ...
 
     def claim(self, entry: QueueEntry, context: dict[str, Any], at: datetime) -> Job | None:
@@ -117,7 +136,7 @@ class QueueStore(Protocol):
         """
         ...
 
-    def running(self, bench: str) -> Job | None:
+    def running(self, bench: str) -> RunningJob | None:
         """The job that drives a bench."""
         ...
 

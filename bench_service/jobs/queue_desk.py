@@ -55,9 +55,10 @@ class QueueDesk:
 
     def standing(self, jobs: Sequence[Job]) -> dict[str, Standing]:
         """Where each of these jobs stands; a bench is looked at once for all of them."""
-        benches = {job.bench for job in jobs if job.state is JobState.QUEUED}
-        queues = {bench: (self._stores.queue.look(bench, now()), self._benches.driven(bench)) for bench in benches}
-        return {job.id: _standing(job, queues.get(job.bench)) for job in jobs}
+        places: dict[str, Place] = {}
+        for bench in {job.bench for job in jobs if job.state is JobState.QUEUED}:
+            places |= self._stores.queue.look(bench, now()).places(self._benches.driven(bench))
+        return {job.id: _standing(job, places.get(job.id)) for job in jobs}
 
     def reserve(self, request: ReservationRequest, idempotency_key: str | None = None) -> Reservation:
         """Keep a bench or a unit. Raises `NotFound` for one that is unknown, `AlreadyReserved`, `BadParameter`."""
@@ -94,12 +95,11 @@ class QueueDesk:
             raise BadParameter("reservation", reservation_id, allowed)
 
 
-def _standing(job: Job, seen: tuple[BenchQueue, bool] | None) -> Standing:
+def _standing(job: Job, place: Place | None) -> Standing:
     if job.state is JobState.PAUSED:
         return Standing(waiting="put aside until somebody resumes it")
     if job.state is JobState.INTERRUPTED:
         return Standing(waiting="the service could not go on with it; it waits until somebody resumes it")
     if job.state is JobState.RUNNING and job.prompt is not None:
         return Standing(waiting=f"a person at the bench is asked: {job.prompt.get('text', '')}")
-    place = None if seen is None else seen[0].place(job.id, seen[1])
     return Standing(place, None if place is None else place.waiting)

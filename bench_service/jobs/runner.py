@@ -11,7 +11,7 @@ from bench_service.jobs.errors import ServiceError, StorageFailure
 from bench_service.jobs.job import Failure, Job, JobState
 from bench_service.jobs.live import LiveBoard
 from bench_service.jobs.live_tap import LiveTap
-from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner
+from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner, context_of
 from bench_service.jobs.processes import ProcessIdentity
 from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.retries import try_again
@@ -73,7 +73,7 @@ class JobRunner:
     def claim(self, entry: QueueEntry) -> Job | None:
         """Begin a queued job, with what is known of its unit now; None where it cannot begin any more."""
         job = self._stores.jobs.get(entry.job)
-        context = self._planner.refreshed(CONTEXT.validate_python(job.context))
+        context = self._planner.refreshed(context_of(job))
         return self._stores.queue.claim(entry, CONTEXT.dump_python(context, mode="json"), now())
 
     def stations(self, job_id: str, attempt: int) -> int:
@@ -271,7 +271,7 @@ def analysed(
     code_version: str,
 ) -> Analysed:
     """Run a procedure's analysis on a job's recordings. Raises `DomainError`, `ValidationError` for the parameters."""
-    context = CONTEXT.validate_python(job.context)
+    context = context_of(job)
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
     outcome = procedure.analyse(recordings, params, context)
     used = context.unit.calibration_id if procedure.uses_calibration else None

@@ -10,11 +10,12 @@ from random import SystemRandom
 from bench_service.jobs.analyses import AnalysisDesk
 from bench_service.jobs.campaigns.desk import CampaignDesk
 from bench_service.jobs.driver import BenchDriver, TrueTriad
-from bench_service.jobs.errors import IllegalTransition, NotFound, NotReady
+from bench_service.jobs.errors import IllegalTransition, NotFound, NotReady, NotUnderstood
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.live import LiveBoard
 from bench_service.jobs.log_context import about
 from bench_service.jobs.planning import CONTEXT, Plan, Planner, register
+from bench_service.jobs.queue import RunningJob
 from bench_service.jobs.queue_desk import QueueDesk
 from bench_service.jobs.request import JobRequest, fingerprint
 from bench_service.jobs.safety import Safety, SafetyDesk
@@ -148,17 +149,17 @@ class BenchService:
         self._wake()
         return job
 
-    def stop_bench(self, bench_id: str, reason: str) -> tuple[Job | None, Safety]:
-        """Stop what the bench is doing, wherever its worker is, until it is released; the job that was running, if
-        any, and what is known of the bench's safety then. Jobs in the queue wait.
+    def stop_bench(self, bench_id: str, reason: str) -> tuple[str | None, Safety]:
+        """Stop what the bench is doing, wherever its worker is, until it is released; the id of the job that was
+        running, if any, and what is known of the bench's safety then. Jobs in the queue wait.
         """
         self.benches.description(bench_id)
         self.stores.units.stop_bench(BenchStop(bench_id, now(), reason))
         running = self.running_job(bench_id)
         if running is not None:
-            with suppress(IllegalTransition):  # it has ended this moment
-                running = self.cancel(running.id)
-        return running, self.safety.stopping(bench_id)
+            with suppress(IllegalTransition, NotUnderstood):  # it has ended this moment; or nobody here can read it
+                self.cancel(running.id)
+        return None if running is None else running.id, self.safety.stopping(bench_id)
 
     def release_bench(self, bench_id: str) -> None:
         """Let a stopped bench work again; the jobs in its queue go on. Raises `NotSafe` while it is not safe."""
@@ -172,15 +173,17 @@ class BenchService:
         """Change the place of a queued job. Raises `IllegalTransition` where it is not queued."""
         return self.stores.queue.set_priority(job_id, priority, now())
 
-    def running_job(self, bench_id: str) -> Job | None:
+    def running_job(self, bench_id: str) -> RunningJob | None:
         """A bench's job that has begun and not ended."""
         return self.stores.queue.running(bench_id)
 
-    def driving_job(self, bench_id: str) -> Job | None:
-        """The job that drives a bench now; one that only waits for room to note its end drives it no more."""
+    def driving_job(self, bench_id: str) -> str | None:
+        """The id of the job that drives a bench now; one that only waits for room to note its end drives it no more."""
         if self._worker is not None and self.driver is not None and self.driver.description.id == bench_id:
-            return self._worker.running_job()
-        return self.running_job(bench_id)
+            driving = self._worker.running_job()
+        else:
+            driving = self.running_job(bench_id)
+        return None if driving is None else driving.id
 
     def _wake(self) -> None:
         if self._worker is not None:

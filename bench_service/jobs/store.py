@@ -92,7 +92,9 @@ class RecordingStore(Protocol):
 
 
 class JobStore(Protocol):
-    """Jobs and their events. Every change of state appends an event in the same transaction."""
+    """Jobs and their events. Every change of state appends an event in the same transaction.
+
+    A job that is not understood is left out of lists; every method that gives one raises `NotUnderstood`."""
 
     def add(self, job: Job, idempotency: Idempotency | None = None) -> Job:
         """Store a new job; or, where the key is known with the same fingerprint, return the job it made.
@@ -132,6 +134,12 @@ class JobStore(Protocol):
         """Change state; to the state it is already in, it is a no-op. Raises `IllegalTransition`, `NotFound`."""
         ...
 
+    def interrupt(self, job_id: str, at: datetime, failure: Failure) -> None:
+        """The service cannot go on with a job, and says why; one that was to be cancelled is. It is not read, so that it
+        need not be understood.
+        """
+        ...
+
     def station_done(self, job_id: str, station: int, at: datetime, data: dict[str, Any]) -> Job:
         """Note that recordings up to and including `station` (index) are complete; idempotent."""
         ...
@@ -141,7 +149,10 @@ class JobStore(Protocol):
         ...
 
     def request_cancel(self, job_id: str, at: datetime) -> Job:
-        """A queued job is cancelled at once, a running one soon. Raises `IllegalTransition` for one that has ended."""
+        """A queued job is cancelled at once, a running one soon; `NotUnderstood` is raised after that.
+
+        Raises `IllegalTransition` for one that has ended.
+        """
         ...
 
     def cancel_requested(self, job_id: str) -> bool: ...

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from bench_service.jobs.errors import IllegalTransition, NotFound
 from bench_service.jobs.job import LEGAL, Failure, JobState
 from bench_service.persistence.database import announce
-from bench_service.persistence.job_rows import failure_document
+from bench_service.persistence.job_rows import failure_document, state_of_row
 from bench_service.persistence.tables import EventRow, JobRow
 from procedures.core.limits import Verdict
 
@@ -45,7 +45,7 @@ def move_job(
     result_id: str | None = None,
 ) -> None:
     """Change the state of a locked row, with what goes with it, and say so in an event. Raises `IllegalTransition`."""
-    before = JobState(row.state)
+    before = state_of_row(row)
     if to not in LEGAL[before]:
         raise IllegalTransition(f"job {row.id} is {before.value}; it cannot become {to.value}")
     if verdict is None and to is JobState.FAILED:

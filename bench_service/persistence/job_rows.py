@@ -4,8 +4,10 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from bench_service.jobs.errors import NotUnderstood
 from bench_service.jobs.job import Event, Failure, Job, JobState
 from bench_service.persistence.tables import EventRow, JobRow
+from procedures.core.errors import DomainError
 from procedures.core.limits import Verdict
 from procedures.core.recording import Station
 
@@ -39,7 +41,7 @@ def row_of_job(job: Job) -> JobRow:
         pause_requested=job.pause_requested,
         attempt=job.attempt,
         deadline_at=job.deadline_at,
-        queued_at=job.queued_at,
+        queued_at=job.queued_at or job.created_at,
         not_before=job.not_before,
         retries=job.retries,
         retries_left=job.retries_left,
@@ -54,7 +56,22 @@ def row_of_job(job: Job) -> JobRow:
 
 
 def job_of_row(row: JobRow) -> Job:
-    """The job that a row keeps."""
+    """The job that a row keeps. Raises `NotUnderstood`."""
+    try:
+        return _job_of_row(row)
+    except (ValueError, TypeError, DomainError) as error:
+        raise NotUnderstood(row.id, row.code_version, error) from error
+
+
+def state_of_row(row: JobRow) -> JobState:
+    """The state that a row keeps. Raises `NotUnderstood`."""
+    try:
+        return JobState(row.state)
+    except ValueError as error:
+        raise NotUnderstood(row.id, row.code_version, error) from error
+
+
+def _job_of_row(row: JobRow) -> Job:
     return Job(
         id=row.id,
         procedure=row.procedure,

@@ -4,22 +4,25 @@ Every change reads the job's row under a lock (`FOR UPDATE`; on SQLite the writi
 processes that want different ends for one job, one wins and the other is told `IllegalTransition`.
 """
 
+import logging
 from collections.abc import Callable
 from datetime import datetime
 from typing import Any
 
 from sqlalchemy import func, select
 
-from bench_service.jobs.errors import IllegalTransition, NotFound
+from bench_service.jobs.errors import IllegalTransition, NotFound, NotUnderstood
 from bench_service.jobs.job import FINAL, Event, Failure, Job, JobState
 from bench_service.jobs.stored import Idempotency, Page
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.job_changes import append_event, found_job, move_job
-from bench_service.persistence.job_rows import event_of_row, job_of_row, row_of_job
+from bench_service.persistence.job_rows import event_of_row, job_of_row, row_of_job, state_of_row
 from bench_service.persistence.pages import page
 from bench_service.persistence.tables import EventRow, JobRow
 from procedures.core.limits import Verdict
+
+log = logging.getLogger(__name__)
 
 
 class SqlJobStore:
@@ -27,6 +30,8 @@ class SqlJobStore:
 
     def __init__(self, database: Database) -> None:
         self._database = database
+        self._left_out: set[str] = set()
+        """Jobs that were not understood, and are told."""
 
     def add(self, job: Job, idempotency: Idempotency | None = None) -> Job:
         def once() -> Job:
@@ -63,7 +68,17 @@ class SqlJobStore:
         if unit is not None:
             query = query.where(JobRow.unit == unit)
         with self._database.read() as session:
-            return page(session, query, JobRow.id, after, limit, job_of_row)
+            return page(session, query, JobRow.id, after, limit, self._understood)
+
+    def _understood(self, row: JobRow) -> Job | None:
+        """A job for a list; None where it is not understood, which is told once for each."""
+        try:
+            return job_of_row(row)
+        except NotUnderstood as error:
+            if row.id not in self._left_out:
+                self._left_out.add(row.id)
+                log.warning("left out of lists: %s", error)
+            return None
 
     def counts(self) -> dict[JobState, int]:
         query = select(JobRow.state, func.count()).group_by(JobRow.state)
@@ -87,6 +102,12 @@ class SqlJobStore:
                 move_job(session, row, to, at, verdict, failure, result_id)
             return job_of_row(row)
 
+    def interrupt(self, job_id: str, at: datetime, failure: Failure) -> None:
+        with self._database.write() as session:
+            row = found_job(session, job_id, lock=True)
+            to = JobState.CANCELLED if row.cancel_requested else JobState.INTERRUPTED
+            move_job(session, row, to, at, failure=failure)
+
     def station_done(self, job_id: str, station: int, at: datetime, data: dict[str, Any]) -> Job:
         with self._database.write() as session:
             row = found_job(session, job_id, lock=True)
@@ -104,7 +125,7 @@ class SqlJobStore:
     def request_cancel(self, job_id: str, at: datetime) -> Job:
         with self._database.write() as session:
             row = found_job(session, job_id, lock=True)
-            state = JobState(row.state)
+            state = state_of_row(row)
             if state in FINAL:
                 raise IllegalTransition(f"job {job_id} has ended: it is {state.value}, and cannot be cancelled")
             if state in (JobState.QUEUED, JobState.PAUSED, JobState.INTERRUPTED):
@@ -113,7 +134,7 @@ class SqlJobStore:
             elif not row.cancel_requested:
                 row.cancel_requested = True
                 append_event(session, job_id, "note", at, {"cancel_requested": True})
-            return job_of_row(row)
+        return job_of_row(row)  # after the commit: one that is not understood is cancelled all the same
 
     def request_pause(self, job_id: str, at: datetime) -> Job:
         with self._database.write() as session:

@@ -18,11 +18,14 @@ def page(
     key: InstrumentedAttribute[str],
     after: str | None,
     limit: int,
-    item: Callable[[R], T],
+    item: Callable[[R], T | None],
 ) -> Page[T]:
-    """The next `limit` rows older than `after`, each made an item."""
+    """The next `limit` rows older than `after`, each made an item; one of which none can be made is left out."""
     if after is not None:
         query = query.where(key < after)
     rows = session.scalars(query.order_by(key.desc()).limit(limit + 1)).all()
     shown = rows[:limit]
-    return Page(tuple(item(row) for row in shown), shown[-1].id if len(rows) > limit and shown else None)
+    items = (item(row) for row in shown)
+    return Page(
+        tuple(made for made in items if made is not None), shown[-1].id if len(rows) > limit and shown else None
+    )

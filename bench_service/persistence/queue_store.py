@@ -1,14 +1,15 @@
 """The queues of benches in SQL. Knows rows and locks; who may start is said by `bench_service.jobs.queue`."""
 
+from dataclasses import replace
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import bindparam, func, select
+from sqlalchemy import bindparam, func, select, tuple_
 from sqlalchemy.orm import Session
 
 from bench_service.jobs.errors import IllegalTransition
 from bench_service.jobs.job import Failure, Job, JobState
-from bench_service.jobs.queue import BenchQueue, QueueEntry
+from bench_service.jobs.queue import BenchQueue, QueueEntry, RunningJob
 from bench_service.jobs.stored import BenchStop
 from bench_service.persistence.database import Database
 from bench_service.persistence.job_changes import append_event, found_job, move_job
@@ -18,25 +19,33 @@ from bench_service.persistence.tables import BenchStopRow, JobRow
 from bench_service.persistence.tables_around_jobs import ReservationRow
 
 QUEUED, RUNNING = JobState.QUEUED.value, JobState.RUNNING.value
-_QUEUED_AT = func.coalesce(JobRow.queued_at, JobRow.created_at)
-_OPEN_JOBS = (
-    select(
-        JobRow.id,
-        JobRow.unit,
-        JobRow.priority,
-        _QUEUED_AT,
-        JobRow.attempt,
-        JobRow.not_before,
-        JobRow.reservation,
-        JobRow.state,
-        BenchStopRow.at.label("stopped_at"),
-        BenchStopRow.reason,
-    )
-    .outerjoin(BenchStopRow, BenchStopRow.bench == JobRow.bench)
-    .where(JobRow.bench == bindparam("bench"), JobRow.state.in_((QUEUED, RUNNING)))
-    .order_by(JobRow.priority, _QUEUED_AT, JobRow.id)
+FIRST_PAGE, LONGER = 20, 4
+"""How many entries are read to find the one that starts next, and how much more each time that none of them may."""
+
+_ORDER = (JobRow.priority, JobRow.queued_at, JobRow.id)
+_ENTRY = (
+    JobRow.id,
+    JobRow.unit,
+    JobRow.priority,
+    JobRow.queued_at,
+    JobRow.attempt,
+    JobRow.not_before,
+    JobRow.reservation,
 )
-"""Those that wait, in the order of the queue, and the one that runs; each with the stop of its bench."""
+"""The fields of a `QueueEntry`."""
+_OF_BENCH = JobRow.bench == bindparam("bench")
+_OPEN_JOBS = select(*_ENTRY, JobRow.state).where(_OF_BENCH, JobRow.state.in_((QUEUED, RUNNING))).order_by(*_ORDER)
+"""Those that wait, in the order of the queue, and the one that runs."""
+_FRONT = select(*_ENTRY).where(_OF_BENCH, JobRow.state == QUEUED).order_by(*_ORDER).limit(bindparam("limit"))
+_FURTHER = _FRONT.where(tuple_(*_ORDER) > tuple_(*(bindparam(f"last_{c.key}", type_=c.type) for c in _ORDER)))
+"""Those that wait, from the first on, and from one on: in the order of an index, so the others are not touched."""
+_RUNNING = (
+    select(JobRow.id, JobRow.attempt, JobRow.procedure, JobRow.unit)
+    .where(_OF_BENCH, JobRow.state == RUNNING)
+    .order_by(JobRow.id)
+    .limit(1)
+)
+_STOP = select(BenchStopRow.at, BenchStopRow.reason).where(BenchStopRow.bench == bindparam("bench"))
 
 
 class SqlQueueStore:
@@ -49,13 +58,25 @@ class SqlQueueStore:
         with self._database.read() as session:
             return _look(session, bench, at)
 
+    def front(self, bench: str, at: datetime) -> BenchQueue:
+        with self._database.read() as session:
+            running = _running(session, bench)
+            first = () if running is not None else _entries(session, bench, FIRST_PAGE)
+            queue = _queue(session, bench, at, first, running)
+            wanted = FIRST_PAGE
+            while len(queue.entries) == wanted and queue.stop is None and queue.next() is None:
+                more = _entries(session, bench, wanted * (LONGER - 1), queue.entries[-1])
+                queue, wanted = replace(queue, entries=queue.entries + more), wanted * LONGER
+            return queue
+
     def claim(self, entry: QueueEntry, context: dict[str, Any], at: datetime) -> Job | None:
         with self._database.write() as session:
             row = found_job(session, entry.job, lock=True)
             self._database.one_at_a_time(session, f"claim a job of bench {row.bench}")
-            queue = _look(session, row.bench, at)
-            current = next((e for e in queue.entries if e.job == entry.job and e.attempt == entry.attempt), None)
-            if current is None or queue.running is not None or queue.hold(current) is not None:
+            current = QueueEntry(*(getattr(row, column.key) for column in _ENTRY))
+            if row.state != QUEUED or current.attempt != entry.attempt or _running(session, row.bench) is not None:
+                return None
+            if _queue(session, row.bench, at, (current,)).next() is None:
                 return None
             row.context = context
             row.not_before = None
@@ -64,11 +85,10 @@ class SqlQueueStore:
             move_job(session, row, JobState.RUNNING, at)
             return job_of_row(row)
 
-    def running(self, bench: str) -> Job | None:
-        query = select(JobRow).where(JobRow.bench == bench, JobRow.state == RUNNING).order_by(JobRow.id)
+    def running(self, bench: str) -> RunningJob | None:
         with self._database.read() as session:
-            row = session.scalars(query.limit(1)).first()
-            return None if row is None else job_of_row(row)
+            row = session.execute(_RUNNING, {"bench": bench}).first()
+            return None if row is None else RunningJob(*row)
 
     def requeue(self, job_id: str, at: datetime, not_before: datetime | None, why: Failure, spend: bool) -> Job:
         with self._database.write() as session:
@@ -107,11 +127,32 @@ class SqlQueueStore:
 def _look(session: Session, bench: str, at: datetime) -> BenchQueue:
     rows = session.execute(_OPEN_JOBS, {"bench": bench}).all()
     running = min((row.id for row in rows if row.state == RUNNING), default=None)
-    entries = tuple(QueueEntry(*row[:7]) for row in rows if row.state == QUEUED)
+    entries = tuple(QueueEntry(*row[:-1]) for row in rows if row.state == QUEUED)
+    return _queue(session, bench, at, entries, running)
+
+
+def _queue(
+    session: Session, bench: str, at: datetime, entries: tuple[QueueEntry, ...], running: str | None = None
+) -> BenchQueue:
+    """These entries, with everything that may keep them from starting."""
     if not entries:
         return BenchQueue(bench, at, (), running)
-    stop = None if rows[0].stopped_at is None else BenchStop(bench, rows[0].stopped_at, rows[0].reason)
-    return BenchQueue(bench, at, entries, running, stop, active_reservations(session, at))
+    stop = session.execute(_STOP, {"bench": bench}).first()
+    held = None if stop is None else BenchStop(bench, stop.at, stop.reason)
+    return BenchQueue(bench, at, entries, running, held, active_reservations(session, at))
+
+
+def _running(session: Session, bench: str) -> str | None:
+    """The id of the job that drives a bench."""
+    return session.scalar(_RUNNING, {"bench": bench})
+
+
+def _entries(session: Session, bench: str, limit: int, after: QueueEntry | None = None) -> tuple[QueueEntry, ...]:
+    """The first that wait for a bench, or the next after one of them."""
+    asked: dict[str, Any] = {"bench": bench, "limit": limit}
+    if after is not None:
+        asked |= {"last_priority": after.priority, "last_queued_at": after.queued_at, "last_id": after.job}
+    return tuple(QueueEntry(*row) for row in session.execute(_FRONT if after is None else _FURTHER, asked))
 
 
 def _note_ended_reservation(session: Session, row: JobRow, at: datetime) -> None:

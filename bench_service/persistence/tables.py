@@ -100,7 +100,7 @@ class JobRow(Table):
         Index("ix_jobs_state_id", "state", "id"),
         Index("ix_jobs_procedure_id", "procedure", "id"),
         Index("ix_jobs_unit_id", "unit", "id"),
-        Index("ix_jobs_bench_state", "bench", "state"),
+        Index("ix_jobs_bench_state_priority_queued_at_id", "bench", "state", "priority", "queued_at", "id"),
         Index("ix_jobs_finished_at_id", "finished_at", "id"),
     )
 
@@ -127,7 +127,8 @@ class JobRow(Table):
     pause_requested: Mapped[bool]
     attempt: Mapped[int]
     deadline_at: Mapped[datetime | None]
-    queued_at: Mapped[datetime | None]
+    queued_at: Mapped[datetime] = mapped_column(nullable=True)
+    """Never NULL; to say so of a table that is there, SQLite would have to copy it."""
     not_before: Mapped[datetime | None]
     retries: Mapped[int]
     retries_left: Mapped[int]

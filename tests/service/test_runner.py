@@ -16,6 +16,7 @@ from bench_service.jobs.dispatcher import Dispatcher, Unfinished
 from bench_service.jobs.errors import NotReady
 from bench_service.jobs.job import Failure, Job, JobState
 from bench_service.jobs.planning import Planner
+from bench_service.jobs.queue import RunningJob
 from bench_service.jobs.request import JobRequest
 from bench_service.jobs.runner import JobRunner, StepOutcome
 from bench_service.jobs.safety import SafetyDesk
@@ -37,7 +38,7 @@ class IdleEngine:
 
     def run(self, job: Job) -> None: ...
 
-    def unfinished(self, job: Job) -> Unfinished:
+    def unfinished(self, job: RunningJob) -> Unfinished:
         return Unfinished()
 
     def shut_down(self) -> None: ...
@@ -180,7 +181,7 @@ def test_a_job_that_was_queued_again_while_the_dispatcher_looked_stays_queued(st
     asked = Event()
 
     class EndingEngine(IdleEngine):
-        def unfinished(self, job: Job) -> Unfinished:
+        def unfinished(self, job: RunningJob) -> Unfinished:
             if not asked.is_set():
                 why = Failure("Disconnected", "a test")
                 stores.queue.requeue(job.id, now(), now() + timedelta(minutes=4), why, spend=False)

@@ -55,6 +55,7 @@ def new_job() -> Callable[..., Job]:
             "bench": "sim",
             "state": JobState.QUEUED,
             "created_at": NOW,
+            "queued_at": NOW,
             "requested_parameters": {"record_s": 60},
             "parameters": {"zeta": 1.0, "alpha": [1e16, -0.0, 0.1]},
             "context": {"unit": {"serial": "U-1"}},
