@@ -135,8 +135,9 @@ class JobStore(Protocol):
         ...
 
     def interrupt(self, job_id: str, at: datetime, failure: Failure) -> None:
-        """The service cannot go on with a job, and says why; one that was to be cancelled is. It is not read, so that it
-        need not be understood.
+        """The service cannot go on with a job, and says why; one that was to be cancelled is.
+
+        The job is not read, so it need not be understood.
         """
         ...
 

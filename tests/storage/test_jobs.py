@@ -176,6 +176,13 @@ def test_a_cancel_while_a_job_is_put_aside_goes_first(stores: Stores, new_job: N
     assert (ended.state, ended.attempt, ended.cancel_requested) == (JobState.CANCELLED, 1, True)
 
 
+def test_a_cancel_before_a_crash_is_settled_goes_first(stores: Stores, new_job: NewJob) -> None:
+    for wished, state in ((True, JobState.CANCELLED), (False, JobState.INTERRUPTED)):
+        job = stores.jobs.add(new_job(state=JobState.RUNNING, created_at=now(), cancel_requested=wished))
+        stores.jobs.interrupt(job.id, now(), Failure("EngineGaveUp", "a test"))
+        assert stores.jobs.get(job.id).state is state
+
+
 def test_people_who_stop_a_bench_at_once_all_stop_it(stores: Stores, new_job: NewJob) -> None:
     with ThreadPoolExecutor(8) as people:
         for _ in range(12):
