@@ -194,7 +194,8 @@ class JobRunner:
 
     def running_job(self) -> Job | None:
         """The job that drives the bench now."""
-        return None if self._session is None else self._stores.jobs.get(self._session.job.id)
+        session = self._session  # which another thread may close this moment
+        return None if session is None else self._stores.jobs.get(session.job.id)
 
     def _remember(self, procedure: AnyProcedure, outcome: Outcome, stored: StoredResult) -> None:
         """Put what a result found of its unit into the unit's record; said again after a crash, it changes nothing."""
