@@ -6,8 +6,9 @@ kernel still takes what is sent.
 
 from collections.abc import Callable
 from concurrent.futures import Future, wait
-from threading import Thread
 from typing import Generic, TypeVar
+
+from bench_service.jobs.background import in_background
 
 T = TypeVar("T")
 
@@ -26,16 +27,9 @@ class Question(Generic[T]):
         Raises what the question raises.
         """
         if self._asked is None:
-            self._asked = Future()
-            Thread(target=self._answer, args=(self._asked,), name=self._name, daemon=True).start()
+            self._asked = in_background(self._name, self._question)
         asked = self._asked
         if not wait((asked,), within_s).done:
             return None
         self._asked = None
         return asked.result()
-
-    def _answer(self, asked: "Future[T]") -> None:
-        try:
-            asked.set_result(self._question())
-        except BaseException as error:
-            asked.set_exception(error)

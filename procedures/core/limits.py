@@ -24,6 +24,13 @@ class Limit:
     source: str = ""
 
 
+def bounds(minimum: float | None, maximum: float | None, unit: str) -> str:
+    """A requirement as a person reads it: ≥ 1 and ≤ 2 deg/h."""
+    found = [f"≥ {minimum:g}"] if minimum is not None else []
+    found += [f"≤ {maximum:g}"] if maximum is not None else []
+    return f"{' and '.join(found)} {unit}"
+
+
 @dataclass(frozen=True)
 class Check:
     """One value against one limit."""

@@ -5,15 +5,15 @@ Nothing is remembered over the end of the process: a piece must be safe to begin
 
 from collections.abc import Callable
 from concurrent import futures
-from contextvars import copy_context
-from threading import Thread
+
+from bench_service.jobs.background import in_background
 
 
 class Beside:
     """Pieces of work that go on, and outcomes that nobody has asked for yet. For one thread that asks."""
 
     def __init__(self, tell: Callable[[], None]) -> None:
-        """`tell`: called, in its thread, when a piece is done."""
+        """`tell`: called, in any thread, when a piece is done."""
         self._tell = tell
         self._pieces: dict[str, futures.Future[str]] = {}
 
@@ -24,7 +24,8 @@ class Beside:
         """
         piece = self._pieces.get(key)
         if piece is None:
-            self._pieces[key] = self._begin(key, work)
+            self._pieces[key] = in_background(f"beside {key}", work)
+            self._pieces[key].add_done_callback(lambda _: self._tell())
             return None
         if not piece.done():
             return None
@@ -34,18 +35,3 @@ class Beside:
     def wait(self, seconds: float) -> None:
         """Wait for what goes on, all in all for so long [s]; what lasts longer ends with the process."""
         futures.wait(self._pieces.values(), seconds)
-
-    def _begin(self, key: str, work: Callable[[], str]) -> futures.Future[str]:
-        """In a thread that the process does not wait for at its end, as it would for an executor's."""
-        piece: futures.Future[str] = futures.Future()
-        piece.add_done_callback(lambda _: self._tell())
-
-        def run() -> None:
-            try:
-                piece.set_result(work())
-            except Exception as failure:  # raised again where it is asked for
-                piece.set_exception(failure)
-
-        context = copy_context()  # lines of the log are about the same things
-        Thread(target=context.run, args=(run,), name=f"beside {key}", daemon=True).start()
-        return piece

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from procedures.core.limits import bounds
 from procedures.core.units import converted
 
 NAME = r"^[a-z0-9][a-z0-9_-]{0,63}$"
@@ -47,9 +48,7 @@ class StepLimit(Document):
         return self
 
     def __str__(self) -> str:
-        bounds = [f"≥ {self.minimum:g}"] if self.minimum is not None else []
-        bounds += [f"≤ {self.maximum:g}"] if self.maximum is not None else []
-        return f"{' and '.join(bounds)} {self.unit}"
+        return bounds(self.minimum, self.maximum, self.unit)
 
     def excludes(self, other: "StepLimit") -> bool:
         """Whether all that passes the other limit of the same quantity is below this one's minimum."""

@@ -120,9 +120,9 @@ class Examiner:
         procedure, prediction = plan.procedure, plan.prediction
         names = None if procedure.quantities is None else procedure.quantities(plan.parameters, plan.context)
         _require_known(step, where, names)
-        _require_units(step, where, prediction.uncertainties)
         warnings = [*prediction.warnings]
-        warnings += [w for limit in step.limits if (w := _unresolved(limit, prediction.uncertainties)) is not None]
+        for position, limit in enumerate(step.limits):
+            warnings += _unresolved(limit, f"{where}.limits.{position}", prediction.uncertainties)
         if procedure.calibrations is not NO_CALIBRATIONS:
             progress.calibrated = True
             progress.calibrating.add(step.name)
@@ -213,24 +213,15 @@ def _require_calibrations(step: Step, where: str, progress: _Progress) -> None:
             raise BadParameter(f"{where}.calibrations_of.{position}", name, allowed)
 
 
-def _require_units(step: Step, where: str, predicted: tuple[PredictedUncertainty, ...]) -> None:
-    """Refuse a limit in a unit of another kind than the quantity's, where that is known."""
-    for position, limit in enumerate(step.limits):
-        found = next((p for p in predicted if _same(p.name, limit.quantity)), None)
-        if found is None:
-            continue
-        try:
-            converted(1.0, found.unit, limit.unit)
-        except ValueError as error:
-            raise BadParameter(f"{where}.limits.{position}.unit", limit.unit, f"{limit.quantity}: {error}") from error
-
-
-def _unresolved(limit: StepLimit, predicted: tuple[PredictedUncertainty, ...]) -> str | None:
-    """A limit that is narrower than what the plan will know the quantity to."""
+def _unresolved(limit: StepLimit, where: str, predicted: tuple[PredictedUncertainty, ...]) -> list[str]:
+    """Warn of a limit that is narrower than what the plan will know the quantity to; refuse a unit of another kind."""
     found = next((p for p in predicted if _same(p.name, limit.quantity)), None)
     if found is None:
-        return None
-    uncertainty = converted(found.standard_uncertainty, found.unit, limit.unit)
+        return []
+    try:
+        uncertainty = converted(found.standard_uncertainty, found.unit, limit.unit)
+    except ValueError as error:
+        raise BadParameter(f"{where}.unit", limit.unit, f"{limit.quantity}: {error}") from error
     width = (
         0.5 * (limit.maximum - limit.minimum)
         if limit.maximum is not None and limit.minimum is not None
@@ -238,11 +229,11 @@ def _unresolved(limit: StepLimit, predicted: tuple[PredictedUncertainty, ...]) -
     )
     sign_alone = width == 0.0 and None in (limit.minimum, limit.maximum)
     if uncertainty <= width or sign_alone:
-        return None
-    return (
+        return []
+    return [
         f"the limit of {limit.quantity} cannot be resolved: ±{width:.3g} {limit.unit} is asked for, the plan's "
         f"standard uncertainty is {uncertainty:.3g} {limit.unit}"
-    )
+    ]
 
 
 def _same(predicted: str, quantity: str) -> bool:

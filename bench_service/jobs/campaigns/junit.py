@@ -11,7 +11,7 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 from bench_service.jobs.campaigns.run import ENDED, CampaignRun, StepRun, StepState
-from procedures.core.limits import Check, Verdict
+from procedures.core.limits import Check, Verdict, bounds
 
 if TYPE_CHECKING:
     from junitparser import TestCase, TestSuite
@@ -131,11 +131,9 @@ def _case(run: CampaignRun, step: StepRun, name: str) -> "TestCase":
 def _sentence(check: Check) -> str:
     """The value beside its limit, as a person reads it."""
     limit = check.limit
-    bounds = [f"≥ {limit.minimum:.6g}"] if limit.minimum is not None else []
-    bounds += [f"≤ {limit.maximum:.6g}"] if limit.maximum is not None else []
     value = f"{check.value:.6g}" if isfinite(check.value) else "no finite number"
     uncertainty = "" if check.standard_uncertainty is None else f" ± {check.standard_uncertainty:.2g}"
-    return f"{check.name} = {value}{uncertainty} {limit.unit}, limit {' and '.join(bounds)} {limit.unit}"
+    return f"{check.name} = {value}{uncertainty} {limit.unit}, limit {bounds(limit.minimum, limit.maximum, limit.unit)}"
 
 
 def _seconds(begun: datetime | None, ended: datetime | None) -> float:
