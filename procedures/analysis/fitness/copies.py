@@ -1,0 +1,58 @@
+"""Samples that are copies: a channel repeats the one before far more often than its own small changes allow.
+
+Where a quantity is rounded to multiples of q and its changes are large beside q, a change of nothing is about as likely
+as one of +q or −q. Many more repeats than changes of one step were made by somebody: a table of two rates filled by
+copying, or a row sent more than once.
+"""
+
+import numpy as np
+
+from procedures.analysis.fitness.pieces import Samples
+from procedures.core.arrays import Array
+
+COARSE = 3.0
+"""Steps that half of the changes must be larger than, for the repeats to prove anything."""
+TIMES = 3.0
+"""Repeats for each change of one step, of which half a one was to be expected."""
+LEAST = 50
+LEAST_SHARE = 0.01
+"""Copies below this part are left to the runs."""
+STRIDES = (5, 17)
+"""Every so many differences are looked at, in the first pieces and in later ones; primes, for each phase of copying."""
+FIRST = 8
+"""Pieces that are looked at closely."""
+
+
+class Copies:
+    """Counts repeats, changes of one step, and larger ones, of every channel."""
+
+    def __init__(self, channels: int) -> None:
+        self.step = np.full(channels, np.inf)
+        """The least change that was seen [raw], (channels,)."""
+        self._same = np.zeros(channels, np.int64)
+        self._one = np.zeros(channels, np.int64)
+        self._large = np.zeros(channels, np.int64)
+        self._looked = 0
+        self._pieces = 0
+
+    def add(self, d: Samples, resolution: Array) -> None:
+        """Differences (channels, n); `resolution` [raw] of integer channels, 0 of others: there the least change."""
+        stride = STRIDES[0] if self._pieces < FIRST else STRIDES[1]
+        some = np.abs(d[:, self._pieces % stride :: stride].astype(np.float64))
+        self._pieces += 1
+        if not some.shape[1]:
+            return
+        least = np.min(np.where(some > 0.0, some, np.inf), axis=1)
+        self.step = np.where(resolution > 0.0, resolution, np.minimum(self.step, least))
+        step = np.where(np.isfinite(self.step), self.step, 1.0)[:, None]
+        same = some == 0.0
+        self._same += np.count_nonzero(same, axis=1)
+        self._one += np.count_nonzero((some < 1.5 * step) & ~same, axis=1)
+        self._large += np.count_nonzero(some >= COARSE * step, axis=1)
+        self._looked += some.shape[1]
+
+    def copied(self) -> list[int]:
+        """Columns of the channels whose repeats are beyond what their changes allow."""
+        changed = self._looked - self._same
+        many = self._same > np.maximum(LEAST_SHARE * self._looked, LEAST) + TIMES * self._one
+        return np.flatnonzero(many & (self._large > 0.5 * changed)).tolist()

@@ -1,0 +1,159 @@
+"""Runs of exact repeats longer than chance: rows that hang, triads or channels that stand still while others move."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.analysis.fitness.pieces import Mask
+from procedures.core.arrays import Array
+
+SHORTEST = 5
+"""Repeats in a row, at least."""
+BUSY = 0.5
+"""A channel bears witness where less than so large a part of its samples repeat the one before."""
+CHANCE = 1e-9
+"""Allowed of a false alarm of a recording and a group."""
+WINDOW = 256
+"""Samples whose part of repeats is taken at a time: the usual one of a piece is what a run is judged against."""
+LEAST_PART = 1e-3
+"""Part of repeats that a channel is taken to have at least."""
+KEPT = 1000
+"""Runs that are kept of a group."""
+SAME = 0.8
+"""Part of a run that lies within one of a larger group for it to be the same."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Samples `first_index` … `first_index` + `length` − 1, each of which repeats the one before it."""
+
+    first_index: int
+    length: int
+
+
+@dataclass
+class Group:
+    """Channels that are looked at together: all of them, a triad, or one."""
+
+    rows: tuple[int, ...]
+    runs: list[Run] = field(default_factory=list[Run])
+    lost: int = 0
+    """Runs beyond those that are kept."""
+    open: int = 0
+    """Repeats at the end of the piece before, that a run may go on from."""
+
+
+class Stalls:
+    """Gathers the runs of all groups piece by piece."""
+
+    def __init__(self, groups: Sequence[tuple[int, ...]], channels: int, at_rest: bool) -> None:
+        """`groups` of channels' columns, the larger ones first."""
+        self._groups = [Group(rows) for rows in groups]
+        self._part = np.full(channels, np.nan)
+        self._quantile = 0.5 if at_rest else 0.9
+        self.repeats = np.zeros(channels, np.int64)
+        self._seen = 0
+
+    def add(self, same: Mask, zeros: NDArray[np.int64], start: int) -> None:
+        """Which samples repeat the one before, (channels, n), how many in each, and the index of the first of them."""
+        if not same.shape[1]:
+            return
+        self.repeats += zeros
+        self._seen += same.shape[1]
+        part: Array | None = None
+        few = (zeros < SHORTEST).tolist()
+        for group in self._groups:
+            if not group.open and any(few[c] for c in group.rows):
+                few_left = [same[c, -SHORTEST:] for c in group.rows]
+                group.open = _trailing(few_left[0] if len(few_left) == 1 else np.logical_and.reduce(few_left))
+                continue
+            rows = same[group.rows[0]] if len(group.rows) == 1 else np.logical_and.reduce(same[list(group.rows)])
+            if not group.open and not _has_run(rows):
+                group.open = _trailing(rows)
+                continue
+            part = self._usual(same) if part is None else part
+            self._runs(group, rows, start, part)
+        if part is None and np.isnan(self._part).any():
+            self._usual(same)
+
+    def finish(self) -> list[Group]:
+        """Every group with the runs that are its own, beyond chance against the whole recording."""
+        for group in self._groups:
+            if group.open:
+                part = np.where(np.isnan(self._part), LEAST_PART, self._part)
+                self._keep(group, self._seen - group.open, group.open, part, shift=1)
+        larger: list[Run] = []
+        for group in self._groups:
+            inside = sum(run.length for run in group.runs)
+            whole = (self.repeats - inside) / max(self._seen - inside, 1)
+            own = [run for run in group.runs if self._beyond_chance(group, run.length, whole)]
+            group.runs = [run for run in own if not _within(run, larger)]
+            larger += group.runs
+        return self._groups
+
+    def _usual(self, same: Mask) -> Array:
+        """Usual part of repeats of each channel in a window of this piece, (channels,); windows that repeat throughout
+        are those that are to be judged. Where there is no other the piece before tells it.
+        """
+        width = WINDOW if same.shape[1] >= 2 * WINDOW else same.shape[1]
+        windows = same.shape[1] // width
+        parts = same[:, : windows * width].reshape(len(same), windows, width).mean(axis=2)
+        for c, row in enumerate(parts):
+            moving = row[row < 1.0]
+            if len(moving) and (windows > 1 or np.isnan(self._part[c])):
+                self._part[c] = np.quantile(moving, self._quantile)
+        return np.where(np.isnan(self._part), LEAST_PART, self._part)
+
+    def _runs(self, group: Group, rows: Mask, start: int, part: Array) -> None:
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
+        begins, ends = edges[::2], edges[1::2]
+        lengths = ends - begins
+        carried, group.open = group.open, 0
+        if carried and not (len(begins) and begins[0] == 0):
+            self._keep(group, start - carried, carried, part)
+        elif carried:
+            lengths[0] += carried
+        if len(ends) and ends[-1] == len(rows):
+            group.open = int(lengths[-1])
+            begins, ends, lengths = begins[:-1], ends[:-1], lengths[:-1]
+        for i in np.flatnonzero(lengths >= SHORTEST).tolist():
+            self._keep(group, start + int(ends[i]) - int(lengths[i]), int(lengths[i]), part)
+
+    def _keep(self, group: Group, first: int, length: int, part: Array, shift: int = 0) -> None:
+        if length < SHORTEST or not self._beyond_chance(group, length, part):
+            return
+        if len(group.runs) < KEPT:
+            group.runs.append(Run(first + shift, length))
+        else:
+            group.lost += 1
+
+    def _beyond_chance(self, group: Group, length: int, part: Array) -> bool:
+        """Whether ``N·Π p_c^L`` over the channels that bear witness is below `CHANCE`."""
+        p = part[list(group.rows)]
+        witnesses = p[p < BUSY]
+        if not len(witnesses) or (len(group.rows) > 1 and len(witnesses) < 2):
+            return False
+        chance = np.log(max(self._seen, 1)) + length * float(np.sum(np.log(np.maximum(witnesses, LEAST_PART))))
+        return bool(chance < np.log(CHANCE))
+
+
+def _has_run(rows: Mask) -> bool:
+    """Whether `SHORTEST` repeats stand in a row."""
+    if len(rows) < SHORTEST:
+        return bool(rows.any())
+    two = rows[1:] & rows[:-1]
+    return bool((two[3:] & two[:-3] & rows[2:-2]).any())
+
+
+def _trailing(rows: Mask) -> int:
+    """Repeats at the very end."""
+    changed = np.flatnonzero(~rows[-SHORTEST:])
+    return min(len(rows), SHORTEST) - 1 - int(changed[-1]) if len(changed) else min(len(rows), SHORTEST)
+
+
+def _within(run: Run, larger: Sequence[Run]) -> bool:
+    stop = run.first_index + run.length
+    shared = sum(max(0, min(stop, o.first_index + o.length) - max(run.first_index, o.first_index)) for o in larger)
+    return shared > SAME * run.length
