@@ -7,9 +7,11 @@ same gap at every scale, a bend one that grows with h: so a quarter of the cells
 on either side as well, which an outlier does not move.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from procedures.core.arrays import Array
 
@@ -23,6 +25,8 @@ QUANTILE, NORMAL = 0.8, 1.2815515655446004
 """The spread is taken from this quantile of the magnitudes: one step in sixteen positions hardly moves it."""
 SHARP = 0.5
 """Part of a gap that must be there at a quarter of the scale, and between the medians."""
+SEEN = 6.0
+"""A step so many times the spread at a scale is seen at that scale."""
 MOST = 12
 """Steps of one series that are told apart."""
 TRIES = 40
@@ -90,12 +94,13 @@ def _of_row(y: Array, floor: float, uneven: Array) -> list[Change]:
     found: list[Change] = []
     barred = np.zeros(len(y) + 1, np.bool_)
     for _ in range(TRIES):
-        best = _best(y, uneven, barred)
+        scales = [_Scale.of(y, h, uneven) for h in _scales(len(y))]
+        best = _best(scales, barred)
         if best is None or len(found) >= MOST:
             break
         k, h = best
         height = _height(y, k, h)
-        if abs(height) >= floor and _is_step(y, k, h, height):
+        if abs(height) >= floor and _is_step(y, k, h, height) and _is_sharp(scales, k, height):
             found.append(Change(k, height))
             y[k:] -= height
             # The step lies within one of the cells at the border, which would pass for an outlier.
@@ -106,18 +111,40 @@ def _of_row(y: Array, floor: float, uneven: Array) -> list[Change]:
     return sorted(found, key=lambda change: change.index)
 
 
-def _best(y: Array, uneven: Array, barred: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> tuple[int, int] | None:
+@dataclass(frozen=True)
+class _Scale:
+    """The gaps of one row at one scale, and the spread of each border, (K − 2h + 1,)."""
+
+    h: int
+    gaps: Array
+    spread: Array
+
+    @classmethod
+    def of(cls, y: Array, h: int, uneven: Array) -> "_Scale":
+        gaps = _gaps(y[None], h)
+        return cls(h, gaps[0], float(_spread(np.abs(gaps))[0]) * np.maximum(_beside(uneven, h), 1.0))
+
+
+def _best(scales: Sequence[_Scale], barred: NDArray[np.bool_]) -> tuple[int, int] | None:
     """Border and scale of the gap that is most beyond its spread; None where none is."""
     best, most = None, SIGNIFICANT
-    for h in _scales(len(y)):
-        gaps = _gaps(y[None], h)
-        score = np.abs(gaps[0]) / float(_spread(np.abs(gaps))[0])
-        score /= np.maximum(_beside(uneven, h), 1.0)
-        score[barred[h : len(y) - h + 1]] = 0.0
+    for scale in scales:
+        score = np.abs(scale.gaps) / scale.spread
+        score[barred[scale.h : len(score) + scale.h]] = 0.0
         at = int(np.argmax(score))
         if score[at] > most:
-            best, most = (at + h, h), float(score[at])
+            best, most = (at + scale.h, scale.h), float(score[at])
     return best
+
+
+def _is_sharp(scales: Sequence[_Scale], k: int, height: float) -> bool:
+    """Whether the gap is there at the least scale that could show it: that of a bend or of a transient is not."""
+    for scale in scales:
+        near = slice(max(k - 1 - scale.h, 0), k + 2 - scale.h)
+        gaps, spread = scale.gaps[near], scale.spread[near]
+        if len(gaps) and abs(height) > SEEN * float(spread.max()):
+            return bool(np.max(gaps * np.sign(height)) > SHARP * abs(height))
+    return True
 
 
 def _beside(uneven: Array, h: int) -> Array:

@@ -51,8 +51,11 @@ class Copies:
         self._large += np.count_nonzero(some >= COARSE * step, axis=1)
         self._looked += some.shape[1]
 
-    def copied(self) -> list[int]:
-        """Columns of the channels whose repeats are beyond what their changes allow."""
+    def copied(self, in_runs: Array) -> list[int]:
+        """Columns of the channels whose repeats are beyond what their changes allow.
+
+        `in_runs`: part of all samples (channels,) that repeat in long runs, which are another matter.
+        """
         changed = self._looked - self._same
-        many = self._same > np.maximum(LEAST_SHARE * self._looked, LEAST) + TIMES * self._one
+        many = self._same - in_runs * self._looked > np.maximum(LEAST_SHARE * self._looked, LEAST) + TIMES * self._one
         return np.flatnonzero(many & (self._large > 0.5 * changed)).tolist()

@@ -145,13 +145,12 @@ class Readings:
         found: dict[str, Doubt] = {}
         for group, value in read.items():
             names = [self._names[i] for i in group]
-            if value > limit:
-                found.update(self._told(group, names, value, expected, units.EARTH_RATE, candidates))
-                continue
             walk = float(np.max((noise * np.abs(self._gain))[list(group)])) / self._rate_hz**0.5
             sampled = all(self._channels[i].quantity is Quantity.ANGULAR_RATE for i in group)
-            if value > DOUBTFUL_RATE_RAD_S or (sampled and walk > DOUBTFUL_WALK):
-                found.update(dict.fromkeys(names, _degrees(names, value, walk if sampled else None)))
+            if value > limit and (good or value * units.DEG > limit or not sampled):
+                found.update(self._told(group, names, value, expected, units.EARTH_RATE, candidates))
+            elif value > DOUBTFUL_RATE_RAD_S or (sampled and walk > DOUBTFUL_WALK):
+                found.update(dict.fromkeys(names, _degrees(names, value, expected, walk if sampled else None)))
         return found
 
     def _told(
@@ -200,12 +199,13 @@ def _factor(ratio: float) -> float | None:
     return min(near, key=lambda f: abs(ratio / f - 1.0), default=None)
 
 
-def _degrees(names: Sequence[str], value: float, walk: float | None) -> Doubt:
+def _degrees(names: Sequence[str], value: float, expected: str, walk: float | None) -> Doubt:
     """Gyros whose reading at rest or whose noise is that of a value in degrees."""
     shown = f"channels {names[0]} … {names[-1]} together read" if len(names) > 1 else f"channel {names[0]} reads"
     noise = "" if walk is None else f", with a random walk of about {walk / units.DEG_PER_SQRT_HOUR:.3g} deg/√h"
     return Doubt(
-        f"{shown} {value:.4g} rad/s at rest, {value / units.DEG_PER_HOUR:.4g} deg/h or {value / units.EARTH_RATE:.3g} "
-        f"times the Earth's rate{noise}: values in deg/s that were declared as rad/s look like this",
+        f"{shown} {value:.4g} rad/s where {expected} was expected, {value / units.DEG_PER_HOUR:.4g} deg/h or "
+        f"{value / units.EARTH_RATE:.3g} times the Earth's rate{noise}: values in deg/s declared as "
+        "rad/s look like this",
         False,
     )

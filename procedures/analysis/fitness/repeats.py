@@ -34,9 +34,12 @@ class Repeats:
         self.rows += repeated
         self.pairs += count
 
-    def held(self) -> list[int]:
-        """The channels that show by changing only together that rows are sent more than once; none, if they do not."""
-        if self.rows < max(20, HELD_SHARE * self.pairs) or self.rows == self.pairs:
+    def held(self, in_runs: int) -> list[int]:
+        """The channels that show by changing only together that rows are sent more than once; none, if they do not.
+
+        `in_runs`: repeated rows that hang in long runs, which are another matter.
+        """
+        if self.rows - in_runs < max(20, HELD_SHARE * self.pairs) or self.rows == self.pairs:
             return []
         changed = (self.pairs - self.zeros) / (self.pairs - self.rows)
         together = np.flatnonzero(changed >= HELD)

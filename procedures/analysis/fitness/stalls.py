@@ -11,12 +11,15 @@ from procedures.core.arrays import Array
 
 SHORTEST = 5
 """Repeats in a row, at least."""
-BUSY = 0.5
+BUSY = 0.6
 """A channel bears witness where less than so large a part of its samples repeat the one before."""
 CHANCE = 1e-9
 """Allowed of a false alarm of a recording and a group."""
-WINDOW = 256
-"""Samples whose part of repeats is taken at a time: the usual one of a piece is what a run is judged against."""
+WINDOW = 64
+"""Samples whose part of repeats is taken at a time."""
+USUAL = 0.8
+"""A run is judged against this quantile of the windows of its piece: a channel whose level drifts between two counts
+repeats more often at some times than at others."""
 LEAST_PART = 1e-3
 """Part of repeats that a channel is taken to have at least."""
 KEPT = 1000
@@ -48,12 +51,13 @@ class Group:
 class Stalls:
     """Gathers the runs of all groups piece by piece."""
 
-    def __init__(self, groups: Sequence[tuple[int, ...]], channels: int, at_rest: bool) -> None:
+    def __init__(self, groups: Sequence[tuple[int, ...]], channels: int) -> None:
         """`groups` of channels' columns, the larger ones first."""
         self._groups = [Group(rows) for rows in groups]
         self._part = np.full(channels, np.nan)
-        self._quantile = 0.5 if at_rest else 0.9
         self.repeats = np.zeros(channels, np.int64)
+        self.inside = np.zeros(channels, np.int64)
+        """Repeats that lie in runs, once these are known."""
         self._seen = 0
 
     def add(self, same: Mask, zeros: NDArray[np.int64], start: int) -> None:
@@ -91,6 +95,7 @@ class Stalls:
             own = [run for run in group.runs if self._beyond_chance(group, run.length, whole)]
             group.runs = [run for run in own if not _within(run, larger)]
             larger += group.runs
+            self.inside[list(group.rows)] += sum(run.length for run in group.runs)
         return self._groups
 
     def _usual(self, same: Mask) -> Array:
@@ -103,7 +108,7 @@ class Stalls:
         for c, row in enumerate(parts):
             moving = row[row < 1.0]
             if len(moving) and (windows > 1 or np.isnan(self._part[c])):
-                self._part[c] = np.quantile(moving, self._quantile)
+                self._part[c] = np.quantile(moving, USUAL)
         return np.where(np.isnan(self._part), LEAST_PART, self._part)
 
     def _runs(self, group: Group, rows: Mask, start: int, part: Array) -> None:

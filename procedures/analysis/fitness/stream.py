@@ -23,7 +23,7 @@ from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 from procedures.core.recording import TRIADS, Channel, Quantity, RawArray, Recording
 
-_SPOILS_NOISE = (Kind.SATURATED, Kind.REPEATED, Kind.WRAPPED, Kind.CONSTANT)
+_SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT)
 
 
 class FitnessStream:
@@ -48,7 +48,7 @@ class FitnessStream:
         self._edges = [(Edge(+1), Edge(-1)) for _ in range(number)]
         self._bits = [Bits() for _ in range(number)]
         self._repeats = Repeats(number)
-        self._stalls = Stalls(_groups(self._channels), number, self._settings.at_rest)
+        self._stalls = Stalls(_groups(self._channels), number)
         self._copies = Copies(number)
         self._jumps = Jumps(number)
         self._levels = Levels(number, count)
@@ -147,12 +147,16 @@ class FitnessStream:
 
     def _of_repeats(self, found: list[list[Finding]], words: Wording) -> None:
         """Rows sent more than once, copied channels, hung links, channels that stand still."""
-        held = self._repeats.held()
+        groups = self._stalls.finish()
         rows = self._repeats.rows
+        hung = sum(run.length for group in groups if len(group.rows) == len(self._channels) for run in group.runs)
+        held = self._repeats.held(hung)
         live = [c for c, f in enumerate(found) if not any(x.kind in (Kind.CONSTANT, Kind.SATURATED) for x in f)]
-        copied = [c for c in self._copies.copied() if c in live and c not in held]
+        copied = [
+            c for c in self._copies.copied(self._stalls.inside / max(words.seen, 1)) if c in live and c not in held
+        ]
         witnesses = [c for c in live if self._repeats.zeros[c] < 0.5 * self._repeats.pairs and c not in copied]
-        for group in self._stalls.finish():
+        for group in groups:
             if not group.runs or any(c in held or c in copied for c in group.rows):
                 continue
             if len(group.rows) == len(self._channels):
@@ -215,7 +219,8 @@ class FitnessStream:
         step = np.where(np.isfinite(self._copies.step), self._copies.step, 0.0)
         level, noise = time_flaws.steps_and_noise(cells, step)
         for c, channel in enumerate(self._channels):
-            if any(f.kind in _SPOILS_NOISE and f.severity is Severity.REFUSE for f in found[c]):
+            refused = any(f.kind is Kind.SATURATED and f.severity is Severity.REFUSE for f in found[c])
+            if refused or any(f.kind in _SPOILS_NOISE for f in found[c]):
                 continue
             jumps = self._jumps
             count = int(jumps.outlier_count[c])

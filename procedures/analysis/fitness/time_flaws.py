@@ -20,7 +20,9 @@ SHORT_SHARE = 1e-3
 LEAST_CHANGE = float(np.log(1.4))
 """Of the noise, in the logarithm: temperature and the place of a level between two counts change it by less."""
 LEAST_NOISE = 0.5
-"""Resolutions that the noise must have for its changes, and for small steps of the level, to be more than rounding."""
+"""Resolutions that the noise must have for small steps of the level to be more than rounding."""
+FINE_NOISE = 1.0
+"""Resolutions that the noise must have for its changes to be more than that."""
 ROUNDING = 2.0
 """Resolutions that a step must have where the noise is less."""
 
@@ -31,13 +33,15 @@ def steps_and_noise(cells: CellLevels, resolution: Array) -> tuple[list[list[Cha
     usual = np.median(noise, axis=1) if noise.shape[1] else np.zeros(len(noise))
     fine = usual > LEAST_NOISE * resolution
     floor = np.where(fine, 0.0, ROUNDING * resolution)
-    least = np.maximum(noise, 1e-3 * usual[:, None] + np.finfo(np.float64).tiny)
+    usual = np.where(usual > 0.0, usual, 1.0)
+    least = np.maximum(noise, 1e-3 * usual[:, None])
     of_noise = changes(np.log(least), np.full(len(noise), LEAST_CHANGE))
-    uneven = np.repeat(np.maximum(least / np.maximum(usual, np.finfo(np.float64).tiny)[:, None], 1.0), cells.group, 1)
+    uneven = np.repeat(np.maximum(least / usual[:, None], 1.0), cells.group, 1)
     short = cells.means.shape[1] - uneven.shape[1]
     uneven = np.hstack([uneven, np.ones((len(uneven), short))]) if short > 0 else uneven
     of_level = changes(cells.means, floor, uneven)
-    return of_level, [found if is_fine else [] for found, is_fine in zip(of_noise, fine.tolist(), strict=True)]
+    finer = (usual > FINE_NOISE * resolution).tolist()
+    return of_level, [found if is_fine else [] for found, is_fine in zip(of_noise, finer, strict=True)]
 
 
 def outliers(channel: Channel, jumps: Sequence[Jump], count: int, words: Wording) -> list[Finding]:
