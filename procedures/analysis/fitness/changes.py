@@ -2,7 +2,7 @@
 
 At every border k between two cells a line is fitted to the h cells on either side; where the two lines meet the border
 they differ by the gap G_h(k), which is nothing for a straight drift. The spread of G_h over the whole series is that of
-its own noise at that scale, white or slow, so a gap counts only where it is `SIGNIFICANT` times it. A step opens the
+its own noise at that scale, white or slow, so a gap counts only where it is many times it. A step opens the
 same gap at every scale, a bend one that grows with h: so a quarter of the cells must show half of it, and the medians
 on either side as well, which an outlier does not move.
 """
@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from procedures.core.arrays import Array
 
-SIGNIFICANT = 8.0
-"""Standard deviations of the gap over the series."""
+SIGNIFICANT, FLAT = 8.0, 6.5
+"""Spreads that a gap must have, of lines and of means. The spread of a short series is known to 20 %; 10 000 borders
+and scales of a recording then give a false alarm in some thousands."""
 SHORTEST = 4
 """Cells on either side of a border, at least."""
 POSITIONS = 16
@@ -41,10 +42,11 @@ class Change:
     height: float
 
 
-def changes(series: Array, floor: Array, uneven: Array | None = None) -> list[list[Change]]:
+def changes(series: Array, floor: Array, uneven: Array | None = None, *, flat: bool = False) -> list[list[Change]]:
     """Steps of each row of `series` (channels, K), none smaller than its `floor` (channels,), in order.
 
     `uneven` (channels, K), at least 1: how many times its usual noise a row has at each cell; a gap counts the less.
+    `flat`: the series does not drift: means stand for the lines, which makes the gap twice as certain.
     """
     found: list[list[Change]] = [[] for _ in series]
     if series.shape[1] < POSITIONS * SHORTEST:
@@ -52,10 +54,10 @@ def changes(series: Array, floor: Array, uneven: Array | None = None) -> list[li
     centred = series - np.median(series, axis=1, keepdims=True)
     most = np.zeros(len(series))
     for h in _scales(series.shape[1]):
-        gaps = np.abs(_gaps(centred, h))
+        gaps = np.abs(_gaps(centred, h, flat))
         most = np.maximum(most, np.max(gaps / _spread(gaps)[:, None], axis=1, initial=0.0))
-    for c in np.flatnonzero(most > SIGNIFICANT):
-        found[c] = _of_row(centred[c], float(floor[c]), np.ones(series.shape[1]) if uneven is None else uneven[c])
+    for c in np.flatnonzero(most > (FLAT if flat else SIGNIFICANT)):
+        found[c] = _of_row(centred[c], float(floor[c]), np.ones(series.shape[1]) if uneven is None else uneven[c], flat)
     return found
 
 
@@ -63,13 +65,15 @@ def _scales(cells: int) -> list[int]:
     return [1 << j for j in range(2, 20) if POSITIONS << j <= cells]
 
 
-def _gaps(y: Array, h: int) -> Array:
+def _gaps(y: Array, h: int, flat: bool) -> Array:
     """G_h at the borders h … K − h, (channels, K − 2h + 1)."""
     j = np.arange(y.shape[1], dtype=np.float64)
     zero = np.zeros((len(y), 1))
     s0, s1 = np.hstack([zero, np.cumsum(y, axis=1)]), np.hstack([zero, np.cumsum(y * j, axis=1)])
     k = np.arange(h, y.shape[1] - h + 1)
     left, right = s0[:, k] - s0[:, k - h], s0[:, k + h] - s0[:, k]
+    if flat:
+        return (right - left) / h
     near_left = (k - 0.5) * left - (s1[:, k] - s1[:, k - h])
     near_right = s1[:, k + h] - s1[:, k] - (k - 0.5) * right
     return _intercept(right, near_right, h) - _intercept(left, near_left, h)
@@ -88,18 +92,18 @@ def _spread(gaps: Array) -> Array:
     return np.maximum(np.partition(gaps, at, axis=1)[:, at] / NORMAL, np.finfo(np.float64).tiny)
 
 
-def _of_row(y: Array, floor: float, uneven: Array) -> list[Change]:
+def _of_row(y: Array, floor: float, uneven: Array, flat: bool) -> list[Change]:
     """The largest first; each is taken out before the next is sought."""
     y = y.copy()
     found: list[Change] = []
     barred = np.zeros(len(y) + 1, np.bool_)
     for _ in range(TRIES):
-        scales = [_Scale.of(y, h, uneven) for h in _scales(len(y))]
-        best = _best(scales, barred)
+        scales = [_Scale.of(y, h, uneven, flat) for h in _scales(len(y))]
+        best = _best(scales, barred, FLAT if flat else SIGNIFICANT)
         if best is None or len(found) >= MOST:
             break
         k, h = best
-        height = _height(y, k, h)
+        height = _height(y, k, h, flat)
         if abs(height) >= floor and _is_step(y, k, h, height) and _is_sharp(scales, k, height):
             found.append(Change(k, height))
             y[k:] -= height
@@ -120,14 +124,14 @@ class _Scale:
     spread: Array
 
     @classmethod
-    def of(cls, y: Array, h: int, uneven: Array) -> "_Scale":
-        gaps = _gaps(y[None], h)
+    def of(cls, y: Array, h: int, uneven: Array, flat: bool) -> "_Scale":
+        gaps = _gaps(y[None], h, flat)
         return cls(h, gaps[0], float(_spread(np.abs(gaps))[0]) * np.maximum(_beside(uneven, h), 1.0))
 
 
-def _best(scales: Sequence[_Scale], barred: NDArray[np.bool_]) -> tuple[int, int] | None:
+def _best(scales: Sequence[_Scale], barred: NDArray[np.bool_], most: float) -> tuple[int, int] | None:
     """Border and scale of the gap that is most beyond its spread; None where none is."""
-    best, most = None, SIGNIFICANT
+    best = None
     for scale in scales:
         score = np.abs(scale.gaps) / scale.spread
         score[barred[scale.h : len(score) + scale.h]] = 0.0
@@ -154,11 +158,12 @@ def _beside(uneven: Array, h: int) -> Array:
     return np.maximum(s[k] - s[k - h], s[k + h] - s[k]) / h
 
 
-def _height(y: Array, k: int, h: int) -> float:
+def _height(y: Array, k: int, h: int, flat: bool) -> float:
     """The gap at border k without the two cells beside it, within either of which the step may lie."""
     u = np.arange(1, h) + 0.5
     left, right = y[k - h : k - 1][::-1], y[k + 1 : k + h]
-    return float(right.mean() - left.mean() - (_slope(u, right) - _slope(u, left)) * u.mean())
+    apart = float(right.mean() - left.mean())
+    return apart if flat else apart - float((_slope(u, right) - _slope(u, left)) * u.mean())
 
 
 def _is_step(y: Array, k: int, h: int, height: float) -> bool:

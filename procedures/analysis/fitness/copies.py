@@ -17,10 +17,10 @@ TIMES = 3.0
 LEAST = 50
 LEAST_SHARE = 0.01
 """Copies below this part are left to the runs."""
-STRIDES = (5, 17)
-"""Every so many differences are looked at, in the first pieces and in later ones; primes, for each phase of copying."""
-FIRST = 8
-"""Pieces that are looked at closely."""
+STRIDE = 13
+"""Every so many differences are looked at, from another one on in each piece, so that each phase of copying comes."""
+FIRST = 4
+"""Pieces of which each is looked at."""
 
 
 class Copies:
@@ -37,7 +37,7 @@ class Copies:
 
     def add(self, d: Samples, resolution: Array) -> None:
         """Differences (channels, n); `resolution` [raw] of integer channels, 0 of others: there the least change."""
-        stride = STRIDES[0] if self._pieces < FIRST else STRIDES[1]
+        stride = 1 if self._pieces < FIRST else STRIDE
         some = np.abs(d[:, self._pieces % stride :: stride].astype(np.float64))
         self._pieces += 1
         if not some.shape[1]:
@@ -50,6 +50,10 @@ class Copies:
         self._one += np.count_nonzero((some < 1.5 * step) & ~same, axis=1)
         self._large += np.count_nonzero(some >= COARSE * step, axis=1)
         self._looked += some.shape[1]
+
+    def by_chance(self, c: int) -> float:
+        """Part of the samples that repeat the one before because the quantity did: half as many as change by a step."""
+        return float(self._one[c]) / max(2 * self._looked, 1)
 
     def copied(self, in_runs: Array) -> list[int]:
         """Columns of the channels whose repeats are beyond what their changes allow.

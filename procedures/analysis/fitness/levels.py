@@ -9,7 +9,7 @@ from procedures.core.arrays import Array
 
 LEAST_CELLS = 1024
 """Cells of a recording of known length, at least where it has so many samples, and less than twice as many."""
-NOISE_SAMPLES = 16
+NOISE_SAMPLES = 32
 """Differences that one value of the noise rests on, at least."""
 STRIDE = 8
 """Every so many differences tell the noise of a long cell."""
@@ -40,7 +40,7 @@ class Levels:
         """`count`: samples that are announced."""
         shortest = UNKNOWN if count is None else max(1, count // LEAST_CELLS)
         self._size = min(PIECE, 1 << (shortest.bit_length() - 1))
-        self._stride = max(1, min(STRIDE, self._size // NOISE_SAMPLES))
+        self._stride = max(1, min(STRIDE, self._size // NOISE_SAMPLES // 2))
         self._means: list[Array] = [np.empty((channels, 0))]
         self._noise: list[Array] = [np.empty((channels, 0))]
 

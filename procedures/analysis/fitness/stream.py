@@ -179,6 +179,8 @@ class FitnessStream:
         for together in self._alike(copied):
             names = [self._channels[c].name for c in together]
             repeats = int(self._repeats.zeros[together[0]])
+            # A copied sample cannot have repeated by chance; of the others some did, which are no copies.
+            repeats -= round(self._copies.by_chance(together[0]) * words.seen)
             finding = time_flaws.copied(names, repeats, not witnesses and not held, words, self._settings)
             for c in together:
                 found[c].append(finding)

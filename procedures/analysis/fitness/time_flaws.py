@@ -35,7 +35,7 @@ def steps_and_noise(cells: CellLevels, resolution: Array) -> tuple[list[list[Cha
     floor = np.where(fine, 0.0, ROUNDING * resolution)
     usual = np.where(usual > 0.0, usual, 1.0)
     least = np.maximum(noise, 1e-3 * usual[:, None])
-    of_noise = changes(np.log(least), np.full(len(noise), LEAST_CHANGE))
+    of_noise = changes(np.log(least), np.full(len(noise), LEAST_CHANGE), flat=True)
     uneven = np.repeat(np.maximum(least / usual[:, None], 1.0), cells.group, 1)
     short = cells.means.shape[1] - uneven.shape[1]
     uneven = np.hstack([uneven, np.ones((len(uneven), short))]) if short > 0 else uneven
