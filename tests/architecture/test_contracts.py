@@ -4,6 +4,7 @@ import ast
 import json
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +18,7 @@ PACKAGES = ("procedures", "simulators", "bench_service")
 SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 FILE_LINES = 300
 FUNCTION_LINES = 60
+FOLDER_MODULES = 25
 BANNED_NAMES = {"utils", "helpers", "common", "base", "manager", "misc", "types"}
 
 
@@ -29,6 +31,11 @@ def test_the_import_contracts_are_kept() -> None:
 def test_no_file_is_longer_than_a_sitting() -> None:
     long = {str(p.relative_to(ROOT)): n for p in SOURCES if (n := len(p.read_text().splitlines())) > FILE_LINES}
     assert not long
+
+
+def test_no_folder_of_the_domain_holds_more_modules_than_a_reader_keeps_in_mind() -> None:
+    folders = Counter(str(p.parent.relative_to(ROOT)) for p in SOURCES if p.is_relative_to(ROOT / "procedures"))
+    assert {folder: n for folder, n in folders.items() if n > FOLDER_MODULES} == {}
 
 
 def test_no_function_is_longer_than_a_page() -> None:
