@@ -5,26 +5,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from procedures.analysis.calibration_summary import (
-    ScalarCheck,
-    TriadSummary,
-    scalar_check,
-    triad_summary,
-)
-from procedures.analysis.estimator import Weighting
-from procedures.analysis.multiposition import TriadFit, fit_triad
-from procedures.analysis.reference import INPUT_UNITS, reference_magnitude, reference_vectors
-from procedures.analysis.reference_temperature import (
+from procedures.analysis.calibration.estimator import Weighting
+from procedures.analysis.calibration.multiposition import TriadFit, fit_triad
+from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
+from procedures.analysis.calibration.reference_temperature import (
     ThermalShare,
     bring_to_reference,
     thermal_share,
     thermal_warnings,
 )
-from procedures.analysis.scalar import fit_scalar, nominal_start, start_from_data
-from procedures.analysis.station_means import StationMeans, station_means
-from procedures.analysis.station_noise import triad_covariance
-from procedures.analysis.table_errors import TableUncertainty, table_errors
-from procedures.analysis.verification import magnitudes
+from procedures.analysis.calibration.scalar import fit_scalar, nominal_start, start_from_data
+from procedures.analysis.calibration.station_means import StationMeans, station_means
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.summary import (
+    ScalarCheck,
+    TriadSummary,
+    scalar_check,
+    triad_summary,
+)
+from procedures.analysis.calibration.table_errors import TableUncertainty, table_errors
+from procedures.analysis.calibration.verification import magnitudes
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.recording import Recording

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from procedures.analysis.calibration.station_noise import mean_covariance
 from procedures.analysis.coloured_noise import cosine_series
-from procedures.analysis.station_noise import mean_covariance
 from procedures.analysis.warm_up.fit import Fit, fit_exponentials
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter

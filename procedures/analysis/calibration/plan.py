@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from procedures.analysis.estimator import Estimator, TableShare, Weighting, estimator, table_share
-from procedures.analysis.reference import reference_vectors
-from procedures.analysis.station_noise import triad_covariance
-from procedures.analysis.station_plan import dwell_for, windows
-from procedures.analysis.table_errors import TableErrors, TableUncertainty, table_errors
-from procedures.analysis.verification import magnitude_sensitivity, predicted_sd
+from procedures.analysis.calibration.estimator import Estimator, TableShare, Weighting, estimator, table_share
+from procedures.analysis.calibration.reference import reference_vectors
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.station_plan import dwell_for, windows
+from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
+from procedures.analysis.calibration.verification import magnitude_sensitivity, predicted_sd
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.recording import Station

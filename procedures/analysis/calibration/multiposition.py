@@ -11,10 +11,10 @@ import numpy as np
 from scipy.linalg import block_diag, null_space
 from scipy.special import chdtrc
 
-from procedures.analysis.estimator import Estimator, TableShare, Weighting, estimator, table_share
-from procedures.analysis.noise_scale import noise_factor
-from procedures.analysis.table_errors import TableErrors
-from procedures.analysis.whitening import whitener
+from procedures.analysis.calibration.estimator import Estimator, TableShare, Weighting, estimator, table_share
+from procedures.analysis.calibration.noise_scale import noise_factor
+from procedures.analysis.calibration.table_errors import TableErrors
+from procedures.analysis.least_squares.whitening import whitener
 from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration, triad_calibration
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from procedures.analysis.allan.deviation import deviation
 from procedures.analysis.allan.statistic import OVERLAPPING_ALLAN, Sizes, decade_sizes
-from procedures.analysis.thermal.cycle_results import AllanFound, LegRegime, Trace
-from procedures.analysis.thermal.cycle_runs import PreparedRun
+from procedures.analysis.thermal.cycle.results import AllanFound, LegRegime, Trace
+from procedures.analysis.thermal.cycle.runs import PreparedRun
 from procedures.analysis.thermal.judgement import Corrects, Soak
 from procedures.analysis.thermal.profile_progress import LegEvidence
 from procedures.core.arrays import Array

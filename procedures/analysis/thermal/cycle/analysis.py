@@ -7,18 +7,18 @@ from math import isfinite
 import numpy as np
 
 from procedures.analysis.thermal.correlation import correlation
-from procedures.analysis.thermal.cycle_forms import RunSoaks, normalised_triad, soak_table, soaks_of, worth
-from procedures.analysis.thermal.cycle_gyros import found, gyro_noises, gyro_temperatures
-from procedures.analysis.thermal.cycle_results import (
+from procedures.analysis.thermal.cycle.forms import RunSoaks, normalised_triad, soak_table, soaks_of, worth
+from procedures.analysis.thermal.cycle.gyros import found, gyro_noises, gyro_temperatures
+from procedures.analysis.thermal.cycle.results import (
     AccelerometerCorrelation,
     AxisFound,
     FormFound,
     RunFound,
     ThermalCycle,
 )
-from procedures.analysis.thermal.cycle_runs import CycleSettings, PreparedRun, prepare, with_forces
-from procedures.analysis.thermal.cycle_series import CycleSeries
-from procedures.analysis.thermal.cycle_traces import allan_of, leg_regimes, trace
+from procedures.analysis.thermal.cycle.runs import CycleSettings, PreparedRun, prepare, with_forces
+from procedures.analysis.thermal.cycle.series import CycleSeries
+from procedures.analysis.thermal.cycle.traces import allan_of, leg_regimes, trace
 from procedures.analysis.thermal.fit import AxisFit, fit_correction
 from procedures.analysis.thermal.judgement import Corrects, corrected, magnitude
 from procedures.core.converter import ConverterTriad

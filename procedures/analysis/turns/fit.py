@@ -22,9 +22,9 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
-from procedures.analysis.determination import require_full_rank
-from procedures.analysis.table_errors import TableErrors, TableUncertainty, table_errors
-from procedures.analysis.whitening import whitener
+from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
+from procedures.analysis.least_squares.determination import require_full_rank
+from procedures.analysis.least_squares.whitening import whitener
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter

@@ -1,7 +1,7 @@
 """Tables and figures of whole turns."""
 
-from procedures.analysis.calibration_summary import Coefficient
-from procedures.analysis.whole_turns_summary import RatePoint, WholeTurns
+from procedures.analysis.calibration.summary import Coefficient
+from procedures.analysis.turns.summary import RatePoint, WholeTurns
 from procedures.core import units
 from procedures.core.recording import AXES
 from procedures.core.report import Figure, Series, Table

@@ -11,9 +11,9 @@ from typing import Literal
 import numpy as np
 from scipy.linalg import qr, solve_triangular
 
-from procedures.analysis.determination import require_full_rank
-from procedures.analysis.table_errors import SOURCES, TableErrors
-from procedures.analysis.whitening import whitener
+from procedures.analysis.calibration.table_errors import SOURCES, TableErrors
+from procedures.analysis.least_squares.determination import require_full_rank
+from procedures.analysis.least_squares.whitening import whitener
 from procedures.core.arrays import Array
 
 Weighting = Literal["noise_and_table", "noise"]

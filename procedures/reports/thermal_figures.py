@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from procedures.analysis.thermal.cycle_results import AllanFound, RunFound, ThermalCycle, Trace
+from procedures.analysis.thermal.cycle.results import AllanFound, RunFound, ThermalCycle, Trace
 from procedures.core import units
 from procedures.core.recording import AXES
 from procedures.core.report import Figure, Series

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from procedures.analysis.thermal.cycle_results import GyroNoise, ThermalCycle
+from procedures.analysis.thermal.cycle.results import GyroNoise, ThermalCycle
 from procedures.core import units
 from procedures.core.limits import Check, Limit, check
 from procedures.core.recording import AXES

@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from procedures.analysis.calibration.multiposition import TriadFit
+from procedures.analysis.calibration.station_means import StationMeans
 from procedures.analysis.cells import cell_means
-from procedures.analysis.multiposition import TriadFit
-from procedures.analysis.station_means import StationMeans
 from procedures.analysis.thermal.regime import RegimeSettings
 from procedures.core.arrays import Array
 from procedures.core.converter import at_reference

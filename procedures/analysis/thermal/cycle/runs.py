@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.analysis.thermal.cycle_series import CycleSeries
+from procedures.analysis.thermal.cycle.series import CycleSeries
 from procedures.analysis.thermal.fit import fit_correction
 from procedures.analysis.thermal.judgement import nearest, soaks
 from procedures.analysis.thermal.regime import RegimeSettings, RegimeTrace, regimes

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from procedures.analysis.estimator import Weighting
-from procedures.analysis.multiposition import TriadFit
-from procedures.analysis.scalar import PARAMETERS, ScalarFit, observable_derivative, scalar_parameters
-from procedures.analysis.verification import Magnitudes
+from procedures.analysis.calibration.estimator import Weighting
+from procedures.analysis.calibration.multiposition import TriadFit
+from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, observable_derivative, scalar_parameters
+from procedures.analysis.calibration.verification import Magnitudes
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
-from procedures.analysis.whitening import whitener
+from procedures.analysis.least_squares.whitening import whitener
 from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration, correct
 

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import chdtrc
 
-from procedures.analysis.determination import RANK_TOLERANCE, require_full_rank
-from procedures.analysis.whitening import whitener
+from procedures.analysis.least_squares.determination import RANK_TOLERANCE, require_full_rank
+from procedures.analysis.least_squares.whitening import whitener
 from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration, triad_calibration
 

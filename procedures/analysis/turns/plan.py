@@ -6,10 +6,10 @@ from math import floor
 
 import numpy as np
 
-from procedures.analysis.station_noise import triad_covariance
-from procedures.analysis.station_plan import windows
-from procedures.analysis.table_errors import TableUncertainty
-from procedures.analysis.whole_turns import Term, TurnEstimator, parameter_names, turn_estimator, turn_flaws, turning
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.station_plan import windows
+from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.turns.fit import Term, TurnEstimator, parameter_names, turn_estimator, turn_flaws, turning
 from procedures.core import units
 from procedures.core.errors import BadParameter
 from procedures.core.recording import AXES, Station

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from procedures.analysis.calibration_summary import Coefficient
-from procedures.analysis.station_means import station_means
-from procedures.analysis.station_noise import triad_covariance
-from procedures.analysis.table_errors import TableUncertainty
-from procedures.analysis.whole_turns import Term, TurnFit, Turning, fit_turns, turning
-from procedures.analysis.whole_turns_plan import coefficient_names
+from procedures.analysis.calibration.station_means import station_means
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.summary import Coefficient
+from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.turns.fit import Term, TurnFit, Turning, fit_turns, turning
+from procedures.analysis.turns.plan import coefficient_names
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from procedures.analysis.calibration_plan import TriadPlan
-from procedures.analysis.reference import reference_magnitude, reference_vectors
-from procedures.analysis.station_means import station_means
-from procedures.analysis.station_noise import triad_covariance
-from procedures.analysis.verification import Magnitudes, chi_square_p, error_covariance, magnitudes
+from procedures.analysis.calibration.plan import TriadPlan
+from procedures.analysis.calibration.reference import reference_magnitude, reference_vectors
+from procedures.analysis.calibration.station_means import station_means
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.verification import Magnitudes, chi_square_p, error_covariance, magnitudes
 from procedures.core.arrays import Array
 from procedures.core.errors import DomainError, UnfitRecording
 from procedures.core.imu_model import TriadCalibration

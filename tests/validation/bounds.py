@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.linalg import block_diag
 
-from procedures.analysis.estimator import estimator
-from procedures.analysis.table_errors import TableErrors
-from procedures.analysis.whitening import whitener
+from procedures.analysis.calibration.estimator import estimator
+from procedures.analysis.calibration.table_errors import TableErrors
+from procedures.analysis.least_squares.whitening import whitener
 from procedures.core.arrays import Array
 
 

@@ -10,8 +10,8 @@ from procedures.analysis.noise_fit.estimate import NoiseFit
 from procedures.analysis.noise_fit.likelihood import fit_noise
 from procedures.analysis.noise_fit.powers import slow_powers
 from procedures.analysis.thermal.correlation import Correlation, correlation
-from procedures.analysis.thermal.cycle_results import CorrelationFound, GyroNoise, GyroTemperature
-from procedures.analysis.thermal.cycle_runs import CycleSettings, PreparedRun
+from procedures.analysis.thermal.cycle.results import CorrelationFound, GyroNoise, GyroTemperature
+from procedures.analysis.thermal.cycle.runs import CycleSettings, PreparedRun
 from procedures.analysis.thermal.profile_progress import SENSORS
 from procedures.core.arrays import Array
 from procedures.core.noise import NoiseCoefficients

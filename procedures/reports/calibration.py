@@ -4,9 +4,9 @@ words.
 
 from collections.abc import Sequence
 
-from procedures.analysis.calibration_summary import Coefficient, TriadSummary
-from procedures.analysis.reference_temperature import ThermalShare
-from procedures.analysis.verification import Magnitudes
+from procedures.analysis.calibration.reference_temperature import ThermalShare
+from procedures.analysis.calibration.summary import Coefficient, TriadSummary
+from procedures.analysis.calibration.verification import Magnitudes
 from procedures.core import units
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.report import Figure, Series, Table

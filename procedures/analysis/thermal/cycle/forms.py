@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from procedures.analysis.thermal.cycle_results import FormFound, SoakFound
-from procedures.analysis.thermal.cycle_runs import PreparedRun
+from procedures.analysis.thermal.cycle.results import FormFound, SoakFound
+from procedures.analysis.thermal.cycle.runs import PreparedRun
 from procedures.analysis.thermal.judgement import Corrects, Soak, ThreeSigma, magnitude, nearest, soaks, three_sigma
 from procedures.analysis.thermal.normalised import fit_normalised
 from procedures.analysis.thermal.profile_progress import LegEvidence
