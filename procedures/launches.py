@@ -8,7 +8,7 @@ from typing import Literal, TypeVar
 
 from pydantic import Field
 
-from procedures.analysis.launch.analysis import analyse_launch
+from procedures.analysis.launch.analysis import INSPECTION, analyse_launch
 from procedures.analysis.launch.results import LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.summary import ChannelSummary, summarise
@@ -20,6 +20,8 @@ from procedures.core.report import Report
 from procedures.procedure import Outcome, Parameters
 from procedures.reports import launch as pictures
 
+LAUNCH = INSPECTION
+"""How launches are inspected: each by itself, at rest throughout."""
 Part = Literal["gyros", "accelerometers", "all", "none"]
 
 

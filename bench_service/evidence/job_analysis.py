@@ -13,6 +13,7 @@ from bench_service.wall_clock import new_id, now
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Recording
 from procedures.core.unit_correction import UnitCorrection
+from procedures.inspection import analyse_procedure
 from procedures.procedure import Outcome
 
 
@@ -41,7 +42,7 @@ def analysed(
     """Run a procedure's analysis on a job's recordings. Raises `DomainError`, `ValidationError` for the parameters."""
     context = context_of(job)
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
-    outcome = procedure.analyse(recordings, params, context)
+    outcome = analyse_procedure(procedure, recordings, params, context)
     used = context.unit.calibration_id if procedure.uses_calibration else None
     corrections = (context.unit.correction_id(kind) for kind in procedure.uses_corrections(params))
     stored = StoredResult(

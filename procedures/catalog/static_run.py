@@ -21,7 +21,7 @@ from procedures.core.recording import TRIADS, Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
-from procedures.launches import NoiseParameters, NoiseResult, analyse_launches, noise_report
+from procedures.launches import LAUNCH, NoiseParameters, NoiseResult, analyse_launches, noise_report
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 
 DWELL_STEP_S = 5.0
@@ -150,4 +150,5 @@ PROCEDURE = Procedure(
     report,
     learns=learns,
     quantities=quantities,
+    inspection=lambda _: LAUNCH,
 )

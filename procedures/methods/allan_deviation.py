@@ -15,16 +15,18 @@ from pydantic import Field
 from procedures.analysis.allan.correlated import Uncorrelatable
 from procedures.analysis.allan.deviation import Deviation, DeviationStream
 from procedures.analysis.allan.statistic import STATISTICS, Statistic, log_sizes
+from procedures.analysis.fitness.findings import FitnessSettings
+from procedures.analysis.fitness.watched import Inspection
 from procedures.core import units
 from procedures.core.errors import UnfitRecording
 from procedures.core.limits import Limit, check, verdict
 from procedures.core.recording import INCREMENTS, Quantity, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
-from procedures.procedure import Evidence, Method, Outcome, Parameters
+from procedures.procedure import Evidence, Method, Outcome, RecordedParameters
 
 
-class Params(Parameters):
+class Params(RecordedParameters):
     """Which statistic of which channels."""
 
     statistic: Literal["allan", "overlapping_allan", "modified_allan", "time", "hadamard", "overlapping_hadamard"] = (
@@ -185,4 +187,18 @@ def _figure(curve: Curve, name: str, confidence: float) -> Figure:
     return Figure(f"{curve.channel}, {curve.recording}", "τ, s", f"σ, {label}", series, x_log=True, y_log=True)
 
 
-METHOD = Method("allan_deviation", "Allan deviation and its relatives", "1.0.0", Params, Result, analyse, report)
+def inspection(params: Params, count: int) -> Inspection:
+    """Each recording by itself, the channels that are asked for."""
+    return Inspection(FitnessSettings(least_samples=1), params.channels)
+
+
+METHOD = Method(
+    "allan_deviation",
+    "Allan deviation and its relatives",
+    "1.0.0",
+    Params,
+    Result,
+    analyse,
+    report,
+    inspection=inspection,
+)

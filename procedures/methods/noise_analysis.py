@@ -5,11 +5,11 @@ Channels may be angle or velocity increments, rates or specific forces, in SI or
 
 from procedures.core.report import Report
 from procedures.core.unit import Unit
-from procedures.launches import NoiseParameters, NoiseResult, analyse_launches, noise_report
-from procedures.procedure import Evidence, Method
+from procedures.launches import LAUNCH, NoiseParameters, NoiseResult, analyse_launches, noise_report
+from procedures.procedure import Evidence, Method, RecordedParameters
 
 
-class Params(NoiseParameters):
+class Params(RecordedParameters, NoiseParameters):
     """How to analyse, and what to hold the noise to."""
 
 
@@ -27,4 +27,13 @@ def report(result: Result) -> Report:
     return noise_report(result)
 
 
-METHOD = Method("noise_analysis", "Noise of recordings at rest", "1.0.0", Params, Result, analyse, report)
+METHOD = Method(
+    "noise_analysis",
+    "Noise of recordings at rest",
+    "1.0.0",
+    Params,
+    Result,
+    analyse,
+    report,
+    inspection=lambda _params, _count: LAUNCH,
+)

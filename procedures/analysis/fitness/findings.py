@@ -88,6 +88,10 @@ class FitnessSettings:
     """The analysis takes means: rows sent more than once and copied samples leave these right, and are warned of."""
     seeks_scale: bool = False
     """The analysis is to find scale factors: a reading that is off by a factor is warned of, not refused."""
+    reads_gravity: bool = True
+    """The accelerometers feel gravity, not a current that is fed into their converter."""
+    mends_outliers: bool = False
+    """Outliers that are few will be replaced by the mean of their neighbours, and the sentence says so."""
     gravity_m_s2: float | None = None
     """Of the site [m/s²]; None: standard gravity."""
     gyro_rest_rad_s: float = 0.5
@@ -97,7 +101,7 @@ class FitnessSettings:
 
     def __post_init__(self) -> None:
         for name, value, low, high in (
-            ("least_samples", self.least_samples, 2, 10**9),
+            ("least_samples", self.least_samples, 1, 10**9),
             ("gravity_m_s2", self.gravity_m_s2 or 9.8, 9.7, 9.9),
             ("gyro_rest_rad_s", self.gyro_rest_rad_s, 7.3e-5, 1e3),
         ):

@@ -88,7 +88,7 @@ class Readings:
 
     def _accelerometers(self, settings: FitnessSettings) -> dict[str, Doubt]:
         rows = self._triads.get("accelerometer")
-        if rows is None:
+        if rows is None or not settings.reads_gravity:
             return {}
         gravity = settings.gravity_m_s2 or units.STANDARD_GRAVITY
         read = self._magnitudes["accelerometer"] / self._pieces

@@ -25,6 +25,9 @@ from procedures.core.recording import TRIADS, Channel, Quantity, RawArray, Recor
 
 _SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT)
 
+FEW_SHARE = 1e-3
+"""Part of a channel's samples that may be outliers for a figure without them to be one of the channel."""
+
 
 class FitnessStream:
     """Inspects a recording block by block; the findings do not depend on how it was cut into blocks."""
@@ -81,8 +84,12 @@ class FitnessStream:
         return tuple(ChannelFitness(c.name, tuple(f)) for c, f in zip(self._channels, found, strict=True))
 
     def outliers(self) -> dict[int, list[Jump]]:
-        """The outliers of each column that has any, as many as are kept."""
-        return {c: jumps for c, jumps in enumerate(self._jumps.outliers) if jumps}
+        """The outliers of each column that has any, where they are few enough to be left out."""
+        return {c: jumps for c, jumps in enumerate(self._jumps.outliers) if jumps and self._few(c)}
+
+    def _few(self, c: int) -> bool:
+        count = int(self._jumps.outlier_count[c])
+        return count == len(self._jumps.outliers[c]) and count <= max(FEW_SHARE * self._pieces.seen, 1.0)
 
     def _inspect(self, piece: Piece) -> None:
         x, start = piece.x, piece.start
@@ -226,7 +233,8 @@ class FitnessStream:
                 continue
             jumps = self._jumps
             count = int(jumps.outlier_count[c])
-            found[c] += time_flaws.outliers(channel, jumps.outliers[c], count, words)
+            mended = self._settings.mends_outliers and self._few(c)
+            found[c] += time_flaws.outliers(channel, jumps.outliers[c], count, mended, words)
             if channel.quantity is not Quantity.TEMPERATURE:
                 found[c] += time_flaws.steps(channel, jumps.steps[c], level[c], cells.size, words)
                 found[c] += time_flaws.noise_changes(channel, noise[c], cells.size * cells.group, words)

@@ -44,8 +44,8 @@ def steps_and_noise(cells: CellLevels, resolution: Array) -> tuple[list[list[Cha
     return of_level, [found if is_fine else [] for found, is_fine in zip(of_noise, finer, strict=True)]
 
 
-def outliers(channel: Channel, jumps: Sequence[Jump], count: int, words: Wording) -> list[Finding]:
-    """Single samples far from both neighbours."""
+def outliers(channel: Channel, jumps: Sequence[Jump], count: int, mended: bool, words: Wording) -> list[Finding]:
+    """Single samples far from both neighbours; `mended`: the figures are made without them."""
     if not jumps:
         return []
     first = jumps[0]
@@ -56,6 +56,8 @@ def outliers(channel: Channel, jumps: Sequence[Jump], count: int, words: Wording
         f"{amount(channel, words.rate_hz, first.size)} away where {SIGMAS:g} times the noise of "
         f"{amount(channel, words.rate_hz, first.noise)} was allowed" + (f"; samples {places}" if count > 1 else "")
     )
+    them, its = ("them", "their two neighbours stand") if count > 1 else ("it", "its two neighbours stands")
+    told += f"; the figures are without {them}, the mean of {its} in" if mended else f"; the figures include {them}"
     return [Finding(Kind.OUTLIER, Severity.WARN, told, first.index, count)]
 
 

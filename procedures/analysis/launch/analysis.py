@@ -4,15 +4,15 @@ The first pass inspects the samples and gathers cell means. They tell what to tr
 what is faster than a cell from every sample after the trim; everything slower comes from the cells.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from procedures.analysis.allan.correlated import Uncorrelatable
 from procedures.analysis.allan.deviation import Deviation, DeviationStream
 from procedures.analysis.allan.statistic import Sizes, decade_sizes
 from procedures.analysis.cells import Cells, CellStream, cell_samples, channel_rows
-from procedures.analysis.fitness.findings import require_fit
-from procedures.analysis.fitness.stream import FitnessStream
+from procedures.analysis.fitness.findings import FitnessSettings
+from procedures.analysis.fitness.watched import Inspection, Watched
 from procedures.analysis.launch.channel import channel_noise
 from procedures.analysis.launch.results import LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
@@ -20,8 +20,10 @@ from procedures.analysis.launch.signal import CleanSignal, clean_signal
 from procedures.analysis.noise_fit.powers import FastPowers, Powers
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
-from procedures.core.recording import Quantity, RawArray, Recording
+from procedures.core.recording import Quantity, Recording
 
+INSPECTION = Inspection(FitnessSettings())
+"""A launch is at rest throughout."""
 FEWEST_CELLS = 120
 """Fewer cells are no launch to analyse."""
 CROSSOVER = 0.03
@@ -69,19 +71,11 @@ def _first_pass(
 ) -> tuple[Cells, dict[str, tuple[str, ...]]]:
     """Cell means, and what the inspection warns of, channel by channel. Raises `UnfitRecording`."""
     info = recording.info
-    columns = [info.column(name) for name in names]
-    fitness = FitnessStream([info.channels[c] for c in columns], info.rate_hz, info.count)
+    watched = recording if isinstance(recording, Watched) else Watched(recording, INSPECTION)
     stream = CellStream(info, names, settings.cell_s)
-
-    def inspected() -> Iterator[RawArray]:
-        for block in recording.blocks():
-            fitness.add(block[:, columns])
-            yield block
-
-    for rows in channel_rows(info, names, inspected()):
+    for rows in channel_rows(info, names, watched.blocks()):
         stream.add(rows)
-    found = fitness.finish()
-    require_fit(info.id, found)
+    found = watched.fitness()
     cells = stream.finish()
     if cells.rates.shape[1] < FEWEST_CELLS:
         raise UnfitRecording(
