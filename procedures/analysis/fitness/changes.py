@@ -28,6 +28,8 @@ SHARP = 0.5
 """Part of a gap that must be there at a quarter of the scale, and between the medians."""
 SEEN = 6.0
 """A step so many times the spread at a scale is seen at that scale."""
+ROUNDING = 1e-12
+"""Relative: a series that is nothing but now and then has a spread no smaller than this."""
 MOST = 12
 """Steps of one series that are told apart."""
 TRIES = 40
@@ -89,7 +91,8 @@ def _intercept(total: Array, moment: Array, h: int) -> Array:
 def _spread(gaps: Array) -> Array:
     """Standard deviation (channels,) of noise with the quantile of these magnitudes."""
     at = min(int(QUANTILE * gaps.shape[1]), gaps.shape[1] - 1)
-    return np.maximum(np.partition(gaps, at, axis=1)[:, at] / NORMAL, np.finfo(np.float64).tiny)
+    least = np.maximum(ROUNDING * gaps.max(axis=1), np.finfo(np.float64).tiny / ROUNDING)
+    return np.maximum(np.partition(gaps, at, axis=1)[:, at] / NORMAL, least)
 
 
 def _of_row(y: Array, floor: float, uneven: Array, flat: bool) -> list[Change]:

@@ -6,6 +6,7 @@ copying, or a row sent more than once.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from procedures.analysis.fitness.pieces import Samples
 from procedures.core.arrays import Array
@@ -51,6 +52,10 @@ class Copies:
         self._large += np.count_nonzero(some >= COARSE * step, axis=1)
         self._looked += some.shape[1]
 
+    def fine(self) -> NDArray[np.bool_]:
+        """Whether most changes of a channel are larger than a few of its steps, (channels,)."""
+        return self._large > 0.5 * (self._looked - self._same)
+
     def by_chance(self, c: int) -> float:
         """Part of the samples that repeat the one before because the quantity did: half as many as change by a step."""
         return float(self._one[c]) / max(2 * self._looked, 1)
@@ -60,6 +65,5 @@ class Copies:
 
         `in_runs`: part of all samples (channels,) that repeat in long runs, which are another matter.
         """
-        changed = self._looked - self._same
         many = self._same - in_runs * self._looked > np.maximum(LEAST_SHARE * self._looked, LEAST) + TIMES * self._one
-        return np.flatnonzero(many & (self._large > 0.5 * changed)).tolist()
+        return np.flatnonzero(many & self.fine()).tolist()

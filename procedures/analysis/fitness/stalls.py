@@ -82,16 +82,24 @@ class Stalls:
         if part is None and np.isnan(self._part).any():
             self._usual(same)
 
-    def finish(self) -> list[Group]:
-        """Every group with the runs that are its own, beyond chance against the whole recording."""
+    def finish(self, able: NDArray[np.bool_]) -> list[Group]:
+        """Every group with the runs that are its own, beyond chance against the whole recording.
+
+        `able` (channels,): those that bear witness alone or as a triad. A counter that gives single pulses does not:
+        how regularly they come depends on where its input stands between two pulses.
+        """
         for group in self._groups:
             if group.open:
                 part = np.where(np.isnan(self._part), LEAST_PART, self._part)
                 self._keep(group, self._seen - group.open, group.open, part, shift=1)
         larger: list[Run] = []
+        several = len(self.repeats) > 1
         for group in self._groups:
             inside = sum(run.length for run in group.runs)
             whole = (self.repeats - inside) / max(self._seen - inside, 1)
+            if several and len(group.rows) < len(self.repeats) and not able[list(group.rows)].all():
+                group.runs = []
+                continue
             own = [run for run in group.runs if self._beyond_chance(group, run.length, whole)]
             group.runs = [run for run in own if not _within(run, larger)]
             larger += group.runs

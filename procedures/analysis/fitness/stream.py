@@ -21,7 +21,7 @@ from procedures.analysis.fitness.wording import Wording
 from procedures.analysis.fitness.wraps import Wraps
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
-from procedures.core.recording import TRIADS, Channel, Quantity, RawArray, Recording
+from procedures.core.recording import INCREMENTS, TRIADS, Channel, Quantity, RawArray, Recording
 
 _SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT)
 
@@ -154,7 +154,8 @@ class FitnessStream:
 
     def _of_repeats(self, found: list[list[Finding]], words: Wording) -> None:
         """Rows sent more than once, copied channels, hung links, channels that stand still."""
-        groups = self._stalls.finish()
+        sampled = np.array([c.quantity not in INCREMENTS for c in self._channels])
+        groups = self._stalls.finish(sampled | self._copies.fine())
         rows = self._repeats.rows
         hung = sum(run.length for group in groups if len(group.rows) == len(self._channels) for run in group.runs)
         held = self._repeats.held(hung)
