@@ -12,6 +12,8 @@ HELD = 0.8
 HELD_SHARE = 0.01
 """Repeated rows below this part are left to the longest run."""
 
+SEVERAL = 5
+
 
 class Repeats:
     """Rows that repeat the row before, over all channels."""
@@ -34,14 +36,17 @@ class Repeats:
         self.rows += repeated
         self.pairs += count
 
-    def held(self, in_runs: int) -> list[int]:
+    def held(self, in_runs: int, fine: NDArray[np.bool_]) -> list[int]:
         """The channels that show by changing only together that rows are sent more than once; none, if they do not.
 
-        `in_runs`: repeated rows that hang in long runs, which are another matter.
+        `in_runs`: repeated rows that hang in long runs, which are another matter. `fine` (channels,): those that change
+        by more than a step or two; of others `SEVERAL` must agree, since what is common to a few of them, a current or
+        a reference, changes them together.
         """
         if self.rows - in_runs < max(20, HELD_SHARE * self.pairs) or self.rows == self.pairs:
             return []
         changed = (self.pairs - self.zeros) / (self.pairs - self.rows)
         together = np.flatnonzero(changed >= HELD)
         by_chance = float(np.prod(1.0 - changed[together]))
-        return together.tolist() if len(together) > 1 and self.rows > 5.0 * by_chance * self.pairs else []
+        enough = np.count_nonzero(fine[together]) > 1 or len(together) >= SEVERAL
+        return together.tolist() if enough and self.rows > 5.0 * by_chance * self.pairs else []

@@ -158,7 +158,7 @@ class FitnessStream:
         groups = self._stalls.finish(sampled | self._copies.fine())
         rows = self._repeats.rows
         hung = sum(run.length for group in groups if len(group.rows) == len(self._channels) for run in group.runs)
-        held = self._repeats.held(hung)
+        held = self._repeats.held(hung, self._copies.fine())
         live = [c for c, f in enumerate(found) if not any(x.kind in (Kind.CONSTANT, Kind.SATURATED) for x in f)]
         copied = [
             c for c in self._copies.copied(self._stalls.inside / max(words.seen, 1)) if c in live and c not in held
