@@ -10,7 +10,7 @@ from random import SystemRandom
 from bench_service.jobs.analyses import AnalysisDesk
 from bench_service.jobs.campaigns.desk import CampaignDesk
 from bench_service.jobs.driver import BenchDriver, TrueTriad
-from bench_service.jobs.errors import IllegalTransition, NotFound, NotReady, NotUnderstood
+from bench_service.jobs.errors import IllegalTransition, NotDriving, NotFound, NotReady, NotUnderstood
 from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.live import LiveBoard
 from bench_service.jobs.log_context import about
@@ -89,6 +89,20 @@ class BenchService:
         if self._worker is not None:
             self._worker.begin([lambda: (self.planner.catalog, self.analyses.methods), *warm_up])
             self.campaigns.conductor.begin()
+
+    def at_failed_start(self, then: Callable[[], object]) -> None:
+        """Have `then` called where the engine does not start. To be said before `begin`."""
+        if self._worker is not None:
+            self._worker.at_failed_start(then)
+
+    def failed_start(self) -> NotDriving | None:
+        """Why this service can never work; None where it works, or may yet."""
+        return None if self._worker is None else self._worker.failed_start()
+
+    def require_start(self) -> None:
+        """Wait until the engine runs. Raises `NotDriving` where it does not start."""
+        if self._worker is not None:
+            self._worker.require_engine()
 
     def ready(self) -> tuple[str, ...]:
         """Return once a job could start, with what a person should know all the same.
