@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from procedures.core.arrays import Array
-from procedures.core.errors import UnfitRecording
+from procedures.core.errors import BadParameter, UnfitRecording
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,9 @@ def still_stretches(samples: Array, rate_hz: float, settings: StillSettings | No
         raise UnfitRecording(
             f"{len(samples) / rate_hz:.4g} s are too short for a still beginning of {s.initial_s:g} s and one window"
         )
+    if initial < 2 * width:
+        allowed = f"at least {2 * width / rate_hz:g} s, two windows of still.window_s"
+        raise BadParameter("still.initial_s", s.initial_s, allowed)
     variance = np.linalg.norm(moving_variance(samples, width), axis=1)
     threshold = s.factor * float(np.median(variance[width // 2 : initial - width // 2]))
     still = np.concatenate([[False], variance <= threshold, [False]])
@@ -75,12 +78,19 @@ def pose_means(samples: Array, stretches: tuple[Stretch, ...], batches: int = 10
     """Mean of every stretch and its standard uncertainty, both (poses, 3).
 
     The uncertainty is the scatter of the means of `batches` equal parts of the stretch, over √batches: it allows for
-    noise correlated over less than a part, and for a hand that creeps.
+    noise correlated over less than a part, and for a hand that creeps. A stretch of fewer samples has a part for each.
+    Raises `UnfitRecording` for a stretch of one sample, which has no scatter.
     """
     means, sds = [], []
     for stretch in stretches:
         pose = samples[stretch.start : stretch.stop]
-        parts = np.array([part.mean(axis=0) for part in np.array_split(pose, batches)])
+        if len(pose) < 2:
+            raise UnfitRecording(
+                f"the still stretch at sample {stretch.start} has {len(pose)} sample(s), which show no scatter: at "
+                "least two are needed; a longer still.shortest_s leaves such stretches out"
+            )
+        count = min(batches, len(pose))
+        parts = np.array([part.mean(axis=0) for part in np.array_split(pose, count)])
         means.append(pose.mean(axis=0))
-        sds.append(parts.std(axis=0, ddof=1) / np.sqrt(batches))
+        sds.append(parts.std(axis=0, ddof=1) / np.sqrt(count))
     return np.array(means).reshape(-1, 3), np.array(sds).reshape(-1, 3)

@@ -1,5 +1,6 @@
 """Level and noise of every channel over short cells: what steps and changes of the noise are sought in."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,14 @@ class CellLevels:
     """Cells that a value of the noise is of."""
     noise: Array
     """Mean magnitude of the difference of two neighbours, (channels, K // group)."""
+
+    def leave_out(self, channel: int, samples: Sequence[int]) -> None:
+        """Put the mean of its neighbours for each cell of a channel that one of these samples is in, in place."""
+        for row, size in ((self.means[channel], self.size), (self.noise[channel], self.size * self.group)):
+            # The difference to the next sample is in the next cell where the sample is the last of its own.
+            for k in sorted({(i + late) // size for i in samples for late in (0, 1)}):
+                if 0 < k < len(row) - 1:
+                    row[k] = 0.5 * (row[k - 1] + row[k + 1])
 
 
 class Levels:

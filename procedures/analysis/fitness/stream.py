@@ -226,6 +226,8 @@ class FitnessStream:
     def _of_course(self, found: list[list[Finding]], words: Wording) -> None:
         """Outliers, steps, changes of the noise: against noise, which is not what it was where samples pile up."""
         cells = self._levels.finish()
+        for c, jumps in enumerate(self._jumps.outliers):
+            cells.leave_out(c, [jump.index for jump in jumps])
         step = np.where(np.isfinite(self._copies.step), self._copies.step, 0.0)
         level, noise = time_flaws.steps_and_noise(cells, step)
         for c, channel in enumerate(self._channels):
