@@ -120,18 +120,15 @@ def steps(rng: Rng) -> Fault:
 
 
 def noise_changes(rng: Rng) -> Fault:
-    record, c = (
-        counts(rng, ("white", "low-passed", "flicker")[int(rng.integers(3))], least_sd=4.0),
-        int(rng.integers(6)),
-    )
-    x, n = record.samples.astype(np.float64), len(record.samples)
+    """By a factor of 1.8 … 6, up or down."""
+    name, c = ("white", "low-passed", "flicker")[int(rng.integers(3))], int(rng.integers(6))
+    n, rate = size(rng)
+    sd = 10 ** rng.uniform(np.log10(4.0), 2.5, 6)
     at, factor = int(rng.uniform(0.15, 0.85) * n), float(rng.uniform(1.8, 6.0)) ** float(rng.choice([-1, 1]))
-    level = x[:, c].mean()
-    x[:, c] = level + (x[:, c] - level) * np.where(
-        np.arange(n) < at, 1.0 if factor > 1 else 1 / factor, max(factor, 1.0)
-    )
-    x = np.rint(x).astype(np.int32)
-    return Fault(replace(record, samples=x), "noise_change", (c,), at, 0.01 * n, (f"factor {factor}",), 1)
+    x = sd * NOISES[name](rng, n)
+    x[:, c] *= np.where(np.arange(n) < at, max(1.0, 1.0 / factor), max(1.0, factor))
+    x = np.rint(means(rng) + x).astype(np.int32)
+    return Fault(Record(x, rate), "noise_change", (c,), at, 0.01 * n, (f"factor {factor}",), 1)
 
 
 def outliers(rng: Rng) -> Fault:

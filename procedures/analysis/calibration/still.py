@@ -40,7 +40,8 @@ def still_stretches(samples: Array, rate_hz: float, settings: StillSettings | No
     """Stretches of (n, 3) samples during which the unit rested, in order.
 
     Still is where ``√Σ_c var_c² ≤ factor·√Σ_c var_c²(initial)``, the variances over the moving window. Raises
-    `UnfitRecording` where the recording is shorter than its still beginning.
+    `UnfitRecording` where the recording is shorter than its still beginning, `BadParameter` where that is shorter than
+    two windows. A stretch of a single sample is none: it shows no scatter.
     """
     s = settings or StillSettings()
     width = max(2, round(s.window_s * rate_hz))
@@ -58,7 +59,7 @@ def still_stretches(samples: Array, rate_hz: float, settings: StillSettings | No
     edges = np.flatnonzero(still[1:] != still[:-1]).reshape(-1, 2)
     margin = round(s.margin_s * rate_hz)
     cut = [Stretch(int(a) + margin, int(b) - margin) for a, b in edges]
-    return tuple(c for c in cut if c.stop - c.start >= s.shortest_s * rate_hz)
+    return tuple(c for c in cut if c.stop - c.start >= max(2.0, s.shortest_s * rate_hz))
 
 
 def moving_variance(samples: Array, width: int) -> Array:
@@ -79,16 +80,10 @@ def pose_means(samples: Array, stretches: tuple[Stretch, ...], batches: int = 10
 
     The uncertainty is the scatter of the means of `batches` equal parts of the stretch, over √batches: it allows for
     noise correlated over less than a part, and for a hand that creeps. A stretch of fewer samples has a part for each.
-    Raises `UnfitRecording` for a stretch of one sample, which has no scatter.
     """
     means, sds = [], []
     for stretch in stretches:
         pose = samples[stretch.start : stretch.stop]
-        if len(pose) < 2:
-            raise UnfitRecording(
-                f"the still stretch at sample {stretch.start} has {len(pose)} sample(s), which show no scatter: at "
-                "least two are needed; a longer still.shortest_s leaves such stretches out"
-            )
         count = min(batches, len(pose))
         parts = np.array([part.mean(axis=0) for part in np.array_split(pose, count)])
         means.append(pose.mean(axis=0))

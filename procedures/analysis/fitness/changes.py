@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from procedures.core.arrays import Array
 
-SIGNIFICANT, FLAT = 8.0, 6.5
+SIGNIFICANT, FLAT = 8.0, 7.0
 """Spreads that a gap must have, of lines and of means. The spread of a short series is known to 20 %; 10 000 borders
 and scales of a recording then give a false alarm in some thousands."""
 SHORTEST = 4

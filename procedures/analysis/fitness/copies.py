@@ -18,6 +18,8 @@ TIMES = 3.0
 LEAST = 50
 LEAST_SHARE = 0.01
 """Copies below this part are left to the runs."""
+PART = 1024
+"""Differences that are judged together."""
 STRIDE = 13
 """Every so many differences are looked at, from another one on in each piece, so that each phase of copying comes."""
 FIRST = 4
@@ -33,6 +35,8 @@ class Copies:
         self._same = np.zeros(channels, np.int64)
         self._one = np.zeros(channels, np.int64)
         self._large = np.zeros(channels, np.int64)
+        self._proven = np.zeros(channels, np.int64)
+        """Repeats in stretches whose changes speak against repeats by chance."""
         self._looked = 0
         self._pieces = 0
 
@@ -46,11 +50,20 @@ class Copies:
         least = np.min(np.where(some > 0.0, some, np.inf), axis=1)
         self.step = np.where(resolution > 0.0, resolution, np.minimum(self.step, least))
         step = np.where(np.isfinite(self.step), self.step, 1.0)[:, None]
-        same = some == 0.0
-        self._same += np.count_nonzero(same, axis=1)
-        self._one += np.count_nonzero((some < 1.5 * step) & ~same, axis=1)
-        self._large += np.count_nonzero(some >= COARSE * step, axis=1)
         self._looked += some.shape[1]
+        for at in range(0, some.shape[1], PART):
+            self._count(some[:, at : at + PART], step)
+
+    def _count(self, some: Array, step: Array) -> None:
+        """A stretch short enough for a channel to have one noise in it."""
+        same = np.count_nonzero(some == 0.0, axis=1)
+        one = np.count_nonzero(some < 1.5 * step, axis=1) - same
+        large = np.count_nonzero(some >= COARSE * step, axis=1)
+        self._same += same
+        self._one += one
+        self._large += large
+        proves = (same > TIMES * one) & (large > 0.5 * (some.shape[1] - same))
+        self._proven += np.where(proves, same, 0)
 
     def fine(self) -> NDArray[np.bool_]:
         """Whether most changes of a channel are larger than a few of its steps, (channels,)."""
@@ -65,5 +78,5 @@ class Copies:
 
         `in_runs`: part of all samples (channels,) that repeat in long runs, which are another matter.
         """
-        many = self._same - in_runs * self._looked > np.maximum(LEAST_SHARE * self._looked, LEAST) + TIMES * self._one
-        return np.flatnonzero(many & self.fine()).tolist()
+        many = self._proven - in_runs * self._looked > np.maximum(LEAST_SHARE * self._looked, LEAST)
+        return np.flatnonzero(many & (self._proven > 0.5 * self._same)).tolist()

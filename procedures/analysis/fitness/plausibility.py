@@ -70,11 +70,11 @@ class Readings:
             self._magnitudes[name] += float(np.sort(np.linalg.norm(means[rows], axis=0))[bursts // 2])
         self._pieces += 1
 
-    def doubts(self, settings: FitnessSettings, noise: Array) -> dict[str, Doubt]:
-        """What is doubted, channel by channel; `noise`: standard deviation of white noise of each channel, raw."""
+    def doubts(self, settings: FitnessSettings, mean: Array, noise: Array) -> dict[str, Doubt]:
+        """What is doubted, channel by channel; `mean` of each and `noise`, the standard deviation of white one, raw."""
         if not self._pieces or not settings.at_rest:
             return self._temperatures() if self._pieces else {}
-        return {**self._temperatures(), **self._gyros(settings, noise), **self._accelerometers(settings)}
+        return {**self._temperatures(), **self._gyros(settings, mean, noise), **self._accelerometers(settings)}
 
     def _temperatures(self) -> dict[str, Doubt]:
         found: dict[str, Doubt] = {}
@@ -127,7 +127,7 @@ class Readings:
         )
         return dict.fromkeys(names, Doubt(told, True, of_rate=True))
 
-    def _gyros(self, settings: FitnessSettings, noise: Array) -> dict[str, Doubt]:
+    def _gyros(self, settings: FitnessSettings, mean: Array, noise: Array) -> dict[str, Doubt]:
         limit = settings.gyro_rest_rad_s
         rows = self._triads.get("gyro")
         if rows is not None:
@@ -143,7 +143,9 @@ class Readings:
         candidates = {"deg/s": 1.0 / units.DEG, "deg/h": 1.0 / units.DEG_PER_HOUR} if good else {}
         expected = f"less than {limit:.3g} rad/s at rest"
         found: dict[str, Doubt] = {}
-        for group, value in read.items():
+        for group, burst in read.items():
+            # Single bursts tell a motion from a rest; what a unit at rest reads is surer from all samples.
+            value = min(burst, float(np.linalg.norm(((mean - self._offset) * self._gain)[list(group)])))
             names = [self._names[i] for i in group]
             walk = float(np.max((noise * np.abs(self._gain))[list(group)])) / self._rate_hz**0.5
             sampled = all(self._channels[i].quantity is Quantity.ANGULAR_RATE for i in group)

@@ -211,9 +211,10 @@ class FitnessStream:
 
     def _of_readings(self, found: list[list[Finding]], words: Wording) -> None:
         """Units and rates that what a unit at rest reads speaks against."""
-        noise = self._levels.finish().noise
+        cells = self._levels.finish()
+        noise, mean = cells.noise, cells.means.mean(axis=1) if cells.means.shape[1] else np.full(len(found), np.nan)
         usual = np.median(noise, axis=1) / WHITE if noise.shape[1] else np.zeros(len(found))
-        doubts = self._readings.doubts(self._settings, usual)
+        doubts = self._readings.doubts(self._settings, mean, usual)
         for c, channel in enumerate(self._channels):
             doubt = doubts.get(channel.name)
             if doubt is None or any(f.kind in (Kind.WRAPPED, Kind.CONSTANT) for f in found[c]):

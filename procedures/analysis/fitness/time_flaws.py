@@ -23,6 +23,8 @@ LEAST_NOISE = 0.5
 """Resolutions that the noise must have for small steps of the level to be more than rounding."""
 FINE_NOISE = 1.0
 """Resolutions that the noise must have for its changes to be more than that."""
+LEAST_STEP = 0.01
+"""Resolutions that any step must have."""
 ROUNDING = 2.0
 """Resolutions that a step must have where the noise is less."""
 
@@ -39,7 +41,13 @@ def steps_and_noise(cells: CellLevels, resolution: Array) -> tuple[list[list[Cha
     uneven = np.repeat(np.maximum(least / usual[:, None], 1.0), cells.group, 1)
     short = cells.means.shape[1] - uneven.shape[1]
     uneven = np.hstack([uneven, np.ones((len(uneven), short))]) if short > 0 else uneven
+    floor = np.maximum(floor, LEAST_STEP * resolution)
     of_level = changes(cells.means, floor, uneven)
+    # Means are twice as certain as lines where there is no drift; what lines have found they would only find again.
+    floor = np.where(usual > FINE_NOISE * resolution, floor, ROUNDING * resolution)
+    floor = np.where([bool(f) for f in of_level], np.inf, floor)
+    quiet = changes(cells.means, floor, uneven, flat=True)
+    of_level = [lines or means for lines, means in zip(of_level, quiet, strict=True)]
     finer = (usual > FINE_NOISE * resolution).tolist()
     return of_level, [found if is_fine else [] for found, is_fine in zip(of_noise, finer, strict=True)]
 
