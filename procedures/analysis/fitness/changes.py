@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from procedures.core.arrays import Array
 
 SIGNIFICANT, FLAT = 8.0, 7.0
-"""Spreads that a gap must have, of lines and of means. The spread of a short series is known to 20 %; 10 000 borders
-and scales of a recording then give a false alarm in some thousands."""
+"""Spreads that a gap of lines, and one of means, must have where nothing else is asked for. The spread of a short
+series is known to 20 %; 10 000 borders and scales of a recording then give a false alarm in some thousands."""
 SHORTEST = 4
 """Cells on either side of a border, at least."""
 POSITIONS = 16
@@ -44,11 +44,14 @@ class Change:
     height: float
 
 
-def changes(series: Array, floor: Array, uneven: Array | None = None, *, flat: bool = False) -> list[list[Change]]:
+def changes(
+    series: Array, floor: Array, uneven: Array | None = None, *, flat: bool = False, least: float | None = None
+) -> list[list[Change]]:
     """Steps of each row of `series` (channels, K), none smaller than its `floor` (channels,), in order.
 
     `uneven` (channels, K), at least 1: how many times its usual noise a row has at each cell; a gap counts the less.
-    `flat`: the series does not drift: means stand for the lines, which makes the gap twice as certain.
+    `least`: spreads that a gap must have. `flat`: the series does not drift, and means stand for the lines, which makes
+    the gap twice as certain.
     """
     found: list[list[Change]] = [[] for _ in series]
     if series.shape[1] < POSITIONS * SHORTEST:
@@ -58,8 +61,11 @@ def changes(series: Array, floor: Array, uneven: Array | None = None, *, flat: b
     for h in _scales(series.shape[1]):
         gaps = np.abs(_gaps(centred, h, flat))
         most = np.maximum(most, np.max(gaps / _spread(gaps)[:, None], axis=1, initial=0.0))
-    for c in np.flatnonzero(most > (FLAT if flat else SIGNIFICANT)):
-        found[c] = _of_row(centred[c], float(floor[c]), np.ones(series.shape[1]) if uneven is None else uneven[c], flat)
+    least = (FLAT if flat else SIGNIFICANT) if least is None else least
+    for c in np.flatnonzero(most > least):
+        found[c] = _of_row(
+            centred[c], float(floor[c]), np.ones(series.shape[1]) if uneven is None else uneven[c], flat, least
+        )
     return found
 
 
@@ -95,14 +101,14 @@ def _spread(gaps: Array) -> Array:
     return np.maximum(np.partition(gaps, at, axis=1)[:, at] / NORMAL, least)
 
 
-def _of_row(y: Array, floor: float, uneven: Array, flat: bool) -> list[Change]:
+def _of_row(y: Array, floor: float, uneven: Array, flat: bool, least: float) -> list[Change]:
     """The largest first; each is taken out before the next is sought."""
     y = y.copy()
     found: list[Change] = []
     barred = np.zeros(len(y) + 1, np.bool_)
     for _ in range(TRIES):
         scales = [_Scale.of(y, h, uneven, flat) for h in _scales(len(y))]
-        best = _best(scales, barred, FLAT if flat else SIGNIFICANT)
+        best = _best(scales, barred, least)
         if best is None or len(found) >= MOST:
             break
         k, h = best

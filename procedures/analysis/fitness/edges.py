@@ -14,7 +14,7 @@ NEIGHBOURS = 8
 STEEPEST = 2.5
 """The outermost level may hold so many times its neighbours: more than the √2 + 1 of a sine wave's crest."""
 ALONE = 0.4
-"""Part of the samples of the outermost `NEIGHBOURS` + 1 levels that the first may hold: more than a sine's crest, 1/3."""
+"""Part of the samples of the outermost `NEIGHBOURS` + 1 levels that the first may hold: a sine's crest holds 1/3."""
 CLIFF = 4.0
 """Where the next level holds so many times those behind it, the noise is narrower than a level: no tail either."""
 BUSY = 0.3

@@ -19,6 +19,8 @@ SHORT_SHARE = 1e-3
 """Part of a channel's samples that may stand still before nothing of it can be believed."""
 LEAST_CHANGE = float(np.log(1.4))
 """Of the noise, in the logarithm: temperature and the place of a level between two counts change it by less."""
+NOISE_SPREADS = 6.0
+"""Spreads that a change of the noise must have: it is no smaller than `LEAST_CHANGE` besides."""
 LEAST_NOISE = 0.5
 """Resolutions that the noise must have for small steps of the level to be more than rounding."""
 FINE_NOISE = 1.0
@@ -37,7 +39,7 @@ def steps_and_noise(cells: CellLevels, resolution: Array) -> tuple[list[list[Cha
     floor = np.where(fine, 0.0, ROUNDING * resolution)
     usual = np.where(usual > 0.0, usual, 1.0)
     least = np.maximum(noise, 1e-3 * usual[:, None])
-    of_noise = changes(np.log(least), np.full(len(noise), LEAST_CHANGE), flat=True)
+    of_noise = changes(np.log(least), np.full(len(noise), LEAST_CHANGE), flat=True, least=NOISE_SPREADS)
     uneven = np.repeat(np.maximum(least / usual[:, None], 1.0), cells.group, 1)
     short = cells.means.shape[1] - uneven.shape[1]
     uneven = np.hstack([uneven, np.ones((len(uneven), short))]) if short > 0 else uneven
