@@ -4,6 +4,6 @@
 `findings` what comes out, `grouped` the same of many stations, `pieces` the samples cut alike however they came.
 
 One file a question: `edges` saturated, `bits` stuck or coarse, `wraps` jumps of 2^n, `repeats` rows sent twice,
-`copies` two rates, `stalls` runs that stand still, `jumps` outliers and sharp steps, `levels` and `changes` steps and noise,
-`plausibility` wrong unit or rate. `raw_flaws`, `time_flaws` and `wording` put them into words.
+`copies` two rates, `stalls` runs that stand still, `jumps` outliers and sharp steps, `levels` and `changes` steps and
+noise, `plausibility` wrong unit or rate. `raw_flaws`, `time_flaws` and `wording` put them into words.
 """

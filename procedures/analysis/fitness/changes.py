@@ -169,7 +169,7 @@ def _beside(uneven: Array, h: int) -> Array:
 
 def _height(y: Array, k: int, h: int, flat: bool) -> float:
     """The gap at border k without the two cells beside it, within either of which the step may lie."""
-    u = np.arange(1, h) + 0.5
+    u = np.arange(1, h, dtype=np.float64) + 0.5
     left, right = y[k - h : k - 1][::-1], y[k + 1 : k + h]
     apart = float(right.mean() - left.mean())
     return apart if flat else apart - float((_slope(u, right) - _slope(u, left)) * u.mean())
@@ -178,7 +178,7 @@ def _height(y: Array, k: int, h: int, flat: bool) -> float:
 def _is_step(y: Array, k: int, h: int, height: float) -> bool:
     """Whether the gap is there close by, and between the medians."""
     near = _near(y, k, max(1, h // 4), height)
-    u = np.arange(h) + 0.5
+    u = np.arange(h, dtype=np.float64) + 0.5
     left, right = y[k - h : k][::-1], y[k : k + h]
     slope = 0.5 * (_slope(u, right) - _slope(u, left))
     apart = float(np.median(right - slope * u) - np.median(left + slope * u))

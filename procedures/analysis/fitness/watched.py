@@ -130,7 +130,7 @@ class Watched:
         ]
         if not inside:
             return block
-        mended = np.array(block)
+        mended = block.copy()
         for row, column, away in inside:
             mended[row, column] -= round(away) if np.issubdtype(mended.dtype, np.integer) else away
         return mended
