@@ -20,7 +20,7 @@ LEAST_SHARE = 0.01
 """Copies below this part are left to the runs."""
 PART = 1024
 """Differences that are judged together."""
-STRIDE = 13
+STRIDE = 17
 """Every so many differences are looked at, from another one on in each piece, so that each phase of copying comes."""
 FIRST = 4
 """Pieces of which each is looked at."""
@@ -51,14 +51,15 @@ class Copies:
         self.step = np.where(resolution > 0.0, resolution, np.minimum(self.step, least))
         step = np.where(np.isfinite(self.step), self.step, 1.0)[:, None]
         self._looked += some.shape[1]
-        for at in range(0, some.shape[1], PART):
-            self._count(some[:, at : at + PART], step)
+        parts = max(1, some.shape[1] // PART)
+        for part in np.array_split(some, parts, axis=1):
+            self._count(part, step)
 
     def _count(self, some: Array, step: Array) -> None:
         """A stretch short enough for a channel to have one noise in it."""
-        same = np.count_nonzero(some == 0.0, axis=1)
-        one = np.count_nonzero(some < 1.5 * step, axis=1) - same
-        large = np.count_nonzero(some >= COARSE * step, axis=1)
+        same = _counted(some == 0.0)
+        one = _counted(some < 1.5 * step) - same
+        large = _counted(some >= COARSE * step)
         self._same += same
         self._one += one
         self._large += large
@@ -80,3 +81,7 @@ class Copies:
         """
         many = self._proven - in_runs * self._looked > np.maximum(LEAST_SHARE * self._looked, LEAST)
         return np.flatnonzero(many & (self._proven > 0.5 * self._same)).tolist()
+
+
+def _counted(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
+    return np.array([np.count_nonzero(row) for row in mask], np.int64)

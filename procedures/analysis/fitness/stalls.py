@@ -67,18 +67,15 @@ class Stalls:
         self.repeats += zeros
         self._seen += same.shape[1]
         part: Array | None = None
-        few = (zeros < SHORTEST).tolist()
+        has_run, trailing = _has_run(same, zeros), _trailing(same)
         for group in self._groups:
-            if not group.open and any(few[c] for c in group.rows):
-                few_left = [same[c, -SHORTEST:] for c in group.rows]
-                group.open = _trailing(few_left[0] if len(few_left) == 1 else np.logical_and.reduce(few_left))
+            rows = list(group.rows)
+            if not group.open and not has_run[rows].all():
+                group.open = int(trailing[rows].min())
                 continue
-            rows = same[group.rows[0]] if len(group.rows) == 1 else np.logical_and.reduce(same[list(group.rows)])
-            if not group.open and not _has_run(rows):
-                group.open = _trailing(rows)
-                continue
+            together = same[rows[0]] if len(rows) == 1 else np.logical_and.reduce(same[rows])
             part = self._usual(same) if part is None else part
-            self._runs(group, rows, start, part)
+            self._runs(group, together, start, part)
         if part is None and np.isnan(self._part).any():
             self._usual(same)
 
@@ -152,18 +149,18 @@ class Stalls:
         return bool(chance < np.log(CHANCE))
 
 
-def _has_run(rows: Mask) -> bool:
-    """Whether `SHORTEST` repeats stand in a row."""
-    if len(rows) < SHORTEST:
-        return bool(rows.any())
-    two = rows[1:] & rows[:-1]
-    return bool((two[3:] & two[:-3] & rows[2:-2]).any())
+def _has_run(same: Mask, zeros: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether `SHORTEST` repeats stand in a row, (channels,)."""
+    if same.shape[1] < SHORTEST or not np.any(zeros >= SHORTEST):
+        return zeros >= min(SHORTEST, same.shape[1])
+    two = same[:, 1:] & same[:, :-1]
+    return (two[:, 3:] & two[:, :-3] & same[:, 2:-2]).any(axis=1)
 
 
-def _trailing(rows: Mask) -> int:
-    """Repeats at the very end."""
-    changed = np.flatnonzero(~rows[-SHORTEST:])
-    return min(len(rows), SHORTEST) - 1 - int(changed[-1]) if len(changed) else min(len(rows), SHORTEST)
+def _trailing(same: Mask) -> NDArray[np.int64]:
+    """Repeats at the very end, at most `SHORTEST`, (channels,); those of a group are the fewest of its channels."""
+    tail = same[:, -SHORTEST:]
+    return np.where(tail.all(axis=1), tail.shape[1], np.argmin(tail[:, ::-1], axis=1)).astype(np.int64)
 
 
 def _within(run: Run, larger: Sequence[Run]) -> bool:
