@@ -12,6 +12,7 @@ from bench_service.bench.devices import DeviceState
 from bench_service.bench.live.values import BenchLive
 from bench_service.bench.safety import Safety
 from bench_service.jobs.queue import Place, QueueEntry
+from bench_service.mapping import copied
 from bench_service.service import BenchService
 from bench_service.wall_clock import now
 from procedures.bench import BenchDescription
@@ -110,17 +111,7 @@ class QueueEntryView(BaseModel):
     @classmethod
     def of(cls, entry: QueueEntry, place: Place) -> "QueueEntryView":
         """As HTTP says it."""
-        return cls(
-            job=entry.job,
-            position=place.position,
-            ahead=place.ahead,
-            waiting=place.waiting,
-            priority=entry.priority,
-            unit=entry.unit,
-            queued_at=entry.queued_at,
-            not_before=entry.not_before,
-            reservation=entry.reservation,
-        )
+        return copied(cls, entry, place, job=entry.id)
 
 
 class QueueView(BaseModel):
@@ -180,7 +171,7 @@ def read_queue(bench_id: str, service: Service) -> QueueView:
     queue = service.queues.queue(bench_id)
     holder = service.benches.holder(bench_id)
     places = queue.places(holder is not None)
-    entries = [QueueEntryView.of(entry, places[entry.job]) for entry in queue.entries]
+    entries = [QueueEntryView.of(entry, places[entry.id]) for entry in queue.entries]
     return QueueView(bench=queue.bench, running=queue.running, driven_by=holder, entries=entries)
 
 

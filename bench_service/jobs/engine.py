@@ -18,7 +18,7 @@ from pydantic import TypeAdapter
 
 from bench_service.bench.session import ShuttingDown
 from bench_service.jobs.dispatcher import Unfinished
-from bench_service.jobs.queue import RunningJob
+from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.runner import JobRunner, StepOutcome
 from bench_service.model.errors import NotUnderstood, ServiceError, StorageFailure, StorageFull
 from bench_service.model.job import Failure, Job
@@ -114,7 +114,7 @@ class Engine:
             handle = DBOS.start_workflow(self._workflow, job.id, job.attempt)
         handle.get_result()
 
-    def unfinished(self, job: RunningJob) -> Unfinished:
+    def unfinished(self, job: QueueEntry) -> Unfinished:
         """What became of a running job's workflow."""
         status = DBOS.get_workflow_status(_workflow_id(job))
         if status is None:
@@ -231,7 +231,7 @@ class Engine:
         return StepOutcome(Failure(kind, str(error)) if refused else Failure("InternalError", f"{kind}: {error}"))
 
 
-def _workflow_id(job: Job | RunningJob) -> str:
+def _workflow_id(job: Job | QueueEntry) -> str:
     """Each attempt of a job is a workflow of its own."""
     return f"{job.id}/{job.attempt}"
 
