@@ -214,7 +214,7 @@ def _require_calibrations(step: Step, where: str, progress: _Progress) -> None:
 
 def _unresolved(limit: StepLimit, where: str, predicted: tuple[PredictedUncertainty, ...]) -> list[str]:
     """Warn of a limit that is narrower than what the plan will know the quantity to; refuse a unit of another kind."""
-    found = next((p for p in predicted if _same(p.name, limit.quantity)), None)
+    found = next((p for p in predicted if p.about(limit.quantity)), None)
     if found is None:
         return []
     try:
@@ -233,11 +233,6 @@ def _unresolved(limit: StepLimit, where: str, predicted: tuple[PredictedUncertai
         f"the limit of {limit.quantity} cannot be resolved: ±{width:.3g} {limit.unit} is asked for, the plan's "
         f"standard uncertainty is {uncertainty:.3g} {limit.unit}"
     ]
-
-
-def _same(predicted: str, quantity: str) -> bool:
-    """A check's name is a sentence ("gyro_x random walk") where a prediction's is a path ("gyro_x.random_walk")."""
-    return predicted.replace("_", " ").replace(".", " ") == quantity.replace("_", " ").replace(".", " ")
 
 
 def step_field(campaign: Campaign, name: str) -> int:

@@ -29,7 +29,7 @@ def coefficient_table(summary: TriadSummary) -> Table:
 
 
 def _coefficient_row(c: Coefficient, sources: Sequence[str]) -> tuple[str | float, ...]:
-    name = c.name.split(".")[1]
+    name = c.name.symbol
     diagonal = name in ("K11", "K22", "K33")
     if c.unit == "1":
         unit, size, zero = "ppm", units.PPM, 1.0 if diagonal else 0.0

@@ -20,7 +20,7 @@ def coefficient_table(found: WholeTurns) -> Table:
 
 
 def _row(c: Coefficient, sources: tuple[str, ...]) -> tuple[str | float, ...]:
-    name = c.name.split(".")[1]
+    name = c.name.symbol
     zero = 1.0 if name in ("K11", "K22", "K33") else 0.0
     unit, size = ("ppm", units.PPM) if c.unit == "1" else units.DISPLAY[c.unit]
     parts = (c.standard_uncertainty, c.from_noise, c.from_table, *(c.from_table_source[s] for s in sources))
