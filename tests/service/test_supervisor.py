@@ -93,7 +93,7 @@ def identity(worker: subprocess.Popen[bytes]) -> ProcessIdentity:
 
 
 def started(pid: int) -> str:
-    from bench_service.jobs import processes
+    from bench_service.bench import processes
 
     return processes._started(pid)
 
