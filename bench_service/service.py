@@ -96,7 +96,8 @@ class BenchService:
         if reasons:
             raise NotReady(reasons)
         stops = (self.stores.benches.bench_stop(bench) for bench in self.benches.ids())
-        return tuple(f"bench {stop.bench} is stopped: {stop.reason}" for stop in stops if stop is not None)
+        stopped = (f"bench {stop.bench} is stopped: {stop.reason}" for stop in stops if stop is not None)
+        return (*stopped, *self.catalogue.notes())
 
     def stop(self) -> None:
         """End the service: the running job is left for the next start, the bench made safe."""

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from bench_service.campaigns.campaign import Campaign, Step, StepLimit
-from bench_service.jobs.planning import Plan, Planner
+from bench_service.jobs.planning import Plan, Planner, stations_of
 from bench_service.model.errors import NotFound
 from procedures.core.errors import BadParameter, DomainError
 from procedures.core.units import HOUR, converted
@@ -144,7 +144,7 @@ class Examiner:
             raise BadParameter(where, step.does, str(error)) from error
         procedure, context = self._catalogue.procedure(step.does), self._planner.context(unit, bench)
         params = procedure.resolve(procedure.params.model_validate(step.parameters), context)
-        stations = procedure.schedule(params)
+        stations = stations_of(procedure, params)
         _require_known(step, where, None if procedure.quantities is None else procedure.quantities(params, context))
         duration_s = sum(s.power_off_s + s.settle_s + s.record_s for s in stations)
         warning = "not predicted: the calibration that it uses is not there yet"

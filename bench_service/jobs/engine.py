@@ -20,8 +20,9 @@ from bench_service.bench.session import ShuttingDown
 from bench_service.jobs.dispatcher import Unfinished
 from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.runner import JobRunner, StepOutcome
-from bench_service.model.errors import NotUnderstood, ServiceError, StorageFailure, StorageFull
+from bench_service.model.errors import NotUnderstood, ServiceError, StorageFailure, StorageFull, UnfitValue
 from bench_service.model.job import Failure, Job
+from bench_service.telemetry.defects import described
 
 PROCEDURE_ABI = "1"
 """Raise it when stored workflows can no longer be continued by this code."""
@@ -189,7 +190,7 @@ class Engine:
             try:
                 self._runner.end_early(job_id, outcome)
                 return
-            except NotUnderstood:  # no end of ours can be noted: the dispatcher interrupts it
+            except (NotUnderstood, UnfitValue):  # no end of ours can be noted: the dispatcher interrupts it
                 return
             except (StorageFull, StorageFailure) as error:
                 log.warning("the end of job %s cannot be noted yet: %s", job_id, error)
@@ -226,9 +227,9 @@ class Engine:
         """A defect, or books that cannot be kept."""
         error = self._understood(raised)
         refused = isinstance(error, ServiceError)
-        log.error("job %s failed inside the service: %s", job_id, error, exc_info=None if refused else error)
-        kind = type(error).__name__
-        return StepOutcome(Failure(kind, str(error)) if refused else Failure("InternalError", f"{kind}: {error}"))
+        said = str(error) if refused else described(error)
+        log.error("job %s failed inside the service: %s", job_id, said, exc_info=None if refused else error)
+        return StepOutcome(Failure(type(error).__name__ if refused else "InternalError", said))
 
 
 def _workflow_id(job: Job | QueueEntry) -> str:

@@ -136,6 +136,19 @@ def test_results_are_listed_newest_first(stores: Stores, new_result: NewResult) 
     assert stores.results.list(unit="U-1").items == (made[3], made[1])
 
 
+def test_a_value_that_no_database_holds_is_refused_as_one_that_never_will_be(
+    stores: Stores, new_result: NewResult, new_recording: Callable[..., NewRecording]
+) -> None:
+    """Not as a failure of the database, which is answered by trying again."""
+    unit = Unit("U-1", 400.0, new_recording().channels, averaging_time_s=float("nan"))
+    for store in (lambda: stores.units.put_unit(unit), lambda: stores.results.add(new_result(document={"a": [1e999]}))):
+        with pytest.raises(UnfitValue, match="a value cannot be stored: Out of range float values"):
+            store()
+    with pytest.raises(NotFound):
+        stores.units.unit("U-1")
+    assert stores.results.list().items == ()
+
+
 def test_a_unit_comes_back_with_its_current_calibration(
     stores: Stores, new_result: NewResult, new_recording: Callable[..., NewRecording]
 ) -> None:
