@@ -36,6 +36,16 @@ class Outcome(BaseModel):
     warnings: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class Estimate:
+    """A named number of a result. Limits and trends of campaigns may be about it, as about a check."""
+
+    name: str
+    unit: str
+    estimate: float
+    standard_uncertainty: float
+
+
 P = TypeVar("P", bound=Parameters)
 R = TypeVar("R", bound=Outcome)
 

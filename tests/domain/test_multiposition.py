@@ -14,7 +14,7 @@ from procedures.analysis.calibration.table_errors import TableErrors, TableUncer
 from procedures.core.errors import Undetermined
 from procedures.core.frames import orientation_beta_gamma
 from procedures.core.recording import Station
-from tests.domain.forward_model import (
+from tests.kit.forward_model import (
     ACCELEROMETER_NOISE,
     B_ACCELEROMETER,
     B_GYRO,

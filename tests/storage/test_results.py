@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench_service.campaigns.stores import Stores
-from bench_service.model.errors import IdempotencyConflict, NotFound
+from bench_service.model.errors import IdempotencyConflict, NotFound, UnfitValue
 from bench_service.model.job import Job
 from bench_service.model.records import Idempotency, NewRecording, StoredResult
 from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
