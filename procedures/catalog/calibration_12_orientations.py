@@ -230,11 +230,10 @@ def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
     parts, unit = predicted_parts(plan), INPUT_UNITS[plan.triad]
     if parts is None:
         return []
+    rows = [(name, coefficient_unit(name, unit, unit)) for name in COEFFICIENT_NAMES]
     return [
-        PredictedUncertainty(
-            CoefficientName(plan.triad, name), coefficient_unit(name, unit, unit), float(np.hypot(n, t)), n, t
-        )
-        for name, n, t in zip(COEFFICIENT_NAMES, parts[0].tolist(), parts[1].tolist(), strict=True)
+        PredictedUncertainty(CoefficientName(plan.triad, name), of, float(np.hypot(n, t)), n, t)
+        for (name, of), n, t in zip(rows, parts[0].tolist(), parts[1].tolist(), strict=True)
     ]
 
 
