@@ -50,8 +50,6 @@ class AnalysisService:
             return self._stores.results.get(known)
         job = self._read_job(job_id)
         recordings = recordings_of(self._stores, job_id)
-        if len(recordings) < len(job.stations):
-            raise UnfitRecording(f"job {job_id} has {len(recordings)} of its {len(job.stations)} recordings")
         merged = {**job.requested_parameters, **parameters}
         result = analysed(job, self._catalogue.procedure(job.procedure), merged, recordings, self._code_version)
         return self._stores.results.add(result.stored, result.calibrations, False, idempotency, result.corrections)

@@ -11,6 +11,7 @@ from bench_service.model.context import context_of
 from bench_service.model.job import Job
 from bench_service.model.records import StoredResult
 from bench_service.wall_clock import new_id, now
+from procedures.core.errors import UnfitRecording
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Recording
 from procedures.core.unit_correction import UnitCorrection
@@ -43,6 +44,8 @@ def analysed(
 
     A value that cannot be stored, NaN above all, is `UnfitResult`.
     """
+    if len(recordings) != len(job.stations):
+        raise UnfitRecording(f"job {job.id} has {len(recordings)} of its {len(job.stations)} recordings")
     context = context_of(job)
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
     outcome = procedure.analyse(recordings, params, context)

@@ -142,7 +142,7 @@ def test_a_value_that_no_database_holds_is_refused_as_one_that_never_will_be(
     """Not as a failure of the database, which is answered by trying again."""
     unit = Unit("U-1", 400.0, new_recording().channels, averaging_time_s=float("nan"))
     for store in (lambda: stores.units.put_unit(unit), lambda: stores.results.add(new_result(document={"a": [1e999]}))):
-        with pytest.raises(UnfitValue, match="a value cannot be stored.*Out of range float values"):
+        with pytest.raises(UnfitValue, match=r"a value cannot be stored.*Out of range float values"):
             store()
     with pytest.raises(NotFound):
         stores.units.unit("U-1")
