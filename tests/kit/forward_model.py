@@ -40,6 +40,9 @@ K_ACCELEROMETER = np.array(
 )
 B_ACCELEROMETER = np.array([0.090117, 0.092241, 0.12179])
 
+BETA_GAMMA = [(0, -90), (0, 90), (90, 0), (-90, 0), (0, 0), (180, 0)]
+BETA_GAMMA += [(-90, -45), (90, 45), (180, -45), (0, 45), (135, 0), (-45, 0)]
+"""(β, γ) [deg] of the thesis's twelve orientations (figure 5.4), written out here again."""
 CHANNELS = (
     *(Channel(name, Quantity.ANGULAR_RATE, "rad/s") for name in GYRO),
     *(Channel(name, Quantity.SPECIFIC_FORCE, "m/s^2") for name in ACCELEROMETER),
