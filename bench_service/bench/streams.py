@@ -12,12 +12,12 @@ async def stream_of(streams: AsyncIterator[Stream], procedure: str, station: Sta
     stream = await anext(streams, None)
     if stream is None:
         raise ProcedureDefect(
-            f"procedure {procedure} gave no stream for station {_named(station)}: `acquire` must yield one for each "
+            f"procedure {procedure} gave no stream for {_named(station)}: `acquire` must yield one for each "
             "station that it is given, in order"
         )
     if stream.station != station:
         raise ProcedureDefect(
-            f"procedure {procedure} gave the stream of station {_named(stream.station)} where station "
+            f"procedure {procedure} gave the stream of {_named(stream.station)} where "
             f"{_named(station)} was due: `acquire` must yield one for each station, unchanged and in order"
         )
     return stream
@@ -28,10 +28,10 @@ async def require_end(streams: AsyncIterator[Stream], procedure: str, stations: 
     further = await anext(streams, None)
     if further is not None:
         raise ProcedureDefect(
-            f"procedure {procedure} gave one more stream, of station {_named(further.station)}, after the last of its "
+            f"procedure {procedure} gave one more stream, of {_named(further.station)}, after the last of its "
             f"{len(stations)} stations: `schedule` must list every station that `acquire` records"
         )
 
 
-def _named(station: Station) -> str:
-    return f"{station.index} ({station.label})"
+def _named(station: Station | None) -> str:
+    return "no station" if station is None else f"station {station.index} ({station.label})"
