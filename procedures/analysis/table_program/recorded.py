@@ -11,7 +11,7 @@ from procedures.analysis.cells import CellStream, channel_rows
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.noise import NoiseCoefficients
-from procedures.core.recording import TRIADS, Recording, Station
+from procedures.core.recording import TRIADS, Recording, Station, require_complete, require_finite
 from procedures.core.unit import Unit
 
 
@@ -94,14 +94,12 @@ def _means(recording: Recording, names: tuple[str, ...]) -> tuple[Array, Array |
     stream = CellStream(info, names, batch_s) if batch_s > 0.0 else None
     total, seen = np.zeros(len(names)), 0
     for rows in channel_rows(info, names, recording.blocks()):
-        if not np.all(np.isfinite(rows)):
-            raise UnfitRecording(f"recording {info.id} holds samples that are not numbers")
+        require_finite(info, names, rows.T)
         total += rows.sum(axis=1)
         seen += rows.shape[1]
         if stream is not None:
             stream.add(rows)
-    if seen != info.count or not seen:
-        raise UnfitRecording(f"recording {info.id}: {seen} samples where {info.count} are announced")
+    require_complete(info, seen)
     if stream is None:
         return total / seen, None
     batches = stream.finish().rates
