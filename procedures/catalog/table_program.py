@@ -13,7 +13,7 @@ from pydantic import Field
 from procedures import steps
 from procedures.analysis.calibration.station_plan import move_time_s, windows
 from procedures.analysis.table_program.dialect import DELAY_MAX_S, Dwell, read_program, refusal
-from procedures.analysis.table_program.recorded import DwellRecord, channel_noise, dwell_records, mean_sd
+from procedures.analysis.table_program.recorded import DwellRecord, dwell_records, mean_sd
 from procedures.analysis.table_program.writing import THESIS_POSITIONS, dwells_at, write_program
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -102,7 +102,7 @@ def predict(params: Params, context: Context) -> Prediction:
     found: list[PredictedUncertainty] = []
     unknown: list[str] = []
     for channel in context.unit.channels:
-        noise = None if channel.rate_unit == "count" else channel_noise(context.unit, channel.name)
+        noise = context.unit.channel_noise(channel)
         if noise is None:
             unknown.append(channel.name)
             continue

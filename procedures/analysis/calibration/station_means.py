@@ -7,6 +7,7 @@ import numpy as np
 
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
+from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import (
     INCREMENTS,
     TRIADS,
@@ -77,6 +78,14 @@ def station_means(recordings: Sequence[Recording], triad: str) -> StationMeans:
         tuple(i.station.label if i.station else i.id for i in infos),
         tuple(i.station.angles if i.station else None for i in infos),
     )
+
+
+def require_unit_of(calibration: TriadCalibration, means: StationMeans) -> None:
+    """Refuse means that are not in the unit that a calibration is for. Raises `UnfitRecording`."""
+    if means.output_unit != calibration.output_unit:
+        raise UnfitRecording(
+            f"the {means.triad} channels are in {means.output_unit}, the calibration is for {calibration.output_unit}"
+        )
 
 
 def launch_warnings(recordings: Sequence[Recording]) -> tuple[str, ...]:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import toeplitz
-from scipy.special import chdtrc
 
 from procedures.analysis.calibration.station_noise import mean_covariance
 from procedures.analysis.calibration.station_plan import dwell_for
 from procedures.analysis.cells import cell_means
+from procedures.analysis.least_squares.chi_square import tail_probability
 from procedures.analysis.least_squares.whitening import whitener
 from procedures.analysis.recursive_bias.kalman import RecursiveBias
 from procedures.core.arrays import Array
@@ -104,7 +104,7 @@ def slow_noise_p(means: Array, covariance: Array) -> float:
     weights = whitener(averaging @ covariance @ averaging.T)
     values, ones = weights @ averaging @ means, weights @ np.ones(BATCHES)
     residuals = values - ones * float(ones @ values) / float(ones @ ones)
-    return float(chdtrc(BATCHES - 1, float(residuals @ residuals)))
+    return tail_probability(float(residuals @ residuals), BATCHES - 1)
 
 
 def predicted_sd(noise: NoiseCoefficients, dwell_s: float, start_s: float, prior_variance: float | None) -> float:
