@@ -183,7 +183,7 @@ class Recording(Protocol):
 
 @dataclass(frozen=True)
 class MemoryRecording:
-    """A recording held in memory: for tests, and for short stretches cut out of a longer one."""
+    """A recording held in memory: for tests and for work at a prompt; the service reads its own from storage."""
 
     info: RecordingInfo
     raw: RawArray = field(repr=False)

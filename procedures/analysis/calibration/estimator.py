@@ -124,9 +124,3 @@ def _with_flaws(design: Array, whiteners: Array, flaws: Array) -> Array:
 def table_share(plan: Estimator, of_table: Array, table: TableErrors) -> TableShare:
     """The table's flaws carried through the outputs `of_table` F (n, 3, P) and the estimator into the coefficients."""
     return TableShare(np.einsum("kcn,ncp->kp", plan.gain, of_table, optimize=True), table.source)
-
-
-def joint_table_covariance(gyro: TableShare, accelerometer: TableShare) -> Array:
-    """Covariance of all twenty-four coefficients from the table's flaws, which both triads share, shape (24, 24)."""
-    both = np.vstack([gyro.per_sd, accelerometer.per_sd])
-    return both @ both.T
