@@ -185,7 +185,7 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
 def report(result: Result) -> Report:
     """Coefficients, checks, residuals and magnitudes (thesis Tables 5.1-5.4, figures 5.6-5.12)."""
     magnitudes = [t.magnitudes for t in result.triads]
-    tables = [pictures.coefficient_table(t) for t in result.triads]
+    tables = [pictures.triad_table(t) for t in result.triads]
     tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
     tables += [pictures.magnitude_table(magnitudes, "Magnitudes over the orientations")]
     figures = [f for t in result.triads for f in pictures.triad_figures(t)]

@@ -166,9 +166,7 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
 def report(result: Result) -> Report:
     """Coefficients, scale factor over the rates, checks."""
     found = result.gyro
-    return Report(
-        sections=(pictures.coefficient_table(found), *pictures.rate_figures(found), pictures.rate_table(found))
-    )
+    return Report(sections=(pictures.turns_table(found), *pictures.rate_figures(found), pictures.rate_table(found)))
 
 
 def _program(params: Params) -> TurnProgram:

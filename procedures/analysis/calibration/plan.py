@@ -99,7 +99,12 @@ def predicted_parts(plan: TriadPlan) -> tuple[Array, Array] | None:
     if noise is None:
         estimator(f"the {plan.triad} coefficients", plan.vectors, np.array([np.eye(len(plan.stations))] * 3))
         return None
-    gls = plan.estimator(noise)
+    return parts_by_noise(plan, noise)
+
+
+def parts_by_noise(plan: TriadPlan, noise_covariance: Array) -> tuple[Array, Array]:
+    """`predicted_parts` for a known covariance of the station means (3, n, n). Raises `Undetermined`."""
+    gls = plan.estimator(noise_covariance)
     return np.sqrt(np.diagonal(gls.noise_covariance)), np.sqrt(np.diagonal(plan.share(gls).covariance))
 
 
