@@ -175,10 +175,7 @@ def _used_s(dwell: Dwell, at: TableAngles, params: Params) -> float:
     """What of a delay is gone before the recording: the least time to move, and the settling [s]."""
     if params.axis_motion is None:
         raise BadParameter("axis_motion", None, "resolve the parameters first: how fast the axes move the bench says")
-    to = dwell.angles
-    turns = (to.outer_deg - at.outer_deg, to.middle_deg - at.middle_deg, to.inner_deg - at.inner_deg)
-    moving = max(move_time_s(turn, *axis) for turn, axis in zip(turns, params.axis_motion, strict=True))
-    return moving + params.settle_s
+    return move_time_s(at, dwell.angles, params.axis_motion) + params.settle_s
 
 
 def _recorded_s(dwell: Dwell, used_s: float) -> float:

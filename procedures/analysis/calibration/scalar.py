@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from procedures.analysis.calibration.magnitude import magnitude_covariance, magnitude_gradient
-from procedures.analysis.least_squares.chi_square import judged_p_value
+from procedures.analysis.least_squares.chi_square import judged_p_value, residual_factor
 from procedures.analysis.least_squares.determination import RANK_TOLERANCE, require_full_rank
 from procedures.analysis.least_squares.inverse import scaled_pinv
 from procedures.analysis.least_squares.whitening import whitener
@@ -163,7 +163,7 @@ def fit_scalar(
     residuals = _magnitudes(parameters, outputs) - reference
     whitened = weights @ residuals
     chi_square, degrees = float(whitened @ whitened), len(outputs) - 9
-    factor = 1.0 if noise_known or degrees == 0 else max(1.0, chi_square / degrees)
+    factor = residual_factor(chi_square, degrees, noise_known)
     remaining = np.eye(len(outputs)) - jacobian @ solve
     expected = np.diagonal(remaining @ covariance_f @ remaining.T) * factor
     gain = -np.einsum("pn,nc->pnc", solve, _output_weights(parameters, outputs))

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from procedures.analysis.field.positions import Tilt, field_vectors, of_azimuth, of_settings, of_tilt
-from procedures.analysis.least_squares.chi_square import judged_p_value
+from procedures.analysis.least_squares.chi_square import judged_p_value, residual_factor
 from procedures.analysis.least_squares.determination import require_full_rank
 from procedures.analysis.least_squares.inverse import scaled_pinv
 from procedures.analysis.least_squares.whitening import whitener
@@ -154,7 +154,7 @@ def fit_field(
     inverse = scaled_pinv(whitened @ jacobian)
     chi_square = float(np.sum((whitened @ residuals) ** 2))
     degrees = 3 * len(outputs) - len(asked)
-    factor = 1.0 if noise_known or degrees == 0 else max(1.0, chi_square / degrees)
+    factor = residual_factor(chi_square, degrees, noise_known)
     covariance = np.zeros((8, 8))
     covariance[np.ix_(asked, asked)] = inverse @ inverse.T * factor
     if not model.estimate_scale:

@@ -19,6 +19,11 @@ def tail_probability(statistic: float, degrees_of_freedom: int) -> float:
     return float(chdtrc(degrees_of_freedom, statistic))
 
 
+def residual_factor(statistic: float, degrees_of_freedom: int, noise_known: bool) -> float:
+    """Factor on the noise's covariance that makes the residuals likely: χ²/ν, never under one, one of known noise."""
+    return 1.0 if noise_known or degrees_of_freedom == 0 else max(1.0, statistic / degrees_of_freedom)
+
+
 def judged_p_value(statistic: float, degrees_of_freedom: int, noise_known: bool) -> float | None:
     """`tail_probability` of a fit's residuals, or None where it proves nothing.
 

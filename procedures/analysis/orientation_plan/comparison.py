@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -99,13 +100,8 @@ def total_time_s(angles: Sequence[TableAngles], dwell_s: float, setting: Setting
 def in_short_order(angles: Sequence[TableAngles], setting: Setting) -> tuple[TableAngles, ...]:
     """Always the nearest orientation next, beginning from the table's zero."""
     left, at, ordered = list(angles), TableAngles(), list[TableAngles]()
-
-    def move(to: TableAngles) -> float:
-        turns = (to.outer_deg - at.outer_deg, to.middle_deg - at.middle_deg, to.inner_deg - at.inner_deg)
-        return max(move_time_s(turn, *axis) for turn, axis in zip(turns, setting.axes, strict=True))
-
     while left:
-        at = min(left, key=move)
+        at = min(left, key=partial(move_time_s, at, axes=setting.axes))
         left.remove(at)
         ordered.append(at)
     return tuple(ordered)
