@@ -25,12 +25,15 @@ def copied(shape: type[T], *sources: object, **given: Any) -> T:
     for name, needed in required.items():
         if name in values:
             continue
-        value = next((found for s in sources if (found := getattr(s, name, MISSING)) is not MISSING), MISSING)
-        if value is not MISSING:
-            values[name] = value
-        elif needed:
-            has = " or ".join(type(source).__name__ for source in sources) or "nothing"
-            raise TypeError(f"{shape.__name__} needs {name}: {has} has no such field, and it is not given")
+        for source in sources:
+            value = getattr(source, name, MISSING)
+            if value is not MISSING:
+                values[name] = value
+                break
+        else:
+            if needed:
+                has = " or ".join(type(source).__name__ for source in sources) or "nothing"
+                raise TypeError(f"{shape.__name__} needs {name}: {has} has no such field, and it is not given")
     return shape(**values)
 
 
