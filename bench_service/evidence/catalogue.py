@@ -62,5 +62,6 @@ class Catalogue:
         for name, error in found.broken.items():
             sentence = f"{folder}/{name}.py is left out: {described(error)}"
             self._left_out[kind, name] = sentence
-            log.error(sentence, exc_info=error)
+            log.error("%s", sentence)
+            log.debug("where %s/%s.py broke", folder, name, exc_info=error)
         return found.entries
