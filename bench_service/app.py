@@ -9,7 +9,8 @@ from fastapi import Depends, FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
-from bench_service.api import audit, benches, health, metrics, procedures, recordings, reservations, results, trends
+from bench_service.api import audit, health, metrics, procedures, recordings, reservations, results, trends
+from bench_service.api.benches import routes as benches
 from bench_service.api.campaigns import routes as campaigns
 from bench_service.api.campaigns import schedules
 from bench_service.api.http import bodies, errors, request_id

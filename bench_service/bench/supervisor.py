@@ -52,7 +52,7 @@ class SafetyBooks(Protocol):
         """A stopped bench is safe."""
         ...
 
-    def stop(self, reason: str) -> None:
+    def stop(self, reason: str, by: str) -> None:
         """Stop the bench until a person releases it."""
         ...
 
@@ -152,7 +152,7 @@ class Supervisor:
             self._books.confirm_safe(state.by)
             self._confirmed = True
         if self._unsaid_stop is not None:
-            self._books.stop(self._unsaid_stop)
+            self._books.stop(self._unsaid_stop, self._by)
             self._unsaid_stop = None
         while self._unsaid:
             self._books.note(self._by, *self._unsaid[0])

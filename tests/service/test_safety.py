@@ -8,11 +8,11 @@ from pathlib import Path
 import httpx
 import pytest
 
+from bench_service.bench import safety
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.cli.client import connect
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver
-from bench_service.jobs import safety
 from bench_service.persistence import open_stores
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.settings import Settings

@@ -45,7 +45,7 @@ class Books:
         self._ask()
         self.confirmed = by
 
-    def stop(self, reason: str) -> None:
+    def stop(self, reason: str, by: str) -> None:
         self._ask()
         self.is_stopped = True
         self.said.append(f"stopped: {reason}")
@@ -93,7 +93,7 @@ def identity(worker: subprocess.Popen[bytes]) -> ProcessIdentity:
 
 
 def started(pid: int) -> str:
-    from bench_service.jobs import processes
+    from bench_service.bench import processes
 
     return processes._started(pid)
 

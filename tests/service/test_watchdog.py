@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from bench_service.bench import session
 from bench_service.bench.watchdog import Patience, Watchdog
 from bench_service.campaigns.stores import Stores
 from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver
-from bench_service.jobs import session
 from bench_service.jobs.runner import JobRunner
 from bench_service.model.job import Job, JobState
 from bench_service.persistence import open_stores

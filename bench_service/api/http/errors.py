@@ -27,6 +27,7 @@ from bench_service.model.errors import (
     NotSafe,
     NotUnderstood,
     ServiceError,
+    SeveralStops,
     StorageFailure,
     StorageFull,
 )
@@ -44,6 +45,7 @@ STATUS: dict[type[Exception], int] = {
     NotReady: 503,
     NotMounted: 422,
     NotSafe: 409,
+    SeveralStops: 409,
     NotUnderstood: 409,
     DomainError: 422,
     BenchError: 502,
@@ -171,6 +173,8 @@ def _on_known(request: Request, error: Exception) -> Response:
         fields = [FieldError(field=error.field, message=error.allowed, value=_jsonable(error.value))]
     if isinstance(error, NotReady):
         fields = [FieldError(field="service", message=reason) for reason in error.reasons]
+    if isinstance(error, SeveralStops):
+        fields = [FieldError(field="stop_id", message=text, value=stop) for stop, text in error.stops]
     lost = list(error.lost) if isinstance(error, Undetermined) else []
     return respond(request, status_of(error), str(error), type(error).__name__, fields, lost)
 

@@ -31,14 +31,17 @@ class SqlSafetyBooks:
 
     def stopped(self) -> bool:
         with self._database.read() as session:
-            query = select(BenchStopRow.bench).where(BenchStopRow.bench == self._bench_id)
-            return session.scalar(query) is not None
+            query = select(BenchStopRow.id).where(
+                BenchStopRow.bench == self._bench_id, BenchStopRow.released_at.is_(None)
+            )
+            return session.scalar(query.limit(1)) is not None
 
     def confirm_safe(self, by: str) -> None:
         SqlBenchRegistry(self._database).confirm_safe(self._bench_id, wall_clock.now(), by)
 
-    def stop(self, reason: str) -> None:
-        SqlBenchRegistry(self._database).stop_bench(BenchStop(self._bench_id, wall_clock.now(), reason))
+    def stop(self, reason: str, by: str) -> None:
+        stop = BenchStop(self._bench_id, wall_clock.now(), reason, by=by)
+        SqlBenchRegistry(self._database).stop_bench_once(stop)
 
     def note(self, by: str, text: str, job: str | None) -> None:
         at = wall_clock.now()
