@@ -13,6 +13,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from bench_service.api.http.bodies import BODY_BYTES
+from bench_service.api.http.headers import SECURITY_HEADERS
 from bench_service.formats.plain_json import A_NUMBER, NOT_SO_DEEP, is_finite, shown
 from bench_service.model.errors import (
     AlreadyReserved,
@@ -89,8 +90,10 @@ _UNREAD: dict[type, str] = {RecursionError: NOT_SO_DEEP, ValueError: A_NUMBER}
 
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """The `responses` of a route: these statuses answer with a problem document; 400, 422 and 503 always can."""
-    wanted = sorted({*statuses, 400, 422, 503})
+    """The `responses` of a route: these statuses answer with a problem document. Those of the door (401, 403, 421), of
+    a body or an address that is not understood, and of a service that is not ready are possible everywhere.
+    """
+    wanted = sorted({*statuses, 400, 401, 403, 421, 422, 503})
     return {
         status: {
             "description": HTTPStatus(status).phrase,
@@ -224,7 +227,9 @@ def _on_http(request: Request, error: Exception) -> Response:
 
 
 def _on_unknown(request: Request, error: Exception) -> Response:
-    return respond(request, 500, "a defect of the service; its log has the details", "InternalError")
+    response = respond(request, 500, "a defect of the service; its log has the details", "InternalError")
+    response.headers.update(SECURITY_HEADERS)  # this answer is made outside of all that adds to answers
+    return response
 
 
 def respond(
