@@ -12,6 +12,7 @@ import uvicorn
 from bench_service.api.http.door import Door, may_listen
 from bench_service.app import create_app, open_service
 from bench_service.cli.logs import set_up
+from bench_service.cli.private_files import protect
 from bench_service.cli.refusal import Refused
 from bench_service.settings import Settings
 from bench_service.wall_clock import pause
@@ -33,6 +34,7 @@ def ready(
     `open_service` raises: before any thread or signal handler is there.
     """
     set_up(settings, level)
+    protect(settings)
     if socket_file is None:
         check_address(settings)
     rules = Door.of(settings) if socket_file is None else Door.of(settings, EMBEDDED)

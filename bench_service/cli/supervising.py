@@ -12,6 +12,7 @@ from types import FrameType
 
 from bench_service.bench.supervisor import Supervisor
 from bench_service.cli.logs import set_up
+from bench_service.cli.private_files import protect
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.model.errors import BenchBusy
@@ -35,6 +36,7 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
     that drives the bench.
     """
     set_up(settings, "info")
+    protect(settings)
     ending = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:

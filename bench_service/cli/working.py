@@ -9,6 +9,7 @@ from types import FrameType
 from bench_service.app import open_service
 from bench_service.cli.companion import accompanied
 from bench_service.cli.logs import set_up
+from bench_service.cli.private_files import protect
 from bench_service.settings import Settings
 
 
@@ -18,6 +19,7 @@ def work(settings: Settings, say: Callable[[str], object]) -> None:
     Raises what `open_service` raises, `BenchBusy` first of all, and `NotDriving` where the engine does not start.
     """
     set_up(settings, "info")
+    protect(settings)
     ending = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:
