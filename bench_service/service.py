@@ -15,12 +15,8 @@ from bench_service.jobs.queue_service import QueueService
 from bench_service.jobs.service import JobService
 from bench_service.jobs.stops import StopService
 from bench_service.jobs.worker import Worker
-<<<<<<< HEAD
-from bench_service.model.errors import NotReady
-from bench_service.model.records import reasons_of
-=======
 from bench_service.model.errors import NotDriving, NotReady
->>>>>>> main
+from bench_service.model.records import reasons_of
 from bench_service.telemetry.tracing import Traces
 
 LEAST_FREE_BYTES = 200_000_000
