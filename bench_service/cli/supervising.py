@@ -10,6 +10,7 @@ from functools import partial
 from bench_service.bench.supervisor import Supervisor
 from bench_service.cli.ending import ending_on_signals
 from bench_service.cli.logs import set_up
+from bench_service.cli.private_files import protect
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.model.errors import BenchBusy
@@ -33,6 +34,7 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
     that drives the bench.
     """
     set_up(settings, "info")
+    protect(settings)
     ending = ending_on_signals()
     folder, bench = settings.devices_in(), settings.bench_id
     files = HostFiles(folder, bench)

@@ -8,6 +8,7 @@ from bench_service.app import open_service
 from bench_service.cli.companion import accompanied
 from bench_service.cli.ending import ending_on_signals
 from bench_service.cli.logs import set_up
+from bench_service.cli.private_files import protect
 from bench_service.settings import Settings
 
 
@@ -17,6 +18,7 @@ def work(settings: Settings, say: Callable[[str], object]) -> None:
     Raises what `open_service` raises, `BenchBusy` first of all, and `NotDriving` where the engine does not start.
     """
     set_up(settings, "info")
+    protect(settings)
     ending = ending_on_signals()
     started = threading.Event()
     with accompanied(settings, lambda: started.is_set() and not ending.is_set()), ExitStack() as closing:

@@ -166,7 +166,7 @@ class Dispatcher:
     def _tell(self, queue: BenchQueue) -> None:
         """Note in the events of the queue's first job why it does not start, once for each reason."""
         head: QueueEntry | None = queue.entries[0] if queue.entries else None
-        why = None if head is None or (queue.stop is None and not queue.reservations) else queue.hold(head)
+        why = None if head is None or (not queue.stops and not queue.reservations) else queue.hold(head)
         if head is None or why is None or self._told == (head.id, why):
             return
         self._stores.jobs.note(head.id, "note", now(), {"text": why})

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from bench_service.jobs.reservation import Reservation, Reserved
 from bench_service.model.job import Failure, Job
-from bench_service.model.records import BenchStop
+from bench_service.model.records import BenchStop, reasons_of
 
 LONGEST_PAUSE_S = 300.0
 """No retry is put off for longer [s]. One that is due later than that was put off by a clock that was set back since:
@@ -54,7 +54,8 @@ class BenchQueue:
     """In order."""
     running: str | None = None
     """The job that drives the bench."""
-    stop: BenchStop | None = None
+    stops: tuple[BenchStop, ...] = ()
+    """Those that stand, oldest first."""
     reservations: tuple[Reservation, ...] = ()
     """Those that hold now, of the bench and of the units in the queue."""
 
@@ -64,8 +65,8 @@ class BenchQueue:
 
     def hold(self, entry: QueueEntry) -> str | None:
         """Why a job may not start whatever else the bench does; None where it may."""
-        if self.stop is not None:
-            return f"bench {self.bench} is stopped: {self.stop.reason}"
+        if self.stops:
+            return f"bench {self.bench} is stopped: {reasons_of(self.stops)}"
         for reservation in self._of_others(entry):
             what = f"{reservation.kind.value} {reservation.name}"
             return f"{what} is reserved by {reservation.holder} until {reservation.until.isoformat()}"

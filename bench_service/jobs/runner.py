@@ -220,7 +220,8 @@ class JobRunner:
 
     def _not_safe(self, job_id: str, why: str) -> StepOutcome:
         text = f"the bench could not be made safe: {why}"
-        self._stores.benches.stop_bench(BenchStop(self._driver.description.id, now(), f"could not be made safe: {why}"))
+        by, reason = f"the worker, {ProcessIdentity.own()}", f"could not be made safe: {why}"
+        self._stores.benches.stop_bench_once(BenchStop(self._driver.description.id, now(), reason, by=by))
         self._stores.jobs.note(job_id, "note", now(), {"text": text})
         return StepOutcome(Failure("NotSafe", text))
 

@@ -17,6 +17,7 @@ from bench_service.persistence import Database
 from bench_service.persistence.stores import stores_of
 from bench_service.wall_clock import new_id, now
 from procedures.core.limits import Verdict
+from tests.stops import release_all
 from tests.storage.conftest import NOW
 
 NewJob = Callable[..., Job]
@@ -194,7 +195,7 @@ def test_people_who_stop_a_bench_at_once_all_stop_it(stores: Stores, new_job: Ne
             stop = stores.benches.bench_stop("sim")
             assert stop is not None
             assert stop.reason.startswith("person")
-            stores.benches.release_bench("sim")
+            release_all(stores.benches, "sim")
 
 
 def test_a_bench_stays_stopped_until_it_is_released(stores: Stores) -> None:
@@ -204,7 +205,7 @@ def test_a_bench_stays_stopped_until_it_is_released(stores: Stores) -> None:
     assert stores.benches.bench_stop("b-1") == stop
     assert stores.benches.bench_stop("b-2") is None
     for _ in range(2):
-        stores.benches.release_bench("b-1")
+        release_all(stores.benches, "b-1")
     assert stores.benches.bench_stop("b-1") is None
 
 

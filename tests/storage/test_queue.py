@@ -15,6 +15,7 @@ from bench_service.model.records import BenchStop, Idempotency
 from bench_service.persistence import Database
 from bench_service.persistence.stores import stores_of
 from bench_service.wall_clock import new_id
+from tests.stops import release_all
 from tests.storage.conftest import NOW
 
 NewJob = Callable[..., Job]
@@ -100,7 +101,7 @@ def test_a_stopped_bench_gives_no_job(stores: Stores, new_job: NewJob) -> None:
     assert place is not None
     assert place.waiting == "bench sim is stopped: smoke"
     assert claim_next(stores) is None
-    stores.benches.release_bench("sim")
+    release_all(stores.benches, "sim")
     assert claim_next(stores) is not None
 
 

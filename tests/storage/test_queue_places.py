@@ -15,6 +15,7 @@ from bench_service.model.records import BenchStop
 from bench_service.persistence import Database
 from bench_service.persistence.jobs.queue_store import FIRST_PAGE, LONGER
 from bench_service.wall_clock import new_id
+from tests.stops import release_all
 from tests.storage.conftest import NOW
 
 SECOND = timedelta(seconds=1)
@@ -57,7 +58,7 @@ def queues(draw: st.DrawFn) -> BenchQueue:
         at=NOW,
         entries=tuple(sorted(draw(ENTRIES), key=lambda entry: (entry.priority, entry.queued_at, entry.id))),
         running=draw(st.none() | st.just("the running one")),
-        stop=draw(st.none() | st.just(BenchStop("sim", NOW, "smoke"))),
+        stops=draw(st.just(()) | st.just((BenchStop("sim", NOW, "smoke"),))),
         reservations=tuple(draw(RESERVATIONS)),
     )
 
@@ -136,8 +137,8 @@ def test_the_front_is_read_only_as_far_as_it_must_be(stores: Stores, new_job: Ca
     stores.benches.stop_bench(BenchStop("sim", NOW, "smoke"))
     stopped = stores.queue.front("sim", NOW)
     assert (len(stopped.entries), stopped.next()) == (FIRST_PAGE, None)
-    assert stopped.stop == stores.queue.look("sim", NOW).stop
-    stores.benches.release_bench("sim")
+    assert stopped.stops == stores.queue.look("sim", NOW).stops
+    release_all(stores.benches, "sim")
     assert stores.queue.claim(front.entries[0], {}, NOW) is not None
     assert stores.queue.front("sim", NOW) == BenchQueue("sim", NOW, (), running=jobs[0].id)
 

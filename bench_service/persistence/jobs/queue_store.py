@@ -11,12 +11,11 @@ from bench_service.jobs.queue import BenchQueue, QueueEntry
 from bench_service.mapping import copied
 from bench_service.model.errors import IllegalTransition
 from bench_service.model.job import Failure, Job, JobState
-from bench_service.model.records import BenchStop
+from bench_service.persistence.bench.registry_store import standing_stops
 from bench_service.persistence.database import Database
 from bench_service.persistence.jobs.job_changes import append_event, found_job, move_job
 from bench_service.persistence.jobs.job_rows import failure_document, job_of_row
 from bench_service.persistence.jobs.reservation_store import active_reservations, reservation_of_row
-from bench_service.persistence.tables.bench import BenchStopRow
 from bench_service.persistence.tables.columns import columns
 from bench_service.persistence.tables.jobs import JobRow, ReservationRow
 
@@ -33,7 +32,6 @@ _FRONT = select(*_ENTRY).where(_OF_BENCH, JobRow.state == QUEUED).order_by(*_ORD
 _FURTHER = _FRONT.where(tuple_(*_ORDER) > tuple_(*(bindparam(f"last_{c.key}", type_=c.type) for c in _ORDER)))
 """Those that wait, from the first on, and from one on: in the order of an index, so the others are not touched."""
 _RUNNING = select(*_ENTRY).where(_OF_BENCH, JobRow.state == RUNNING).order_by(JobRow.id).limit(1)
-_STOP = select(BenchStopRow.at, BenchStopRow.reason).where(BenchStopRow.bench == bindparam("bench"))
 
 
 class SqlQueueStore:
@@ -52,7 +50,7 @@ class SqlQueueStore:
             first = () if running is not None else _entries(session, bench, FIRST_PAGE)
             queue = _queue(session, bench, at, first, running)
             wanted = FIRST_PAGE
-            while len(queue.entries) == wanted and queue.stop is None and queue.next() is None:
+            while len(queue.entries) == wanted and not queue.stops and queue.next() is None:
                 more = _entries(session, bench, wanted * (LONGER - 1), queue.entries[-1])
                 queue, wanted = replace(queue, entries=queue.entries + more), wanted * LONGER
             return queue
@@ -125,9 +123,7 @@ def _queue(
     """These entries, with everything that may keep them from starting."""
     if not entries:
         return BenchQueue(bench, at, (), running)
-    stop = session.execute(_STOP, {"bench": bench}).first()
-    held = None if stop is None else BenchStop(bench, stop.at, stop.reason)
-    return BenchQueue(bench, at, entries, running, held, active_reservations(session, at))
+    return BenchQueue(bench, at, entries, running, standing_stops(session, bench), active_reservations(session, at))
 
 
 def _running(session: Session, bench: str) -> str | None:
