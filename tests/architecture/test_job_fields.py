@@ -39,23 +39,21 @@ def upgrade() -> None:
 """
 SUBMIT = """
 import json, sys
-from contextlib import ExitStack
-from fastapi.testclient import TestClient
-from bench_service.app import create_app, open_service
+from bench_service.cli.client import connect
 from bench_service.drivers.simulated import SimulatedDriver
+from bench_service.persistence import open_stores
 from bench_service.settings import Settings
 
-with ExitStack() as closing:
-    service = open_service(Settings(database_url=sys.argv[1]), closing, drive=False)
-    driver = SimulatedDriver("sim")
-    for unit in driver.mounted():
-        service.stores.units.put_unit(unit)
-    service.stores.benches.put_bench(driver.description, ["SIM-0001"])
-    http = TestClient(create_app(service, 1, lambda: None))
+settings, driver = Settings(database_url=sys.argv[1]), SimulatedDriver("sim")
+stores, database = open_stores(settings.database_url)
+for unit in driver.mounted():
+    stores.units.put_unit(unit)
+stores.benches.put_bench(driver.description, ["SIM-0001"])
+with connect(settings, None, drive=False) as http:
     body = {"procedure": "no_operation", "unit": "SIM-0001", "shift": "night"}
     made = http.post("/api/v1/jobs", json=body).json()
     listed = http.get("/api/v1/jobs").json()["items"]
-    print(json.dumps([made.get("shift"), [job["shift"] for job in listed], service.stores.jobs.get(made["id"]).shift]))
+    print(json.dumps([made.get("shift"), [job["shift"] for job in listed], stores.jobs.get(made["id"]).shift]))
 """
 
 
