@@ -1,7 +1,13 @@
 """The audit trail over HTTP: who asked what and what became of it; nothing about who only looked."""
 
+import sqlite3
+from pathlib import Path
+
 import pytest
 
+from bench_service.cli.client import connect
+from bench_service.settings import Settings
+from tests.kit.registered import register_bench
 from tests.service.client import Client
 
 BODY = {"procedure": "no_operation", "unit": "SIM-0001", "labels": {"lot": "7"}}
@@ -86,3 +92,21 @@ def test_the_trail_is_paged(client: Client) -> None:
     assert len(first["items"]) == 2
     assert len(second["items"]) == 1
     assert {e["outcome"] for e in first["items"]} == {"404"}
+
+
+def test_where_the_entry_cannot_be_written_the_outcome_is_told_all_the_same(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    file = tmp_path / "bench.sqlite"
+    settings = Settings(database_url=f"sqlite:///{file}")
+    register_bench(settings)
+    with connect(settings, None, drive=False) as http:
+        other = sqlite3.connect(file)
+        other.execute("CREATE TRIGGER full BEFORE INSERT ON audit BEGIN SELECT RAISE(ABORT, 'no room'); END")
+        other.commit()
+        other.close()
+        assert http.post("/api/v1/benches/sim/stop").status_code == 202
+        assert http.get("/api/v1/benches/sim").json()["state"] == "stopped"
+        assert http.get("/api/v1/audit").json()["items"] == []
+    assert "no room" in caplog.text
+    assert "/api/v1/benches/sim/stop" in caplog.text

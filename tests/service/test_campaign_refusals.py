@@ -1,10 +1,14 @@
 """What campaigns, runs, schedules and trends refuse: each names the field, the value and what is allowed."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from bench_service.cli.client import connect
+from bench_service.settings import Settings
+from tests.kit.registered import register_bench
 from tests.service.campaigns import SHORT, add, ended, named, start
 from tests.service.client import Client
 
@@ -161,3 +165,18 @@ def test_a_trend_that_cannot_be(sqlite_client: Client, query: dict[str, Any], st
         sqlite_client.http.get("/api/v1/units/NOBODY/trend", params={"quantity": "x", "procedure": "y"}).status_code
         == 404
     )
+
+
+def test_where_benches_have_other_names_than_this_process_expects_a_campaign_is_examined_on_one_of_them(
+    tmp_path: Path,
+) -> None:
+    """An HTTP process without a bench of its own; a run must still name its bench."""
+    settings = Settings(database_url=f"sqlite:///{tmp_path / 'bench.sqlite'}")
+    for bench in ("east", "west"):
+        register_bench(settings.model_copy(update={"bench_id": bench}))
+    with connect(settings, None, drive=False) as http:
+        add(Client(http), named("somewhere", {}))
+        refused = http.post("/api/v1/campaigns/somewhere/runs", json={"unit": "SIM-0001"})
+        assert refused.status_code == 404, refused.text
+        assert "there is no bench 'sim': there is east, west" in refused.json()["detail"]
+        assert http.post("/api/v1/campaigns/somewhere/preview", json={"unit": "SIM-0001", "bench": "west"}).is_success
