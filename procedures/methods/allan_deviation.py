@@ -21,7 +21,6 @@ from procedures.analysis.allan.statistic import (
     log_sizes,
     octave_sizes,
     one_two_four_sizes,
-    sizes_of,
 )
 from procedures.analysis.fitness.findings import FitnessSettings
 from procedures.analysis.fitness.watched import Inspection
@@ -167,7 +166,7 @@ def _deviations(
     for block in recording.blocks():
         for column, channel, stream in zip(columns, channels, streams, strict=True):
             with _naming(info.id, channel.name):
-                stream.add((np.asarray(block)[:, column].astype(np.float64) - channel.offset) * channel.scale)
+                stream.add(channel.value(np.asarray(block)[:, column].astype(np.float64)))
     return [_finished(stream, info.id, name) for stream, name in zip(streams, names, strict=True)]
 
 
@@ -180,7 +179,7 @@ def _sizes(params: Params, largest: int, rate_hz: float) -> Sizes:
                     f"from {1 / rate_hz:g} s, one sample, to {largest / rate_hz:g} s, the longest of this recording"
                 )
                 raise BadParameter("taus", tau_s, allowed)
-        return sizes_of(params.taus, rate_hz)
+        return np.unique(np.round(np.asarray(params.taus) * rate_hz).astype(np.int64))
     if params.taus == "all" and largest > MOST:
         allowed = (
             f"of {largest} cluster times at most {MOST} are taken: ask for octave, decade, a list or a shorter stretch"

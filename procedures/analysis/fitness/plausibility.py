@@ -9,7 +9,7 @@ from procedures.analysis.fitness.findings import FitnessSettings
 from procedures.analysis.fitness.pieces import Samples
 from procedures.core import units
 from procedures.core.arrays import Array
-from procedures.core.recording import ACCELEROMETER, GYRO, INCREMENTS, TRIADS, Channel, Quantity
+from procedures.core.recording import ACCELEROMETER, GYRO, INCREMENTS, TRIADS, Channel, NominalScale, Quantity
 
 BURST = 128
 """Samples that are averaged before a magnitude is taken, so that noise does not pass for a reading."""
@@ -47,8 +47,7 @@ class Readings:
 
     def __init__(self, channels: Sequence[Channel], rate_hz: float) -> None:
         self._rate_hz = rate_hz
-        self._offset = np.array([c.offset for c in channels])
-        self._gain = np.array([c.scale * (rate_hz if c.quantity in INCREMENTS else 1.0) for c in channels])
+        self._scale = NominalScale.of(channels, rate_hz)
         self._channels = tuple(channels)
         self._names = [c.name for c in channels]
         self._sums = np.zeros(len(channels))
@@ -64,7 +63,7 @@ class Readings:
         length = min(BURST, x.shape[1])
         bursts = min(BURSTS, x.shape[1] // length)
         means = x[:, : length * bursts].astype(np.float64).reshape(len(x), bursts, length).mean(axis=2)
-        means = (means - self._offset[:, None]) * self._gain[:, None]
+        self._scale.convert_rows(means)
         self._sums += np.sort(means, axis=1)[:, bursts // 2]
         for name, rows in self._triads.items():
             self._magnitudes[name] += float(np.sort(np.linalg.norm(means[rows], axis=0))[bursts // 2])
@@ -145,9 +144,9 @@ class Readings:
         found: dict[str, Doubt] = {}
         for group, burst in read.items():
             # Single bursts tell a motion from a rest; what a unit at rest reads is surer from all samples.
-            value = min(burst, float(np.linalg.norm(((mean - self._offset) * self._gain)[list(group)])))
+            value = min(burst, float(np.linalg.norm(self._scale.rates(mean)[list(group)])))
             names = [self._names[i] for i in group]
-            walk = float(np.max((noise * np.abs(self._gain))[list(group)])) / self._rate_hz**0.5
+            walk = float(np.max((noise * np.abs(self._scale.gain))[list(group)])) / self._rate_hz**0.5
             sampled = all(self._channels[i].quantity is Quantity.ANGULAR_RATE for i in group)
             if value > limit and (good or value * units.DEG > limit or not sampled):
                 found.update(self._told(group, names, value, expected, units.EARTH_RATE, candidates))
