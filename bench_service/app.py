@@ -22,6 +22,8 @@ from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.live.values import Heartbeat, LiveBoard
 from bench_service.bench.prompts import AskedOperator, Asking
 from bench_service.bench.safety import SafetyService
+from bench_service.bench.stop_road import StopRoads
+from bench_service.bench_files import BenchFiles
 from bench_service.campaigns.stores import Stores
 from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
@@ -68,6 +70,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     that other processes drive.
     Raises `BenchBusy`, `StorageFailure`, `NotMounted`.
     """
+    files = BenchFiles(settings)
+    rescued = files.rescue() if drive else None
     threadpool_limits(1)  # our matrices have at most 72 rows: BLAS threads would only spin against the bench's own
     stores, database = open_stores(settings.database_url)
     closing.callback(database.dispose)
@@ -86,19 +90,26 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     if driver is not None:
         lease = acquire_lease(settings.database_url, settings.bench_id)
         closing.callback(lease.release)
-        files = HostFiles(settings.devices_in(), settings.bench_id)
         files.begin_driving()
-        closing.callback(files.end_driving)
+        closing.callback(files.host.end_driving)
         board = LiveBoard(stores.live, settings.bench_id)
         heartbeat = Heartbeat(board, stores.live)
         heartbeat.begin()
         closing.callback(heartbeat.end)
-        runner = InstrumentedRunner(stores, planner, driver, code, lease.held, board, settings.retry_scale, traces)
-        worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease))
+        runner = InstrumentedRunner(
+            stores, planner, driver, code, lease.held, board, settings.retry_scale, traces, files.stopped
+        )
+        worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease, files))
+        guard = files.guard(runner.stop_now, worker.wake)
+        guard.begin()
+        closing.callback(guard.end)
+        closing.callback(files.keep_books(stores).end)
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
-    service = BenchService(stores, driver, planner, worker, code, safety, board, database.free_bytes, traces)
+    roads = StopRoads(settings.devices_in())
+    more = {"roads": roads, "rescued": rescued}
+    service = BenchService(stores, driver, planner, worker, code, safety, board, database.free_bytes, traces, **more)
     closing.callback(service.stop)
     service.register()
     return service
@@ -127,9 +138,9 @@ def _engine(settings: Settings, runner: JobRunner) -> JobEngine:
 
 
 def _dispatcher(
-    settings: Settings, stores: Stores, lease: BenchLease, runner: JobRunner, engine: JobEngine
+    settings: Settings, stores: Stores, lease: BenchLease, files: BenchFiles, runner: JobRunner, engine: JobEngine
 ) -> Dispatcher:
-    return Dispatcher(settings.bench_id, stores, runner, engine, lease, settings.poll_s)
+    return Dispatcher(settings.bench_id, stores, runner, engine, lease, settings.poll_s, files.stopped)
 
 
 def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[], None], rules: door.Door) -> FastAPI:

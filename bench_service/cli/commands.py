@@ -118,6 +118,22 @@ def supervise(
 
 
 @app.command()
+def stop(
+    context: typer.Context,
+    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
+    reason: Annotated[str, typer.Option(help="Why, for whoever releases it")] = "stopped by an operator",
+    wait: Annotated[float, typer.Option(help="How long to wait until it is safe [s]")] = 15.0,
+) -> int:
+    """Stop a bench on its own host, also without API, database and free disk. Not the hardware emergency stop.
+
+    Exit code: 0 safe, 1 asked for and not safe in time, 2 not asked for.
+    """
+    from bench_service.cli.stopping import stop_here
+
+    return stop_here(_of_bench(context.obj, bench), reason, wait, lambda line: print(line, flush=True))
+
+
+@app.command()
 def demo(
     context: typer.Context,
     port: Annotated[int | None, typer.Option(help="Port to listen on")] = None,

@@ -3,6 +3,7 @@
 It has a composition of its own, because that of the service loads what a supervisor must do without.
 """
 
+import logging
 import signal
 import threading
 from collections.abc import Callable
@@ -10,6 +11,8 @@ from contextlib import ExitStack
 from functools import partial
 from types import FrameType
 
+from bench_service.bench.heartbeat import HeartbeatFile
+from bench_service.bench.stop_channel import StopChannel
 from bench_service.bench.supervisor import Supervisor
 from bench_service.cli.logs import set_up
 from bench_service.cli.private_files import protect
@@ -25,6 +28,7 @@ from bench_service.wall_clock import monotonic_s, pause
 
 TAKE_OVER_S = 2.0
 """How long a companion tries to become the supervisor [s]: one that is about to leave has left by then."""
+log = logging.getLogger(__name__)
 SUPERVISED_ALREADY = 3
 """Exit code of a companion that leaves its bench to another supervisor."""
 
@@ -57,8 +61,13 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
         closing.callback(books.close)
         take_lease = partial(acquire_lease, settings.database_url, bench, SUPERVISOR)
         devices = RegisteredDevices(DeviceRegister(folder, bench))
+        channel, heartbeat = StopChannel(folder, bench), HeartbeatFile(folder, bench)
+        try:
+            channel.prepare()
+        except OSError as error:  # a full disk: what there is must do
+            log.warning("the stop channel of bench %s: %s", bench, error)
         say(f"supervising bench {bench}")
-        Supervisor(bench, devices, files, books, take_lease).run(ending, companion)
+        Supervisor(bench, devices, files, books, take_lease, channel, heartbeat).run(ending, companion)
     return 0
 
 

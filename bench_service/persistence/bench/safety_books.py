@@ -6,16 +6,17 @@ supervisor works without one that does not answer.
 
 from functools import cached_property
 
-from sqlalchemy import select
-
 from bench_service import wall_clock
+from bench_service.bench.stop_word import StopWord
+from bench_service.jobs.stop_entry import StopEntry
 from bench_service.model.errors import NotFound
 from bench_service.model.records import BenchStop
 from bench_service.persistence.bench.registry_store import SqlBenchRegistry
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.jobs.job_store import SqlJobStore
-from bench_service.persistence.tables.bench import BenchStopRow
+from bench_service.persistence.jobs.queue_store import SqlQueueStore
 from bench_service.persistence.tables.telemetry import AuditRow
+from bench_service.persistence.telemetry.audit_store import SqlAuditTrail
 
 
 class SqlSafetyBooks:
@@ -29,12 +30,13 @@ class SqlSafetyBooks:
     def _database(self) -> Database:
         return connect(self._url)
 
-    def stopped(self) -> bool:
-        with self._database.read() as session:
-            query = select(BenchStopRow.id).where(
-                BenchStopRow.bench == self._bench_id, BenchStopRow.released_at.is_(None)
-            )
-            return session.scalar(query.limit(1)) is not None
+    def standing(self) -> tuple[BenchStop, ...]:
+        return SqlBenchRegistry(self._database).standing_stops(self._bench_id)
+
+    def enter(self, word: StopWord) -> None:
+        database = self._database
+        stores = SqlBenchRegistry(database), SqlQueueStore(database), SqlJobStore(database), SqlAuditTrail(database)
+        StopEntry(*stores).enter(self._bench_id, word)
 
     def confirm_safe(self, by: str) -> None:
         SqlBenchRegistry(self._database).confirm_safe(self._bench_id, wall_clock.now(), by)
