@@ -22,6 +22,7 @@ from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.live.values import Heartbeat, LiveBoard
 from bench_service.bench.prompts import AskedOperator, Asking
 from bench_service.bench.safety import SafetyService
+from bench_service.bench.stop_elsewhere import StopAddresses
 from bench_service.bench.stop_road import StopRoads
 from bench_service.bench_files import BenchFiles
 from bench_service.campaigns.stores import Stores
@@ -40,6 +41,7 @@ from bench_service.pages import campaign_pages, docs, figures, images, static_fi
 from bench_service.pages import routes as pages
 from bench_service.persistence import BenchLease, acquire_lease, engine_database, lease_holder, open_stores
 from bench_service.persistence.bench.host_files import HostFiles
+from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.database import as_storage_error
 from bench_service.service import BenchService
 from bench_service.settings import Settings
@@ -107,7 +109,10 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
-    roads = StopRoads(settings.devices_in())
+    addresses = StopAddresses(SqlStopAddresses(database).all, settings.stop_secret_in())
+    addresses.begin()
+    closing.callback(addresses.end)
+    roads = StopRoads(settings.devices_in(), addresses.road, addresses.host)
     more = {"roads": roads, "rescued": rescued}
     service = BenchService(stores, driver, planner, worker, code, safety, board, database.free_bytes, traces, **more)
     closing.callback(service.stop)

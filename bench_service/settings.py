@@ -56,6 +56,12 @@ class Settings(BaseModel):
     """Where a simulated bench's devices keep their state; None: beside an SQLite file, in .bench/ for Postgres.
 
     A folder of the bench's own host, the same for every process of that bench."""
+    stop_listen: str = Field("127.0.0.1:0", pattern=r"^(|\S+:\d{1,5})$")
+    """Where a bench's supervisor takes stops from an API on another host, `host:port`, port 0 for any; empty: nowhere.
+
+    The name is also what the API is told to connect to; over a network it is one that the API's host can resolve."""
+    stop_secret_file: Path | None = None
+    """Secret that supervisors and APIs of a deployment share, 16 bytes or more; None: the device folder's own."""
     device_faults: str | None = None
     """For exercises: faults put into a simulated bench's devices (see `bench_service.drivers.device_faults`)."""
     ask_operator: bool = False
@@ -76,6 +82,10 @@ class Settings(BaseModel):
     """Where traces go (OTLP over HTTP, protobuf); None: nowhere, unless OTEL_EXPORTER_OTLP_ENDPOINT names a place."""
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported."""
+
+    def stop_secret_in(self) -> Path:
+        """The file of the secret under which a stop goes to another host."""
+        return self.stop_secret_file or self.devices_in() / "bench-stop.secret"
 
     def token(self) -> str | None:
         """The token of `token_file`; None where the settings name none. Raises `BadSettings`."""

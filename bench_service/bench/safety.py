@@ -68,10 +68,10 @@ class SafetyService:
             safe, explanation = state.safe, _here(bench_id, state, worker, supervisor)
         return Safety(safe, explanation, state, worker, supervisor)
 
-    def stopping(self, bench_id: str) -> Safety:
+    def stopping(self, bench_id: str, patient: bool = True) -> Safety:
         """What is known of a bench on this host shortly after its stop was asked for; needs no database.
 
-        Where nobody else can, the devices are made safe here.
+        Where nobody else can, the devices are made safe here. Not `patient`: what is known now.
         """
         found = self.known(bench_id)
         if found.safe is False and found.worker is None and found.supervisor is None:
@@ -80,7 +80,7 @@ class SafetyService:
             found = self.known(bench_id)
             done = f"This service tried itself: {obstacle}." if obstacle else "This service made it safe itself."
             return Safety(found.safe, f"{alone} {done}", found.devices, found.worker, found.supervisor)
-        return self._within(bench_id, found)
+        return self._within(bench_id, found) if patient else found
 
     def stopping_elsewhere(self, bench_id: str) -> Safety:
         """What the books know of another host's bench shortly after its stop was entered. Raises `StorageFailure`."""

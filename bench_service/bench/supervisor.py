@@ -13,7 +13,6 @@ import select
 import socket
 from collections.abc import Callable
 from threading import Event, Lock, Thread
-from typing import Protocol
 
 from bench_service.background import NonBlockingQuery
 from bench_service.bench.devices import BenchDevices, DeviceState
@@ -21,8 +20,9 @@ from bench_service.bench.heartbeat import SILENT_S, HeartbeatFile
 from bench_service.bench.make_safe import over_new_link
 from bench_service.bench.processes import Driving, ProcessIdentity, Watch
 from bench_service.bench.stop_channel import SUPERVISOR, StopChannel
-from bench_service.bench.stop_exchange import StopBooks, StopExchange
+from bench_service.bench.stop_exchange import StopExchange
 from bench_service.bench.stop_word import StopAnswer
+from bench_service.bench.supervisor_ports import Lease, Listener, SafetyBooks
 from bench_service.bench.worker_patience import HUNG_S, UNANSWERED_S, WorkerPatience
 from bench_service.model.errors import BenchBusy, ServiceError
 from bench_service.wall_clock import monotonic_s
@@ -43,28 +43,6 @@ LINGER_S = 60.0
 log = logging.getLogger(__name__)
 
 
-class Lease(Protocol):
-    """The right to drive a bench."""
-
-    def release(self) -> None: ...
-
-
-class SafetyBooks(StopBooks, Protocol):
-    """What the supervisor reads and writes in the database. Every verb raises `ServiceError` if it does not answer."""
-
-    def confirm_safe(self, by: str) -> None:
-        """A stopped bench is safe."""
-        ...
-
-    def stop(self, reason: str, by: str) -> None:
-        """Stop the bench until a person releases it."""
-        ...
-
-    def note(self, by: str, text: str, job: str | None) -> None:
-        """Say what was done: in the trail, and to the job that it concerns."""
-        ...
-
-
 class Supervisor:
     """Watches one bench until it is told to end, or nothing is left to watch."""
 
@@ -77,6 +55,7 @@ class Supervisor:
         take_lease: Callable[[], Lease],
         channel: StopChannel,
         heartbeat: HeartbeatFile,
+        listener: Listener | None = None,
         hung_s: float = HUNG_S,
         linger_s: float = LINGER_S,
         unanswered_s: float = UNANSWERED_S,
@@ -88,6 +67,7 @@ class Supervisor:
         self._books = books
         self._take_lease = take_lease
         self._channel = channel
+        self._listener = listener
         self._exchange = StopExchange(channel, books)
         self._patience = WorkerPatience(channel, heartbeat, unanswered_s, hung_s, silent_s)
         self._linger_s = linger_s
@@ -176,6 +156,8 @@ class Supervisor:
     def _ask_books(self) -> None:
         """In a thread of its own: all that goes to the database."""
         self._exchange.exchange()
+        if self._listener is not None and (at := self._listener.listening()) is not None:
+            self._books.say_listening(at)
         state = self._devices.device_state()
         if not self._exchange.stopped:
             self._confirmed = False

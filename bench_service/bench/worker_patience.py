@@ -28,13 +28,14 @@ class WorkerPatience:
         self._channel = channel
         self._heartbeat = heartbeat
         self._limits_s = {"unanswered": unanswered_s, "hung": hung_s, "silent": silent_s}
-        self._passed_s = dict.fromkeys(self._limits_s, 0.0)
+        self._held_s: dict[str, float | None] = dict.fromkeys(self._limits_s)
+        """For how long each has held so far, from the first look that found it so."""
         self._looked_s = inf
         self._beat = 0
 
     def reset(self, now_s: float) -> None:
         """There is nothing to bear with now."""
-        self._passed_s = dict.fromkeys(self._limits_s, 0.0)
+        self._held_s = dict.fromkeys(self._limits_s)
         self._looked_s = now_s
 
     def over(self, now_s: float, worker: ProcessIdentity, words: frozenset[str], stopped: bool) -> str | None:
@@ -48,8 +49,12 @@ class WorkerPatience:
         silent, self._beat = beat == self._beat, beat
         unanswered = bool(words - self._channel.answered(WORKER).seen)
         for name, holds in (("silent", silent), ("unanswered", unanswered), ("hung", stopped)):
-            self._passed_s[name] = self._passed_s[name] + passed_s if holds else 0.0
-        return next((self._why(name) for name in self._limits_s if self._passed_s[name] > self._limits_s[name]), None)
+            since = self._held_s[name] if holds else None  # None: it did not hold at the look before
+            self._held_s[name] = None if not holds else 0.0 if since is None else since + passed_s
+        return next((self._why(name) for name, held_s in self._held_s.items() if self._too_long(name, held_s)), None)
+
+    def _too_long(self, name: str, held_s: float | None) -> bool:
+        return held_s is not None and held_s > self._limits_s[name]
 
     def _why(self, name: str) -> str:
         limit_s = self._limits_s[name]

@@ -13,6 +13,8 @@ from types import FrameType
 
 from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.stop_channel import StopChannel
+from bench_service.bench.stop_listener import StopListener
+from bench_service.bench.stop_messages import made_secret
 from bench_service.bench.supervisor import Supervisor
 from bench_service.cli.logs import set_up
 from bench_service.cli.private_files import protect
@@ -66,9 +68,29 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
             channel.prepare()
         except OSError as error:  # a full disk: what there is must do
             log.warning("the stop channel of bench %s: %s", bench, error)
+        listener = _listener(settings, channel, devices)
+        if listener is not None:
+            listener.begin()
+            closing.callback(listener.end)
         say(f"supervising bench {bench}")
-        Supervisor(bench, devices, files, books, take_lease, channel, heartbeat).run(ending, companion)
+        Supervisor(bench, devices, files, books, take_lease, channel, heartbeat, listener).run(ending, companion)
     return 0
+
+
+def _listener(settings: Settings, channel: StopChannel, devices: RegisteredDevices) -> StopListener | None:
+    """Takes stops from other hosts; None where the settings want none, or no secret can be had."""
+    if not settings.stop_listen:
+        return None
+    secret = made_secret(settings.stop_secret_in())
+    if secret is None:
+        log.warning("no stop is taken from other hosts: %s holds no secret", settings.stop_secret_in())
+        return None
+
+    def is_safe() -> bool:
+        state = devices.device_state()
+        return state is not None and state.safe
+
+    return StopListener(settings.stop_listen, secret, channel, is_safe)
 
 
 def _lock(files: HostFiles, patience_s: float) -> SupervisorLock:

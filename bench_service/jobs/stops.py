@@ -58,23 +58,24 @@ class StopService:
         self._entry = StopEntry(stores.benches, stores.queue, stores.jobs, trail)
         self._ledger = StopLedger(self._enter)
 
-    def stop(self, bench_id: str, reason: str, by: str, via: str = "http") -> Stopped:
+    def stop(self, bench_id: str, reason: str, by: str, via: str = "http", patient: bool = True) -> Stopped:
         """Stop what the bench is doing, wherever its worker is, until this stop is released. Jobs in the queue wait.
 
         `by`: who stops it; `via`: over which way. It waits for the bench and for the books, for a second each at the
-        most, and neither waits for the other. Raises `NotFound` for a bench that nobody knows.
+        most, and neither waits for the other; where it is not `patient`, for neither. Raises `NotFound` for a bench
+        that nobody knows.
         """
-        asked_s = monotonic_s()
+        books_by_s = monotonic_s() + (BOOKS_S if patient else 0.0)
         word = StopWord(reason, by, via)
         road = self._roads.to(bench_id)
         found = None if road is None else road.ask(word)
         entering = self._ledger.enter(bench_id, word)
         if road is not None and road.here:
-            safety = self._safety.stopping(bench_id)
-            job, books = self._entered(entering, asked_s + BOOKS_S - monotonic_s())
+            safety = self._safety.stopping(bench_id, patient)
+            job, books = self._entered(entering, books_by_s - monotonic_s())
             job = job or (safety.devices.job if safety.devices is not None and safety.worker is not None else None)
         else:
-            job, books = self._entered(entering, asked_s + BOOKS_S - monotonic_s())
+            job, books = self._entered(entering, books_by_s - monotonic_s())
             safety = found or (
                 self._safety.stopping_elsewhere(bench_id) if not books else self._roads.unreached(bench_id)
             )

@@ -7,11 +7,13 @@ supervisor works without one that does not answer.
 from functools import cached_property
 
 from bench_service import wall_clock
+from bench_service.bench.stop_messages import Listening
 from bench_service.bench.stop_word import StopWord
 from bench_service.jobs.stop_entry import StopEntry
 from bench_service.model.errors import NotFound
 from bench_service.model.records import BenchStop
 from bench_service.persistence.bench.registry_store import SqlBenchRegistry
+from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.jobs.job_store import SqlJobStore
 from bench_service.persistence.jobs.queue_store import SqlQueueStore
@@ -37,6 +39,9 @@ class SqlSafetyBooks:
         database = self._database
         stores = SqlBenchRegistry(database), SqlQueueStore(database), SqlJobStore(database), SqlAuditTrail(database)
         StopEntry(*stores).enter(self._bench_id, word)
+
+    def say_listening(self, at: Listening) -> None:
+        SqlStopAddresses(self._database).say(self._bench_id, at)
 
     def confirm_safe(self, by: str) -> None:
         SqlBenchRegistry(self._database).confirm_safe(self._bench_id, wall_clock.now(), by)
