@@ -30,6 +30,7 @@ from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
+from bench_service.evidence.analysis_processes import AnalysisProcesses
 from bench_service.evidence.catalogue import Catalogue
 from bench_service.jobs.dispatcher import Dispatcher, JobEngine
 from bench_service.jobs.events.hub import EventHub
@@ -43,6 +44,7 @@ from bench_service.persistence import BenchLease, acquire_lease, engine_database
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.database import as_storage_error
+from bench_service.persistence.evidence.analysis_run import open_run
 from bench_service.service import BenchService
 from bench_service.settings import Settings
 from bench_service.telemetry.code_version import code_version
@@ -65,11 +67,11 @@ ROUTERS = (
 )
 
 
-def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> BenchService:
+def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apart: bool = False) -> BenchService:
     """A service that is ready to begin; `closing` undoes everything in reverse order.
 
     With `drive` it holds the bench's lease and runs jobs; without, it plans, queues, reads and analyses for benches
-    that other processes drive.
+    that other processes drive. With `apart` analyses are worked out in processes of their own.
     Raises `BenchBusy`, `StorageFailure`, `NotMounted`.
     """
     files = BenchFiles(settings)
@@ -113,7 +115,10 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     addresses.begin()
     closing.callback(addresses.end)
     roads = StopRoads(settings.devices_in(), addresses.road, addresses.host)
-    more = {"roads": roads, "rescued": rescued}
+    processes = AnalysisProcesses(open_run, settings.database_url, code) if apart else None
+    if processes is not None:
+        closing.callback(processes.close)
+    more = {"roads": roads, "rescued": rescued, "processes": processes}
     service = BenchService(stores, driver, planner, worker, code, safety, board, database.free_bytes, traces, **more)
     closing.callback(service.stop)
     service.register()

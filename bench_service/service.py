@@ -10,6 +10,7 @@ from bench_service.bench.stop_road import StopRoads
 from bench_service.campaigns.service import CampaignService
 from bench_service.campaigns.stores import Stores
 from bench_service.evidence.analyses import AnalysisService
+from bench_service.evidence.analysis_processes import AnalysisProcesses
 from bench_service.evidence.imports import ImportService
 from bench_service.evidence.units import register
 from bench_service.jobs.planning import Planner
@@ -41,11 +42,13 @@ class BenchService:
         traces: Traces | None = None,
         roads: StopRoads | None = None,
         rescued: Rescue | None = None,
+        processes: AnalysisProcesses | None = None,
     ) -> None:
         """`driver`: of this process's own bench; None: it plans and queues for benches that workers drive.
 
         `free_bytes`: room on the database's disk, where that is known. `roads`: how a stop reaches its bench; None:
-        through the database alone. `rescued`: what was made safe before the database was opened.
+        through the database alone. `rescued`: what was made safe before the database was opened. `processes`: where
+        analyses are worked out; None: in the caller's thread.
         """
         self.safety = safety
         self.traces = traces or Traces()
@@ -56,7 +59,7 @@ class BenchService:
         self.code_version = code_version
         self.benches = planner.benches
         self.imports = ImportService(stores)
-        self.analyses = AnalysisService(stores, planner.catalogue, stores.jobs.get, code_version)
+        self.analyses = AnalysisService(stores, planner.catalogue, stores.jobs.get, code_version, processes)
         self.queues = QueueService(stores, planner.benches, self._wake)
         self.jobs = JobService(stores, planner, self.queues, driver, worker, code_version, self._wake)
         self._roads = roads or StopRoads(None)

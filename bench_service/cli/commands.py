@@ -130,7 +130,8 @@ def stop(
     """
     from bench_service.cli.stopping import stop_here
 
-    return stop_here(_of_bench(context.obj, bench), reason, wait, lambda line: print(line, flush=True))
+    settings = _of_bench(context.obj, bench)
+    return stop_here(settings.bench_id, settings.devices_in(), reason, wait, lambda line: print(line, flush=True))
 
 
 @app.command()

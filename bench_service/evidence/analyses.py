@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from bench_service.evidence.analysis_processes import AnalysisProcesses
 from bench_service.evidence.catalogue import Catalogue
 from bench_service.evidence.job_analysis import analysed, recordings_of
 from bench_service.evidence.stores import EvidenceStores
@@ -33,9 +34,17 @@ class AnalysisService:
     """Runs methods and analyses on stored evidence; each call returns with its result stored."""
 
     def __init__(
-        self, stores: EvidenceStores, catalogue: Catalogue, read_job: Callable[[str], Job], code_version: str
+        self,
+        stores: EvidenceStores,
+        catalogue: Catalogue,
+        read_job: Callable[[str], Job],
+        code_version: str,
+        processes: AnalysisProcesses | None = None,
     ) -> None:
-        """`read_job`: gives a job by its id, and raises `NotFound`."""
+        """`read_job`: gives a job by its id, and raises `NotFound`. `processes`: where analyses are worked out; None:
+        here, in the caller's thread.
+        """
+        self._processes = processes
         self._stores = stores
         self._catalogue = catalogue
         self._read_job = read_job
@@ -52,7 +61,11 @@ class AnalysisService:
         if len(recordings) < len(job.stations):
             raise UnfitRecording(f"job {job_id} has {len(recordings)} of its {len(job.stations)} recordings")
         merged = {**job.requested_parameters, **parameters}
-        result = analysed(job, self._catalogue.procedure(job.procedure), merged, recordings, self._code_version)
+        procedure = self._catalogue.procedure(job.procedure)
+        if self._processes is not None:
+            procedure.params.model_validate(merged)
+            return self._stores.results.get(self._processes.result("again", job_id, parameters, key))
+        result = analysed(job, procedure, merged, recordings, self._code_version)
         return self._stores.results.add(result.stored, result.calibrations, False, idempotency, result.corrections)
 
     def run_method(self, request: AnalysisRequest, key: str | None = None) -> StoredResult:
@@ -65,6 +78,8 @@ class AnalysisService:
         _require_each_once("calibrations", request.calibrations)
         method = self._catalogue.method(request.method)
         params = method.params.model_validate(request.parameters)
+        if self._processes is not None:
+            return self._stores.results.get(self._processes.result("method", request, key))
         used = [self._stores.results.calibration(c) for c in request.calibrations]
         dated = tuple(DatedCalibration(c.id, c.made_at.isoformat(), c.triads) for c in used)
         evidence = Evidence(self._complete(request.recordings), dated)

@@ -130,7 +130,7 @@ class StopBench:
 
     def _answers(self) -> bool:
         with suppress(httpx.TransportError):
-            return self.http.get("/readyz").status_code == 200
+            return self.http.get("/healthz").status_code == 200
         return False
 
     def supervisor(self) -> int:
