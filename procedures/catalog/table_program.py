@@ -42,7 +42,7 @@ class Params(Parameters):
         None,
         max_length=50_000,
         description="text: ':mode:position all', ':demand:position 1,deg; p 2,deg; p 3,deg', 'delay s', '% comment'; "
-        "axis 1 outer, 2 middle, 3 inner",
+        "axis 1 inner, 2 middle, 3 outer",
     )
     positions: tuple[tuple[Angle, Angle, Angle, Delay], ...] | None = Field(
         None,
@@ -206,7 +206,7 @@ def _unknown(channels: Sequence[str]) -> str:
 PROCEDURE = Procedure(
     "table_program",
     "Program of table positions",
-    "1.0.0",
+    "2.0.0",
     Params,
     Result,
     resolve,
