@@ -15,11 +15,11 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 
 import httpx
-import psutil
+import sqlalchemy as sa
 
 from tests.chaos.databases import OwnPostgres, database
 from tests.chaos.stop_bench import StopBench
-from tests.database_away import hung
+from tests.database_away import Port, hung
 
 ANALYSES, SOCKETS, DESCRIPTORS = 100, 2000, 1024
 ROWS = 200_000
@@ -154,16 +154,19 @@ def locked_sqlite(folder: Path) -> Iterator[StopBench]:
 
 @contextmanager
 def postgres_refuses(folder: Path) -> Iterator[StopBench]:
-    """Killed, and not started again."""
-    with postgres_bench(folder) as (bench, server):
-        bench.submit()
-        bench.until_it_moves()
-        master = psutil.Process(int((server.data / "postmaster.pid").read_text().splitlines()[0]))
-        for process in (master, *master.children(recursive=True)):
-            with suppress(psutil.NoSuchProcess):
-                process.kill()
-        yield bench
-        server.restart("immediate")  # so that it can be ended in order
+    """Its port is closed, as that of a server which crashed."""
+    with database("postgres", folder) as server:
+        assert isinstance(server, OwnPostgres)
+        port = Port(server.url)
+        bench = StopBench(folder, port.url, apart=True)
+        try:
+            bench.start()
+            bench.submit()
+            bench.until_it_moves()
+            port.cut()
+            yield bench
+        finally:
+            bench.end()
 
 
 @contextmanager
@@ -215,17 +218,11 @@ class Wire:
 
 @contextmanager
 def postgres_gone_over_tcp(folder: Path) -> Iterator[StopBench]:
-    import sqlalchemy as sa
-
     with database("postgres", folder) as server:
         assert isinstance(server, OwnPostgres)
-        url = sa.make_url(server.url)
-        where = Path(str(url.query.get("host") or url.host))
-        sockets = sorted(where.glob(".s.PGSQL.*[0-9]"))
-        if not sockets:
-            raise NotHere(f"the test's Postgres has no Unix socket in {where}")
-        wire = Wire(str(sockets[0]))
-        through = url.set(host="127.0.0.1", port=wire.port, query={}).render_as_string(hide_password=False)
+        behind = sa.make_url(server.url)
+        wire = Wire(f"{behind.query['host']}/.s.PGSQL.{behind.port or 5432}")
+        through = behind.set(host="127.0.0.1", port=wire.port, query={}).render_as_string(hide_password=False)
         bench = StopBench(folder, through, apart=True)
         try:
             bench.start()
