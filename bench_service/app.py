@@ -118,8 +118,9 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     processes = AnalysisProcesses(open_run, settings.database_url, code) if apart else None
     if processes is not None:
         closing.callback(processes.close)
-    more = {"roads": roads, "rescued": rescued, "processes": processes}
-    service = BenchService(stores, driver, planner, worker, code, safety, board, database.free_bytes, traces, **more)
+    service = BenchService(
+        stores, driver, planner, worker, code, safety, board, database.free_bytes, traces, roads, rescued, processes
+    )
     closing.callback(service.stop)
     service.register()
     return service

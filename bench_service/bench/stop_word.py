@@ -30,7 +30,8 @@ class StopWord:
     @classmethod
     def of(cls, document: dict[str, Any]) -> "StopWord":
         """Raises `TypeError`, `ValueError`, `KeyError` for what is no word."""
-        return cls(**{**document, "at": datetime.fromisoformat(document["at"])})
+        given: dict[str, Any] = {**document, "at": datetime.fromisoformat(document["at"])}
+        return cls(**given)
 
 
 DAMAGED = StopWord("a record of the stop channel cannot be read", "the stop channel", "books", "damaged", booked=True)

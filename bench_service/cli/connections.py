@@ -49,12 +49,17 @@ class BoundedConnections(HttpToolsProtocol):
             self._late.cancel()
 
     @property
+    def _begun(self) -> bool:
+        """Whether a first request has come, as far as its body."""
+        return getattr(self, "cycle", None) is not None
+
+    @property
     def idle(self) -> bool:
         """Whether it asks nothing now."""
-        return self.cycle is None or self.cycle.response_complete
+        return not self._begun or self.cycle.response_complete
 
     def _end_if_idle(self) -> None:
-        if self.cycle is None and not self.transport.is_closing():
+        if not self._begun and not self.transport.is_closing():
             self.transport.abort()
 
 
