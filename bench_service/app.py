@@ -22,8 +22,8 @@ from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.live.values import Heartbeat, LiveBoard
 from bench_service.bench.prompts import AskedOperator, Asking
 from bench_service.bench.safety import SafetyService
-from bench_service.bench.stop_elsewhere import StopAddresses
-from bench_service.bench.stop_road import StopRoads
+from bench_service.bench.stop.elsewhere import StopAddresses
+from bench_service.bench.stop.road import StopRoads
 from bench_service.bench_files import BenchFiles
 from bench_service.campaigns.stores import Stores
 from bench_service.drivers.device_faults import FaultPlan

@@ -8,10 +8,10 @@ from collections.abc import Callable
 from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.make_safe import Rescue, before_anything_else
 from bench_service.bench.processes import ProcessIdentity
-from bench_service.bench.stop_channel import StopChannel
-from bench_service.bench.stop_guard import StopGuard
-from bench_service.bench.stop_keeper import StopKeeper
-from bench_service.bench.stop_word import StopWord
+from bench_service.bench.stop.channel import StopChannel
+from bench_service.bench.stop.guard import StopGuard
+from bench_service.bench.stop.keeper import StopKeeper
+from bench_service.bench.stop.word import StopWord
 from bench_service.campaigns.stores import Stores
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
@@ -68,7 +68,7 @@ class BenchFiles:
 
 
 class _Books:
-    """`bench_service.bench.stop_exchange.StopBooks` over a service's stores."""
+    """`bench_service.bench.stop.exchange.StopBooks` over a service's stores."""
 
     def __init__(self, stores: Stores, bench_id: str) -> None:
         self._stores = stores

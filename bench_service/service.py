@@ -6,7 +6,7 @@ from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import LiveBoard
 from bench_service.bench.make_safe import Rescue
 from bench_service.bench.safety import SafetyService
-from bench_service.bench.stop_road import StopRoads
+from bench_service.bench.stop.road import StopRoads
 from bench_service.campaigns.service import CampaignService
 from bench_service.campaigns.stores import Stores
 from bench_service.evidence.analyses import AnalysisService

@@ -19,9 +19,9 @@ from bench_service.bench.devices import BenchDevices, DeviceState
 from bench_service.bench.heartbeat import SILENT_S, HeartbeatFile
 from bench_service.bench.make_safe import over_new_link
 from bench_service.bench.processes import Driving, ProcessIdentity, Watch
-from bench_service.bench.stop_channel import SUPERVISOR, StopChannel
-from bench_service.bench.stop_exchange import StopExchange
-from bench_service.bench.stop_word import StopAnswer
+from bench_service.bench.stop.channel import SUPERVISOR, StopChannel
+from bench_service.bench.stop.exchange import StopExchange
+from bench_service.bench.stop.word import StopAnswer
 from bench_service.bench.supervisor_ports import Lease, Listener, SafetyBooks
 from bench_service.bench.worker_patience import HUNG_S, UNANSWERED_S, WorkerPatience
 from bench_service.model.errors import BenchBusy, ServiceError

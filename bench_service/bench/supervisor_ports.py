@@ -2,8 +2,8 @@
 
 from typing import Protocol
 
-from bench_service.bench.stop_exchange import StopBooks
-from bench_service.bench.stop_messages import Listening
+from bench_service.bench.stop.exchange import StopBooks
+from bench_service.bench.stop.messages import Listening
 
 
 class Lease(Protocol):

@@ -9,7 +9,7 @@ from math import inf
 
 from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.processes import ProcessIdentity
-from bench_service.bench.stop_channel import WORKER, StopChannel
+from bench_service.bench.stop.channel import WORKER, StopChannel
 
 UNANSWERED_S = 3.0
 """How long a worker may leave a stop unanswered, while its bench is not safe, before it is killed [s]."""

@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from pydantic import ValidationError
 
-from bench_service.cli import campaign_commands
+from bench_service.cli import bench_commands, campaign_commands
 from bench_service.cli.client import RESULT, call, check, connect, segment
 from bench_service.cli.files import check_folder, text_of, whole_file
 from bench_service.cli.options import AsJson, Server, console, errors, parameter, wide
@@ -89,49 +88,8 @@ def serve(
         server.run()
 
 
-@app.command()
-def worker(
-    context: typer.Context,
-    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
-) -> None:
-    """Run the jobs of a bench, without HTTP, until SIGTERM or SIGINT. Its running job is left for the next start."""
-    from bench_service.cli.working import work
-
-    settings = _of_bench(context.obj, bench)
-    work(settings, lambda line: print(line, flush=True))
-
-
-@app.command()
-def supervise(
-    context: typer.Context,
-    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
-    companion: Annotated[bool, typer.Option(help="End with the process that drives the bench")] = False,
-) -> int:
-    """Watch a bench on its own host, and make it safe where the process that drives it is gone or hangs.
-
-    Exit code 3: a companion left the bench to another supervisor.
-    """
-    from bench_service.cli.supervising import supervise as watch_over
-
-    settings = _of_bench(context.obj, bench)
-    return watch_over(settings, companion, lambda line: print(line, flush=True))
-
-
-@app.command()
-def stop(
-    context: typer.Context,
-    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
-    reason: Annotated[str, typer.Option(help="Why, for whoever releases it")] = "stopped by an operator",
-    wait: Annotated[float, typer.Option(help="How long to wait until it is safe [s]")] = 15.0,
-) -> int:
-    """Stop a bench on its own host, also without API, database and free disk. Not the hardware emergency stop.
-
-    Exit code: 0 safe, 1 asked for and not safe in time, 2 not asked for.
-    """
-    from bench_service.cli.stopping import stop_here
-
-    settings = _of_bench(context.obj, bench)
-    return stop_here(settings.bench_id, settings.devices_in(), reason, wait, lambda line: print(line, flush=True))
+for _command in (bench_commands.worker, bench_commands.supervise, bench_commands.stop):
+    app.command()(_command)
 
 
 @app.command()
@@ -286,14 +244,6 @@ def jobs(
 
 def _with(settings: Settings, **given: Any) -> Settings:
     return settings.model_copy(update={name: value for name, value in given.items() if value is not None})
-
-
-def _of_bench(settings: Settings, bench: str | None) -> Settings:
-    """The settings of another bench. Raises `Refused` for a name that no bench can have."""
-    try:
-        return Settings.model_validate({**settings.model_dump(), "bench_id": bench or settings.bench_id})
-    except ValidationError as error:
-        raise Refused(f"--bench {bench}: {error.errors()[0]['msg']}") from error
 
 
 def _until_interrupted() -> None:

@@ -13,8 +13,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from bench_service.bench.processes import HOST
-from bench_service.bench.stop_channel import StopChannel
-from bench_service.bench.stop_word import StopWord
+from bench_service.bench.stop.channel import StopChannel
+from bench_service.bench.stop.word import StopWord
 from bench_service.device_folder import BENCH_ID, DATABASE_URL, device_folder
 from bench_service.wall_clock import monotonic_s, pause
 

@@ -12,9 +12,9 @@ from functools import partial
 from types import FrameType
 
 from bench_service.bench.heartbeat import HeartbeatFile
-from bench_service.bench.stop_channel import StopChannel
-from bench_service.bench.stop_listener import StopListener
-from bench_service.bench.stop_messages import made_secret
+from bench_service.bench.stop.channel import StopChannel
+from bench_service.bench.stop.listener import StopListener
+from bench_service.bench.stop.messages import made_secret
 from bench_service.bench.supervisor import Supervisor
 from bench_service.cli.logs import set_up
 from bench_service.cli.private_files import protect

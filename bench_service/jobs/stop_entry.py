@@ -4,13 +4,13 @@ import logging
 from contextlib import suppress
 
 from bench_service.bench.registry import BenchRegistry
-from bench_service.bench.stop_exchange import LATE_S
-from bench_service.bench.stop_word import StopWord
+from bench_service.bench.stop.exchange import LATE_S
+from bench_service.bench.stop.word import StopWord
 from bench_service.jobs.queue import QueueStore
 from bench_service.jobs.stores import JobStore
-from bench_service.model.errors import IllegalTransition, NotUnderstood
+from bench_service.model.errors import IllegalTransition, NotUnderstood, ServiceError
 from bench_service.model.records import BenchStop
-from bench_service.telemetry.audit import AuditTrail, record
+from bench_service.telemetry.audit import AuditEntry, AuditTrail
 from bench_service.wall_clock import now
 
 REQUESTS = frozenset({"http", "page"})
@@ -48,4 +48,10 @@ class StopEntry:
             return
         text = f"entered {late_s:.1f} s after it was asked for" if late_s > LATE_S else "entered in time"
         detail = {"stop": word.id, "reason": word.reason, "via": word.via, "asked_at": word.at.isoformat()}
-        record(self._trail, word.by, "stop", f"bench {bench_id}", "noted", text=text, late_s=late_s, **detail)
+        entry = AuditEntry(
+            word.id, now(), word.by, "stop", f"bench {bench_id}", "noted", {"text": text, "late_s": late_s, **detail}
+        )
+        try:
+            self._trail.add(entry)  # under the stop's own id: of several processes that enter it one tells
+        except ServiceError as error:
+            log.debug("the entry of the trail for stop %s: %s", word.id, error)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from queue import Full, Queue
 from threading import Lock, Thread
 
-from bench_service.bench.stop_word import StopWord
+from bench_service.bench.stop.word import StopWord
 from bench_service.model.errors import NotFound, ServiceError, StorageFailure
 from bench_service.wall_clock import pause
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.safety import Safety, SafetyService
-from bench_service.bench.stop_road import StopRoads
-from bench_service.bench.stop_word import StopWord
+from bench_service.bench.stop.road import StopRoads
+from bench_service.bench.stop.word import StopWord
 from bench_service.jobs.stop_entry import StopEntry
 from bench_service.jobs.stop_ledger import StopLedger
 from bench_service.jobs.stores import JobStores

@@ -11,7 +11,7 @@ import typer
 import yaml
 
 from bench_service.api.http.door import may_listen
-from bench_service.bench.stop_messages import split_address
+from bench_service.bench.stop.messages import split_address
 from bench_service.cli.commands import app, run_command_line
 from bench_service.jobs.engine import SHUT_DOWN_S
 from bench_service.settings import Settings

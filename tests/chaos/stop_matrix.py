@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.chaos import stop_hindrances as hindrances
+from tests.chaos import stop_hindrances_of_networks as networks
 from tests.chaos.stop_bench import WAYS, Outcome, StopBench
 from tests.chaos.stop_hindrances import NotHere
 
@@ -35,9 +36,9 @@ MATRIX = {
     "full disk": Hindrance(hindrances.full_disk),
     "no inode": Hindrance(hindrances.no_inode),
     "locked SQLite": Hindrance(hindrances.locked_sqlite),
-    "Postgres refuses": Hindrance(hindrances.postgres_refuses),
-    "Postgres hangs": Hindrance(hindrances.postgres_hangs),
-    "Postgres gone over TCP": Hindrance(hindrances.postgres_gone_over_tcp),
+    "Postgres refuses": Hindrance(networks.postgres_refuses),
+    "Postgres hangs": Hindrance(networks.postgres_hangs),
+    "Postgres gone over TCP": Hindrance(networks.postgres_gone_over_tcp),
     "100 analyses": Hindrance(hindrances.analyses),
     "2000 idle sockets": Hindrance(hindrances.idle_sockets),
     "hostile import": Hindrance(hindrances.hostile_import),
@@ -45,7 +46,7 @@ MATRIX = {
     "supervisor killed": Hindrance(hindrances.killed_supervisor),
     "log disk full": Hindrance(hindrances.full_log_disk),
     "clock jump": Hindrance(hindrances.clock_jump, believes_clock=False),
-    "API on another host": Hindrance(hindrances.api_on_another_host),
+    "API on another host": Hindrance(networks.api_on_another_host),
 }
 
 

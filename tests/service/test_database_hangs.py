@@ -13,7 +13,7 @@ from bench_service.bench import session
 from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.processes import Driving
 from bench_service.bench.session import BenchSession, ShuttingDown
-from bench_service.bench.stop_channel import StopChannel
+from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.supervisor import Supervisor
 from bench_service.cli.client import connect
 from bench_service.drivers.registered import RegisteredDevices

@@ -7,8 +7,8 @@ supervisor works without one that does not answer.
 from functools import cached_property
 
 from bench_service import wall_clock
-from bench_service.bench.stop_messages import Listening
-from bench_service.bench.stop_word import StopWord
+from bench_service.bench.stop.messages import Listening
+from bench_service.bench.stop.word import StopWord
 from bench_service.jobs.stop_entry import StopEntry
 from bench_service.model.errors import NotFound
 from bench_service.model.records import BenchStop

@@ -5,7 +5,7 @@ A bench that is registered anew loses it; its supervisor says it again with its 
 
 from sqlalchemy import select
 
-from bench_service.bench.stop_messages import Listening
+from bench_service.bench.stop.messages import Listening
 from bench_service.persistence.database import Database
 from bench_service.persistence.tables.bench import BenchRow
 

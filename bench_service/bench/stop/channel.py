@@ -20,7 +20,6 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from bench_service.bench.folder_sockets import bound, send
 from bench_service.bench.records_in_place import (
     RECORD_BYTES,
     Unreadable,
@@ -30,7 +29,8 @@ from bench_service.bench.records_in_place import (
     read_record,
     write_record,
 )
-from bench_service.bench.stop_word import DAMAGED, StopAnswer, StopWord
+from bench_service.bench.stop.folder_sockets import bound, send
+from bench_service.bench.stop.word import DAMAGED, StopAnswer, StopWord
 from bench_service.wall_clock import monotonic_s, pause
 
 WORDS = 16

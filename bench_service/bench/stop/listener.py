@@ -11,8 +11,8 @@ from collections.abc import Callable
 from threading import Event, Lock, Thread
 
 from bench_service.bench.processes import HOST
-from bench_service.bench.stop_channel import StopChannel
-from bench_service.bench.stop_messages import (
+from bench_service.bench.stop.channel import StopChannel
+from bench_service.bench.stop.messages import (
     BadMessage,
     Listening,
     check,
@@ -22,7 +22,7 @@ from bench_service.bench.stop_messages import (
     send_line,
     split_address,
 )
-from bench_service.bench.stop_word import StopWord
+from bench_service.bench.stop.word import StopWord
 from bench_service.wall_clock import monotonic_s, now, pause
 
 CONNECTIONS = 16

@@ -12,8 +12,8 @@ from threading import Lock
 from typing import Protocol
 
 from bench_service.bench.safety import Safety
-from bench_service.bench.stop_channel import StopChannel
-from bench_service.bench.stop_word import StopWord
+from bench_service.bench.stop.channel import StopChannel
+from bench_service.bench.stop.word import StopWord
 
 BENCH_ID = re.compile(r"[a-z0-9][a-z0-9_-]{0,31}")
 """What may become part of a file's name."""

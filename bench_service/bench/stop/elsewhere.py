@@ -8,7 +8,7 @@ from pathlib import Path
 from threading import Event, Thread
 
 from bench_service.bench.safety import Safety
-from bench_service.bench.stop_messages import (
+from bench_service.bench.stop.messages import (
     BadMessage,
     Listening,
     check,
@@ -19,7 +19,7 @@ from bench_service.bench.stop_messages import (
     send_line,
     split_address,
 )
-from bench_service.bench.stop_word import StopWord
+from bench_service.bench.stop.word import StopWord
 from bench_service.model.errors import ServiceError
 from bench_service.wall_clock import monotonic_s
 
@@ -33,7 +33,7 @@ log = logging.getLogger(__name__)
 
 
 class ListenerRoad:
-    """`bench_service.bench.stop_road.StopRoad` over TCP."""
+    """`bench_service.bench.stop.road.StopRoad` over TCP."""
 
     here = False
 

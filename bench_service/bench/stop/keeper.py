@@ -3,8 +3,8 @@
 import logging
 from threading import Event, Thread
 
-from bench_service.bench.stop_channel import StopChannel
-from bench_service.bench.stop_exchange import StopBooks, StopExchange
+from bench_service.bench.stop.channel import StopChannel
+from bench_service.bench.stop.exchange import StopBooks, StopExchange
 from bench_service.model.errors import ServiceError
 
 KEEP_S = 1.0

@@ -7,8 +7,8 @@ stop twice, or taking it away twice, changes nothing.
 
 from typing import Protocol
 
-from bench_service.bench.stop_channel import StopChannel
-from bench_service.bench.stop_word import StopWord
+from bench_service.bench.stop.channel import StopChannel
+from bench_service.bench.stop.word import StopWord
 from bench_service.model.records import BenchStop
 
 LATE_S = 2.0

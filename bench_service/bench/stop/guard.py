@@ -13,8 +13,8 @@ from threading import Event, Thread
 
 from bench_service.bench.heartbeat import BEAT_S, HeartbeatFile
 from bench_service.bench.processes import ProcessIdentity
-from bench_service.bench.stop_channel import WORKER, StopChannel
-from bench_service.bench.stop_word import StopAnswer
+from bench_service.bench.stop.channel import WORKER, StopChannel
+from bench_service.bench.stop.word import StopAnswer
 from bench_service.wall_clock import monotonic_s
 
 LOOK_S = 0.1
