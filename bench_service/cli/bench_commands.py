@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 from pydantic import ValidationError
 
+from bench_service.cli.options import announce
 from bench_service.cli.refusal import Refused
 from bench_service.settings import Settings
 
@@ -17,7 +18,7 @@ def worker(
     from bench_service.cli.working import work
 
     settings = of_bench(context.obj, bench)
-    work(settings, lambda line: print(line, flush=True))
+    work(settings, announce)
 
 
 def supervise(
@@ -32,7 +33,7 @@ def supervise(
     from bench_service.cli.supervising import supervise as watch_over
 
     settings = of_bench(context.obj, bench)
-    return watch_over(settings, companion, lambda line: print(line, flush=True))
+    return watch_over(settings, companion, announce)
 
 
 def stop(
@@ -48,7 +49,7 @@ def stop(
     from bench_service.cli.stopping import stop_here
 
     settings = of_bench(context.obj, bench)
-    return stop_here(settings.bench_id, settings.devices_in(), reason, wait, lambda line: print(line, flush=True))
+    return stop_here(settings.bench_id, settings.devices_in(), reason, wait, announce)
 
 
 def of_bench(settings: Settings, bench: str | None) -> Settings:

@@ -14,7 +14,7 @@ import typer
 from bench_service.cli import bench_commands, campaign_commands
 from bench_service.cli.client import RESULT, call, check, connect, segment
 from bench_service.cli.files import check_folder, text_of, whole_file
-from bench_service.cli.options import AsJson, Server, console, errors, parameter, wide
+from bench_service.cli.options import AsJson, Server, announce, console, errors, parameter, wide
 from bench_service.cli.refusal import Refused
 from bench_service.model.errors import ServiceError
 from bench_service.settings import Settings
@@ -77,14 +77,14 @@ def serve(
     check_port(settings)
     if no_worker or not settings.drive:
         with ready(settings, drive=False, level="info") as server:
-            console.print(f"API without a bench of its own at http://{settings.host}:{settings.port}")
+            announce(f"API without a bench of its own at http://{settings.host}:{settings.port}")
             server.run()
         return
     with (
         ready(settings, level="info") as server,
         accompanied(settings, lambda: server.started and not server.should_exit),
     ):
-        console.print(f"bench {settings.bench_id} at http://{settings.host}:{settings.port}")
+        announce(f"bench {settings.bench_id} at http://{settings.host}:{settings.port}")
         server.run()
 
 

@@ -89,7 +89,12 @@ def stop_command(arguments: Sequence[str], environ: Mapping[str, str]) -> int:
         return REFUSED
     folder = environ.get("BENCH_DEVICE_FOLDER")
     where = device_folder(environ.get("BENCH_DATABASE_URL", DATABASE_URL), None if folder is None else Path(folder))
-    return stop_here(given.bench, where, given.reason or REASON, given.wait, lambda line: print(line, flush=True))
+    return stop_here(given.bench, where, given.reason or REASON, given.wait, _say)
+
+
+def _say(line: str) -> None:
+    with suppress(OSError):  # nobody reads it, or its disk is full: the stop goes on
+        print(line, flush=True)
 
 
 def _person() -> str:
