@@ -30,8 +30,8 @@ from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
-from bench_service.evidence.analysis_processes import AnalysisProcesses
 from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.work_processes import WorkProcesses
 from bench_service.jobs.dispatcher import Dispatcher, JobEngine
 from bench_service.jobs.events.hub import EventHub
 from bench_service.jobs.instrumented_runner import InstrumentedRunner
@@ -40,6 +40,7 @@ from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.worker import Worker
 from bench_service.pages import campaign_pages, docs, figures, images, static_files
 from bench_service.pages import routes as pages
+from bench_service.pages.drawing_process import open_drawing
 from bench_service.persistence import BenchLease, acquire_lease, engine_database, lease_holder, open_stores
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
@@ -50,6 +51,8 @@ from bench_service.settings import Settings
 from bench_service.telemetry.code_version import code_version
 from bench_service.telemetry.tracing import traces_to
 
+DRAWINGS = 30
+"""So many figures may be drawn or wait at one time."""
 ROUTERS = (
     procedures,
     jobs,
@@ -71,7 +74,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     """A service that is ready to begin; `closing` undoes everything in reverse order.
 
     With `drive` it holds the bench's lease and runs jobs; without, it plans, queues, reads and analyses for benches
-    that other processes drive. With `apart` analyses are worked out in processes of their own.
+    that other processes drive. With `apart` analyses and drawings are made in processes of their own.
     Raises `BenchBusy`, `StorageFailure`, `NotMounted`.
     """
     files = BenchFiles(settings)
@@ -115,9 +118,12 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     addresses.begin()
     closing.callback(addresses.end)
     roads = StopRoads(settings.devices_in(), addresses.road, addresses.host)
-    processes = AnalysisProcesses(open_run, settings.database_url, code) if apart else None
+    processes = WorkProcesses(open_run, settings.database_url, code) if apart else None
     if processes is not None:
-        closing.callback(processes.close)
+        drawing = WorkProcesses(open_drawing, at_once=1, waiting=DRAWINGS)
+        figures.draw_in(drawing)
+        for undo in (processes.close, drawing.close, partial(figures.draw_in, None)):
+            closing.callback(undo)
     service = BenchService(
         stores, driver, planner, worker, code, safety, board, database.free_bytes, traces, roads, rescued, processes
     )

@@ -10,9 +10,9 @@ from bench_service.bench.stop.road import StopRoads
 from bench_service.campaigns.service import CampaignService
 from bench_service.campaigns.stores import Stores
 from bench_service.evidence.analyses import AnalysisService
-from bench_service.evidence.analysis_processes import AnalysisProcesses
 from bench_service.evidence.imports import ImportService
 from bench_service.evidence.units import register
+from bench_service.evidence.work_processes import WorkProcesses
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue_service import QueueService
 from bench_service.jobs.service import JobService
@@ -42,7 +42,7 @@ class BenchService:
         traces: Traces | None = None,
         roads: StopRoads | None = None,
         rescued: Rescue | None = None,
-        processes: AnalysisProcesses | None = None,
+        processes: WorkProcesses | None = None,
     ) -> None:
         """`driver`: of this process's own bench; None: it plans and queues for benches that workers drive.
 

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from bench_service.evidence.analysis_processes import AnalysisProcesses
 from bench_service.evidence.catalogue import Catalogue
 from bench_service.evidence.job_analysis import analysed, recordings_of
 from bench_service.evidence.stores import EvidenceStores
+from bench_service.evidence.work_processes import WorkProcesses
 from bench_service.model.job import Job
 from bench_service.model.records import Idempotency, RecordingState, StoredResult
 from bench_service.model.request import fingerprint
@@ -39,7 +39,7 @@ class AnalysisService:
         catalogue: Catalogue,
         read_job: Callable[[str], Job],
         code_version: str,
-        processes: AnalysisProcesses | None = None,
+        processes: WorkProcesses | None = None,
     ) -> None:
         """`read_job`: gives a job by its id, and raises `NotFound`. `processes`: where analyses are worked out; None:
         here, in the caller's thread.

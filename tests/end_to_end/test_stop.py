@@ -3,7 +3,9 @@
 The whole matrix of hindrances and ways is in `tests.chaos.stop_matrix`; three of its cells are here.
 """
 
+import html
 import os
+import re
 import shutil
 import signal
 import sqlite3
@@ -150,13 +152,20 @@ def test_a_start_on_a_full_disk_makes_the_bench_safe_before_anything_else(small_
             os.kill(left.pid, signal.SIGTERM)
 
 
-def test_analyses_are_worked_out_in_other_processes_which_end_with_a_killed_service(bench: BenchProcess) -> None:
+def test_analyses_and_plots_are_made_in_other_processes_which_end_with_a_killed_service(bench: BenchProcess) -> None:
     body = {"method": "noise_analysis", "recordings": [recording_of(bench.client)], "parameters": {}}
     answer = bench.client.post("/api/v1/analyses", json=body)
     assert answer.status_code == 201, answer.text
     children = psutil.Process(bench.process.pid).children(recursive=True)
     workers = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
-    assert workers, [child.cmdline() for child in children]
+    assert len(workers) >= 2, [child.cmdline() for child in children]
+    page = bench.client.get(f"/results/{answer.json()['id']}").text
+    image = re.search(r'"(/results/[^"]+\.svg\?[^"]+)"', page)
+    assert image is not None
+    drawn = bench.client.get(html.unescape(image[1]))
+    assert drawn.status_code == 200
+    assert drawn.text.startswith("<svg")
+    assert "is drawn in this process" not in bench.log.read_text()
     refused = bench.client.post("/api/v1/analyses", json={**body, "recordings": ["no such recording"]})
     assert (refused.status_code, refused.json()["type"]) == (404, "/problems/NotFound")
     bench.kill()

@@ -3,13 +3,13 @@
 from typing import Any
 
 from bench_service.evidence.analyses import AnalysisService
-from bench_service.evidence.analysis_processes import Run
 from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.work_processes import Run
 from bench_service.persistence import open_stores
 
 
 def open_run(database_url: str, code_version: str) -> Run:
-    """See `AnalysisProcesses`: "method" and "again", with the arguments of `AnalysisService`'s verbs."""
+    """See `WorkProcesses`: "method" and "again", with the arguments of `AnalysisService`'s verbs."""
     from threadpoolctl import threadpool_limits
 
     stores, _ = open_stores(database_url)  # it is closed with the process

@@ -1,7 +1,7 @@
-"""Analyses in processes of their own, beside the one that drives a bench and the one that answers a stop.
+"""Analyses and drawings in processes of their own, beside the one that drives a bench and answers a stop.
 
-A few processes at a low priority, each with a connection of its own to the database. What an analysis refuses is the
-same error here; one that is cut off, because its process died, may be asked for again.
+A few processes at a low priority. What the work refuses is the same error here; work that is cut off, because its
+process died, may be asked for again.
 """
 
 import contextlib
@@ -20,15 +20,15 @@ from bench_service.model.errors import Overloaded, ServiceError, StorageFailure
 from procedures.core.errors import DomainError
 
 AT_ONCE = 2
-"""Analyses that are worked out at one time."""
+"""Processes, and so pieces of work that are done at one time."""
 NICENESS = 10
 """By so much they give way to whoever drives a bench or answers."""
 
 WAITING = 16
-"""So many analyses may be worked out or wait at one time; each holds a thread of the service."""
+"""So many pieces of work may be done or wait at one time; each holds a thread of the service."""
 
 Run = Callable[[str, tuple[Any, ...]], str]
-"""Works out an analysis by its name and arguments, and gives the id of its stored result."""
+"""Does a piece of work by its name and arguments, and gives a text: the id of a stored result, or a drawing."""
 
 
 @dataclass(frozen=True)
@@ -52,29 +52,33 @@ class Refusal:
         return made
 
 
-class AnalysisProcesses:
-    """The processes of one service, begun with the first analysis. For any thread."""
+class WorkProcesses:
+    """Some processes of one service, begun with the first piece of work. For any thread."""
 
-    def __init__(self, open_run: Callable[..., Run], *arguments: Any) -> None:
+    def __init__(
+        self, open_run: Callable[..., Run], *arguments: Any, at_once: int = AT_ONCE, waiting: int = WAITING
+    ) -> None:
         """`open_run`: called with `arguments` in each new process, a function of a module that both can import."""
+        self._at_once = at_once
+        self._waiting = waiting
         self._open_run = open_run
         self._arguments = arguments
         self._mutex = Lock()
-        self._places = BoundedSemaphore(WAITING)
+        self._places = BoundedSemaphore(waiting)
         self._pool: ProcessPoolExecutor | None = None
 
     def result(self, name: str, *arguments: Any) -> str:
-        """The id of the result of an analysis. Raises what the analysis raises, `StorageFailure` where it is cut off,
-        and `Overloaded` where too many are waited for already.
+        """Do a piece of work. Raises what the work raises, `StorageFailure` where it is cut off, and `Overloaded` where
+        too much is waited for already.
         """
         if not self._places.acquire(blocking=False):
-            raise Overloaded(f"{WAITING} analyses are worked out or wait already: ask again later")
+            raise Overloaded(f"{self._waiting} such requests are worked on or wait already: ask again later")
         try:
             found = self._submit(name, arguments).result()
         except BrokenProcessPool as broken:
             with self._mutex:
                 self._pool = None
-            raise StorageFailure("the process of this analysis ended before it was done: ask again") from broken
+            raise StorageFailure("the process that worked on this ended before it was done: ask again") from broken
         finally:
             self._places.release()
         if isinstance(found, Refusal):
@@ -82,7 +86,7 @@ class AnalysisProcesses:
         return found
 
     def close(self) -> None:
-        """End the processes; an analysis that is under way is cut off."""
+        """End the processes; work that is under way is cut off."""
         with self._mutex:
             pool, self._pool = self._pool, None
         if pool is not None:
@@ -96,7 +100,7 @@ class AnalysisProcesses:
             if self._pool is None:
                 context = multiprocessing.get_context("spawn")
                 given = (self._open_run, self._arguments)
-                self._pool = ProcessPoolExecutor(AT_ONCE, context, _begin, given)
+                self._pool = ProcessPoolExecutor(self._at_once, context, _begin, given)
             return self._pool.submit(_work, name, arguments)
 
 
@@ -104,12 +108,12 @@ _run: list[Run] = []
 
 
 def _begin(open_run: Callable[..., Run], arguments: tuple[Any, ...]) -> None:
-    """In a new process: give way to others, leave an interrupt to the service, and open what analyses need."""
+    """In a new process: leave an interrupt to the service, open what the work needs, and from then on give way to others."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with contextlib.suppress(OSError):
-        os.nice(NICENESS)
     Thread(target=_end_with_the_service, name="end with the service", daemon=True).start()
     _run.append(open_run(*arguments))
+    with contextlib.suppress(OSError):  # only now: somebody waits for the first piece of work
+        os.nice(NICENESS)
 
 
 def _work(name: str, arguments: tuple[Any, ...]) -> str | Refusal:
