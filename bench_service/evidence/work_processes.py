@@ -108,7 +108,7 @@ _run: list[Run] = []
 
 
 def _begin(open_run: Callable[..., Run], arguments: tuple[Any, ...]) -> None:
-    """In a new process: leave an interrupt to the service, open what the work needs, and from then on give way to others."""
+    """In a new process: leave interrupts to the service, open what the work needs, then give way to others."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_the_service, name="end with the service", daemon=True).start()
     _run.append(open_run(*arguments))

@@ -154,7 +154,7 @@ def test_a_start_on_a_full_disk_makes_the_bench_safe_before_anything_else(small_
 
 def test_analyses_and_plots_are_made_in_other_processes_which_end_with_a_killed_service(bench: BenchProcess) -> None:
     body = {"method": "noise_analysis", "recordings": [recording_of(bench.client)], "parameters": {}}
-    answer = bench.client.post("/api/v1/analyses", json=body)
+    answer = bench.client.post("/api/v1/analyses", json=body, timeout=100)  # a process has to be begun for it
     assert answer.status_code == 201, answer.text
     children = psutil.Process(bench.process.pid).children(recursive=True)
     workers = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
