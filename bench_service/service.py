@@ -121,7 +121,8 @@ class BenchService:
         if reasons:
             raise NotReady(reasons)
         standing = ((bench, self.stores.benches.standing_stops(bench)) for bench in self.benches.ids())
-        return tuple(f"bench {bench} is stopped: {reasons_of(stops)}" for bench, stops in standing if stops)
+        stopped = (f"bench {bench} is stopped: {reasons_of(stops)}" for bench, stops in standing if stops)
+        return (*stopped, *self.catalogue.notes())
 
     def stop(self) -> None:
         """End the service: the running job is left for the next start, the bench made safe."""

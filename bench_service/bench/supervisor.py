@@ -77,7 +77,6 @@ class Supervisor:
         self._unsaid_stop: str | None = None
         self._stopped = False
         """By the channel, or as the books said last."""
-        self._confirmed = False
         self._told_not_safe = False
         self._next_stop_look_s = 0.0
         self._next_try_s = 0.0
@@ -159,11 +158,8 @@ class Supervisor:
         if self._listener is not None and (at := self._listener.listening()) is not None:
             self._books.say_listening(at)
         state = self._devices.device_state()
-        if not self._exchange.stopped:
-            self._confirmed = False
-        elif not self._confirmed and state is not None and state.safe:
+        if self._exchange.stopped and state is not None and state.safe:
             self._books.confirm_safe(state.by)
-            self._confirmed = True
         if self._unsaid_stop is not None:
             self._books.stop(self._unsaid_stop, self._by)
             self._unsaid_stop = None

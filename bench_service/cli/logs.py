@@ -13,7 +13,7 @@ from bench_service.telemetry.log_context import AddSubjects
 
 FIELDS = "{asctime} {levelname} {name} {message}"
 OWN_HANDLERS = ("uvicorn", "uvicorn.error", "uvicorn.access", "dbos")
-"""Loggers that bring a handler of their own, unless they find one."""
+"""Loggers of libraries that bring a handler of their own, unless they find one; some put tracebacks into messages."""
 
 
 TRACE = "    | "
@@ -33,11 +33,14 @@ class Lines(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
         about: dict[str, str] = getattr(record, "subjects", {})
         found = " ".join(f"{name}={value}" for name, value in about.items())
-        text = f"{_moment(record)} {record.levelname:7} {record.name}: {record.getMessage()}"
+        message = record.getMessage()
+        first, *more = message.split("\n") if record.name in OWN_HANDLERS else [message]
+        text = f"{_moment(record)} {record.levelname:7} {record.name}: {first}"
         if found:
             text += f" [{found}]"
-        traceback = [] if record.exc_info is None else self.formatException(record.exc_info).split("\n")
-        return "\n".join([visible(text), *(TRACE + visible(line) for line in traceback)])
+        if record.exc_info is not None:
+            more += self.formatException(record.exc_info).split("\n")
+        return "\n".join([visible(text), *(TRACE + visible(line) for line in more)])
 
 
 def set_up(settings: Settings, level: str) -> None:

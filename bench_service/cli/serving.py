@@ -41,7 +41,7 @@ def ready(
 
     `level`: from which on lines are logged, where the settings do not say.
     Raises `Refused` for an address that it may not listen on, `Misconfigured` for a token that cannot be used, and what
-    `open_service` raises: before any thread or signal handler is there. Where the job engine does not start the server
+    `open_service` raises, before any thread or signal handler is there. Where the job engine does not start the server
     ends, and `NotDriving` is raised at the end of the block.
     """
     with _opened(settings, drive, socket_file, level) as (server, service):

@@ -4,18 +4,16 @@ It has a composition of its own, because that of the service loads what a superv
 """
 
 import logging
-import signal
-import threading
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
-from types import FrameType
 
 from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.stop.listener import StopListener
 from bench_service.bench.stop.messages import made_secret
 from bench_service.bench.supervisor import Supervisor
+from bench_service.cli.ending import ending_on_signals
 from bench_service.cli.logs import set_up
 from bench_service.cli.private_files import protect
 from bench_service.drivers.device_register import DeviceRegister
@@ -43,13 +41,7 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
     """
     set_up(settings, "info")
     protect(settings)
-    ending = threading.Event()
-
-    def end(_signal: int, _frame: FrameType | None) -> None:
-        ending.set()
-
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, end)
+    ending = ending_on_signals()
     folder, bench = settings.devices_in(), settings.bench_id
     files = HostFiles(folder, bench)
     with ExitStack() as closing:

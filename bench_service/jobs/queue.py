@@ -20,9 +20,10 @@ it waits no more."""
 
 @dataclass(frozen=True)
 class QueueEntry:
-    """What a queued job's turn depends on."""
+    """A job that waits for its bench or drives it, by the fields that every version of the service reads."""
 
-    job: str
+    id: str
+    procedure: str
     unit: str
     priority: int
     queued_at: datetime
@@ -84,9 +85,9 @@ class BenchQueue:
         ahead, last = (0, "") if self.running is None else (1, self.running)
         for number, entry in enumerate(self.entries, start=1):
             hold = self.hold(entry)
-            places[entry.job] = Place(number, ahead, hold or self._turn(ahead, last, driven))
+            places[entry.id] = Place(number, ahead, hold or self._turn(ahead, last, driven))
             if hold is None:
-                ahead, last = ahead + 1, entry.job
+                ahead, last = ahead + 1, entry.id
         return places
 
     def _turn(self, ahead: int, last: str, driven: bool) -> str:
@@ -108,16 +109,6 @@ class BenchQueue:
                 yield reservation
 
 
-@dataclass(frozen=True)
-class RunningJob:
-    """The job that drives a bench, as far as it is known whatever version of the service stored it."""
-
-    id: str
-    attempt: int
-    procedure: str
-    unit: str
-
-
 class QueueStore(Protocol):
     """The queues of all benches, as they are kept. Every method is one transaction."""
 
@@ -137,7 +128,7 @@ class QueueStore(Protocol):
         """
         ...
 
-    def running(self, bench: str) -> RunningJob | None:
+    def running(self, bench: str) -> QueueEntry | None:
         """The job that drives a bench."""
         ...
 

@@ -79,7 +79,7 @@ class JobRunner:
 
     def claim(self, entry: QueueEntry) -> Job | None:
         """Begin a queued job, with what is known of its unit now; None where it cannot begin any more."""
-        job = self._stores.jobs.get(entry.job)
+        job = self._stores.jobs.get(entry.id)
         context = self._planner.refreshed(context_of(job))
         return self._stores.queue.claim(entry, CONTEXT.dump_python(context, mode="json"), now())
 

@@ -17,7 +17,8 @@ ServiceError
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
-    └── DamagedRecording  what is stored of a recording is not what was written
+    ├── DamagedRecording  what is stored of a recording is not what was written
+    └── UnfitValue        a value cannot be stored, now or later
 """
 
 from collections.abc import Sequence
@@ -127,3 +128,7 @@ class StorageFailure(ServiceError):
 
 class DamagedRecording(StorageFailure):
     """What is stored of a recording is not what was written."""
+
+
+class UnfitValue(StorageFailure):
+    """A value that the database cannot store, or not give back: to try again changes nothing."""

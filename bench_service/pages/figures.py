@@ -43,8 +43,8 @@ def draw_in(processes: WorkProcesses | None) -> None:
     _elsewhere[:] = [] if processes is None else [processes]
 
 
-SETTINGS = {"svg.fonttype": "none", "svg.hashsalt": "bench", "font.size": 9, "axes.formatter.useoffset": False}
-"""Drawn again, a figure is the same to the byte: its salt is no dice."""
+SALT = "bench"
+"""Of the names inside a drawing: drawn again, a figure is the same to the byte."""
 _DRAWING = Lock()
 """matplotlib's settings are global: two drawings at once would take each other's."""
 
@@ -71,7 +71,7 @@ def _drawn(figure: Figure) -> str:
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure as Canvas
 
-    with rc_context(SETTINGS):
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": SALT, "font.size": 9, "axes.formatter.useoffset": False}):
         canvas = Canvas(figsize=SIZE_IN)
         canvas.subplots_adjust(**MARGINS)
         FigureCanvasSVG(canvas)

@@ -21,8 +21,8 @@ router = APIRouter(include_in_schema=False)
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; sandbox"
 """A drawing has styles in place; opened alone it runs nothing."""
-MOST = 400
-"""So many figures are put aside: those of about twenty pages."""
+MOST = 200
+"""So many figures are put aside: those of about ten pages, as many as are kept drawn."""
 
 
 class FigureShelf:

@@ -22,7 +22,7 @@ def number(value: Any) -> str:
 
 
 templates.env.filters["number"] = number
-templates.env.globals["asset"] = asset
+templates.env.filters["asset"] = asset
 
 
 def service_of(request: Request) -> BenchService:

@@ -52,6 +52,15 @@ def test_of_a_traceback_no_line_looks_like_a_line_of_the_log() -> None:
     assert "ValueError: smoke" in "".join(rest)
 
 
+def test_a_traceback_in_a_message_of_the_http_server_is_shown_line_by_line() -> None:
+    record = logging.makeLogRecord(
+        {"name": "uvicorn.error", "levelname": "ERROR", "msg": "Traceback:\n  at x\x1b\nE: y"}
+    )
+    first, *rest = logs.Lines().format(record).split("\n")
+    assert first.endswith("uvicorn.error: Traceback:")
+    assert rest == ["    |   at x\\x1b", "    | E: y"]
+
+
 def test_everything_else_is_written_as_it_is() -> None:
     stream = io.StringIO()
     handler = logging.StreamHandler(stream)

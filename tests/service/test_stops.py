@@ -9,7 +9,9 @@ import pytest
 
 from bench_service.bench.safety import SafetyService
 from bench_service.cli.client import connect
+from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.model.errors import NotSafe
+from bench_service.persistence import open_stores
 from bench_service.settings import Settings
 from tests.service.client import Client
 from tests.service.page import page
@@ -17,10 +19,19 @@ from tests.service.page import page
 BENCH = "/api/v1/benches/sim"
 
 
-@pytest.fixture
-def client(tmp_path: Path) -> Generator[Client]:
-    with connect(Settings(database_url=f"sqlite:///{tmp_path / 'bench.sqlite'}"), None, drive=True) as http:
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Generator[Client]:
+    url = f"sqlite:///{tmp_path_factory.mktemp('stops') / 'bench.sqlite'}"
+    with connect(Settings(database_url=url), None, drive=True) as http:
         yield Client(http)
+
+
+@pytest.fixture
+def client(service: Client) -> Generator[Client]:
+    """A bench that is not stopped, and is not when the test is over."""
+    yield service
+    for stop in service.http.get(BENCH).json()["stops"]:
+        assert release(service, stop["id"], by="a test", remark="over").is_success
 
 
 def stopped(client: Client, reason: str, by: str) -> str:
@@ -54,7 +65,7 @@ def test_two_people_stop_a_bench_and_it_works_again_when_both_stops_are_released
     assert client.job(job)["waiting"] == "bench sim is stopped: I reach into it"
     assert release(client, reach, by="Bo", remark="out again").json()["standing"] == []
     assert client.wait(job)["state"] == "succeeded"
-    listed = client.http.get(f"{BENCH}/stops").json()
+    listed = client.http.get(f"{BENCH}/stops", params={"limit": 2}).json()
     assert [(s["id"], s["released_by"], s["remark"]) for s in listed["items"]] == [
         (reach, "Bo", "out again"),
         (smoke, "Cy", "the fan was dusty"),
@@ -68,7 +79,7 @@ def test_a_release_without_an_id_is_refused_where_it_is_not_clear_which_stop_is_
     assert (refused.status_code, refused.json()["type"]) == (409, "/problems/SeveralStops")
     assert [e["value"] for e in refused.json()["errors"]] == [first, second]
     assert "by Bo: I reach into it" in refused.json()["errors"][1]["message"]
-    assert [s["released_at"] for s in client.http.get(f"{BENCH}/stops").json()["items"]] == [None, None]
+    assert [s["id"] for s in client.http.get(BENCH).json()["stops"]] == [first, second]
     release(client, first, by="Ada", remark="looked")
     released = client.http.post(f"{BENCH}/release", headers={"X-Requested-By": "Cy"})
     assert (released.status_code, released.json()["stops"]) == (200, [])
@@ -148,7 +159,10 @@ def test_the_first_page_has_a_form_for_each_stop(client: Client) -> None:
 
 def test_a_stop_that_cannot_be_written_is_not_answered_as_done(tmp_path: Path) -> None:
     file = tmp_path / "bench.sqlite"
-    with connect(Settings(database_url=f"sqlite:///{file}"), None, drive=True) as http:
+    stores, database = open_stores(f"sqlite:///{file}")
+    stores.benches.put_bench(SimulatedDriver("sim").description)
+    database.dispose()
+    with connect(Settings(database_url=f"sqlite:///{file}"), None, drive=False) as http:
         other = sqlite3.connect(file)
         other.execute("CREATE TRIGGER full BEFORE INSERT ON bench_stops BEGIN SELECT RAISE(ABORT, 'no room'); END")
         other.commit()

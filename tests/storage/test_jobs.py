@@ -68,7 +68,6 @@ def test_a_job_through_its_life(stores: Stores, new_job: NewJob) -> None:
     job = stores.jobs.add(new_job())
     start = job.created_at
     stores.jobs.transition(job.id, JobState.RUNNING, at=start + LATER)
-    stores.jobs.set_context(job.id, {"bench": "mounted"})
     stores.jobs.station_done(job.id, 0, start + 2 * LATER, {"recording": "r0"})
     stores.jobs.station_done(job.id, 0, start + 2 * LATER, {"recording": "r0"})
     stores.jobs.station_done(job.id, 2, start + 3 * LATER, {})
@@ -89,7 +88,6 @@ def test_a_job_through_its_life(stores: Stores, new_job: NewJob) -> None:
         verdict=Verdict.PASS,
         result_id="r-1",
         stations_done=3,
-        context={"bench": "mounted"},
         attempt=2,
         queued_at=start + 6 * LATER,
         started_at=start + LATER,
@@ -222,7 +220,6 @@ def test_what_does_not_exist_is_not_found(stores: Stores) -> None:
         lambda: stores.jobs.resume("x", moment),
         lambda: stores.jobs.transition("x", JobState.RUNNING, at=moment),
         lambda: stores.jobs.station_done("x", 0, moment, {}),
-        lambda: stores.jobs.set_context("x", {}),
         lambda: stores.jobs.note("x", "note", moment, {}),
     )
     for ask in asks:

@@ -156,7 +156,7 @@ def test_a_wish_of_a_person_goes_before_a_retry(stores: Stores, new_job: NewJob)
 def test_a_priority_changes_the_order_while_the_job_is_queued(stores: Stores, new_job: NewJob) -> None:
     jobs = [stores.jobs.add(new_job(queued_at=NOW + k * SECOND)) for k in range(3)]
     assert stores.queue.set_priority(jobs[2].id, 1, NOW).priority == 1
-    assert [e.job for e in stores.queue.look("sim", NOW).entries] == [jobs[2].id, jobs[0].id, jobs[1].id]
+    assert [e.id for e in stores.queue.look("sim", NOW).entries] == [jobs[2].id, jobs[0].id, jobs[1].id]
     assert stores.jobs.events(jobs[2].id)[-1].data == {"priority": 1, "before": 10}
     assert claim_next(stores) is not None
     with pytest.raises(IllegalTransition, match="is running; only a queued one"):

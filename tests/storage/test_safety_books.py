@@ -3,9 +3,11 @@
 import sqlalchemy as sa
 
 from bench_service.campaigns.stores import Stores
+from bench_service.model.records import BenchStop
 from bench_service.persistence import Database
 from bench_service.persistence.bench.safety_books import SqlSafetyBooks
 from bench_service.persistence.tables.telemetry import AuditRow
+from bench_service.wall_clock import now
 from tests.stops import release_all
 
 
@@ -25,6 +27,12 @@ def test_a_stop_its_confirmation_and_what_was_done(
     other.close()
     books.confirm_safe("the supervisor")
     books.confirm_safe("somebody later")
+    later = BenchStop("sim", now(), "a stop after that")
+    stores.benches.stop_bench(later)
+    assert [found.safe_by for found in stores.benches.standing_stops("sim")] == [*["the supervisor"] * 2, ""]
+    books.confirm_safe("the supervisor, again")
+    assert stores.benches.standing_stops("sim")[2].safe_by == "the supervisor, again"
+    stores.benches.release_stop("sim", later.id, now(), "Bo", "")
     stop = stores.benches.bench_stop("sim")
     assert stop is not None
     assert (stop.reason, stop.by, stop.safe_by) == ("could not be made safe: a test", *["the supervisor"] * 2)

@@ -65,7 +65,7 @@ def read_queue(bench_id: str, service: Service) -> QueueView:
     queue = service.queues.queue(bench_id)
     holder = service.benches.holder(bench_id)
     places = queue.places(holder is not None)
-    entries = [QueueEntryView.of(entry, places[entry.job]) for entry in queue.entries]
+    entries = [QueueEntryView.of(entry, places[entry.id]) for entry in queue.entries]
     return QueueView(bench=queue.bench, running=queue.running, driven_by=holder, entries=entries)
 
 

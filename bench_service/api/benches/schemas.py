@@ -11,6 +11,7 @@ from bench_service.bench.devices import DeviceState
 from bench_service.bench.live.values import BenchLive
 from bench_service.bench.safety import Safety
 from bench_service.jobs.queue import Place, QueueEntry
+from bench_service.mapping import copied
 from bench_service.model.records import BenchStop
 from procedures.bench import BenchDescription
 
@@ -159,17 +160,7 @@ class QueueEntryView(BaseModel):
     @classmethod
     def of(cls, entry: QueueEntry, place: Place) -> "QueueEntryView":
         """As HTTP says it."""
-        return cls(
-            job=entry.job,
-            position=place.position,
-            ahead=place.ahead,
-            waiting=place.waiting,
-            priority=entry.priority,
-            unit=entry.unit,
-            queued_at=entry.queued_at,
-            not_before=entry.not_before,
-            reservation=entry.reservation,
-        )
+        return copied(cls, entry, place, job=entry.id)
 
 
 class QueueView(BaseModel):

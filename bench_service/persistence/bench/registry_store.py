@@ -94,7 +94,8 @@ class SqlBenchRegistry:
             return standing_stops(session, bench_id)
 
     def bench_stop(self, bench_id: str) -> BenchStop | None:
-        return next(iter(self.standing_stops(bench_id)), None)
+        with self._database.read() as session:
+            return next(iter(standing_stops(session, bench_id, limit=1)), None)
 
     def stops(self, bench_id: str, *, after: str | None = None, limit: int = 50) -> Page[BenchStop]:
         query = select(BenchStopRow).where(BenchStopRow.bench == bench_id)
@@ -102,10 +103,11 @@ class SqlBenchRegistry:
             return page(session, query, BenchStopRow.id, after, limit, _stop_of_row)
 
 
-def standing_stops(session: Session, bench_id: str) -> tuple[BenchStop, ...]:
+def standing_stops(session: Session, bench_id: str, limit: int | None = None) -> tuple[BenchStop, ...]:
     """The stops of a bench that stand, oldest first."""
     query = select(BenchStopRow).where(BenchStopRow.bench == bench_id, _STANDS)
-    return tuple(map(_stop_of_row, session.scalars(query.order_by(BenchStopRow.at, BenchStopRow.id))))
+    ordered = query.order_by(BenchStopRow.at, BenchStopRow.id).limit(limit)
+    return tuple(map(_stop_of_row, session.scalars(ordered)))
 
 
 def _row_of_stop(stop: BenchStop) -> BenchStopRow:

@@ -6,6 +6,8 @@ supervisor works without one that does not answer.
 
 from functools import cached_property
 
+from sqlalchemy import ColumnElement, select
+
 from bench_service import wall_clock
 from bench_service.bench.stop.messages import Listening
 from bench_service.bench.stop.word import StopWord
@@ -17,6 +19,7 @@ from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.jobs.job_store import SqlJobStore
 from bench_service.persistence.jobs.queue_store import SqlQueueStore
+from bench_service.persistence.tables.bench import BenchStopRow
 from bench_service.persistence.tables.telemetry import AuditRow
 from bench_service.persistence.telemetry.audit_store import SqlAuditTrail
 
@@ -44,7 +47,8 @@ class SqlSafetyBooks:
         SqlStopAddresses(self._database).say(self._bench_id, at)
 
     def confirm_safe(self, by: str) -> None:
-        SqlBenchRegistry(self._database).confirm_safe(self._bench_id, wall_clock.now(), by)
+        if self._stands(BenchStopRow.released_at.is_(None), BenchStopRow.safe_at.is_(None)):
+            SqlBenchRegistry(self._database).confirm_safe(self._bench_id, wall_clock.now(), by)
 
     def stop(self, reason: str, by: str) -> None:
         stop = BenchStop(self._bench_id, wall_clock.now(), reason, by=by)
@@ -69,6 +73,12 @@ class SqlSafetyBooks:
                 SqlJobStore(self._database).note(job, "note", at, {"text": text, "by": by})
             except NotFound:
                 return
+
+    def _stands(self, *conditions: ColumnElement[bool]) -> bool:
+        """Whether the bench has a stop of which all this is true."""
+        query = select(BenchStopRow.id).where(BenchStopRow.bench == self._bench_id, *conditions).limit(1)
+        with self._database.read() as session:
+            return session.scalar(query) is not None
 
     def close(self) -> None:
         """Close the database's connections."""
