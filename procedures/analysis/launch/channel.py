@@ -28,12 +28,16 @@ from procedures.analysis.noise_fit.estimate import Estimate, NoiseFit
 from procedures.analysis.noise_fit.least_squares import fit_allan
 from procedures.analysis.noise_fit.likelihood import fit_noise
 from procedures.analysis.noise_fit.powers import Powers, slow_powers
-from procedures.analysis.wavelet_split import wavelet_split
+from procedures.analysis.wavelet_split import most_levels, wavelet_split
 from procedures.core.arrays import Array
 from procedures.core.units import DEVIATION_DISPLAY
 
 BAND_TERMS = 8
 """The band ends where every start has about twice so many terms."""
+
+
+_ROUNDING = 1e-12
+"""Of a series, so much may differ between its parts by rounding alone."""
 
 
 def channel_noise(
@@ -123,21 +127,26 @@ def _split(series: Array, cell_s: float, rate_unit: str, settings: LaunchSetting
     if settings.wavelet_rule is None:
         return []
     unit, size = DEVIATION_DISPLAY[rate_unit]
+    levels = min(settings.wavelet_levels, most_levels(len(series)))
+    if levels == 0:
+        return []
     split = wavelet_split(
         series,
         cell_s,
         rule=settings.wavelet_rule,
         unit_size=size if settings.wavelet_rule == "thesis" else None,
-        levels=settings.wavelet_levels,
+        levels=levels,
     )
-    scale = 2**settings.wavelet_levels * cell_s
+    scale = 2**levels * cell_s
     note = f"{settings.wavelet_rule} rule, scales up to {scale:g} s"
     if settings.wavelet_rule == "thesis":
         note += f", unit variance in {unit}"
+    if levels < settings.wavelet_levels:
+        note += f"; {levels} levels, not {settings.wavelet_levels}: {len(series)} cells allow no more"
     found: list[Stage] = []
     for name, part in (("kept", split.kept), ("removed", split.removed)):
         title = f"{name} by the wavelet split"
-        if np.all(part == part[0]):
+        if np.ptp(part) <= _ROUNDING * np.ptp(series):
             found.append(Stage(title, Curve((), (), (), (), ()), (None,) * len(PROCESSES), f"{note}: nothing"))
             continue
         curve = _deviation(part, cell_s, settings)

@@ -37,7 +37,8 @@ def fit_noise(slow: Powers, fast: Powers | None = None, *, level: float = 0.01, 
     for name, value in (("level", level), ("confidence", confidence)):
         if not 0.0 < value < 1.0:
             raise BadParameter(name, value, f"0 < {name} < 1")
-    joined, remarks = agreed(slow, fast)
+    agreement = agreed(slow, fast)
+    joined = agreement.joined
     selection = select(joined.used, level)
     estimates = _estimates(joined.used, selection, confidence)
     correlated, correlation = _correlation(selection)
@@ -51,9 +52,9 @@ def fit_noise(slow: Powers, fast: Powers | None = None, *, level: float = 0.01, 
         correlated=correlated,
         correlation=correlation,
         octaves=octaves,
-        lines=() if fast is None else fast.lines,
+        lines=(*slow.lines, *(() if fast is None else fast.lines)),
         band_hz=(float(fitted[0]), float(fitted[-1])),
-        remarks=(*remarks, *_remarks(selection)),
+        remarks=(*agreement.remarks, *_remarks(selection)),
     )
 
 
