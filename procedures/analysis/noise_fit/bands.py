@@ -7,12 +7,10 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.analysis.noise_fit.columns import QUANTIZATION, RANDOM_WALK
-from procedures.analysis.noise_fit.estimate import Octave
-from procedures.analysis.noise_fit.goodness import deviates, judged
+from procedures.analysis.noise_fit.extensions import Extension, extension
+from procedures.analysis.noise_fit.joined import Joined, joined_at
 from procedures.analysis.noise_fit.powers import Powers
-from procedures.analysis.noise_fit.restricted import Spectrum, maximum, only_where
-from procedures.core.arrays import Array
+from procedures.analysis.noise_fit.restricted import State, maximum
 from procedures.core.errors import UnfitRecording
 
 MISFIT_LEVEL = 1e-3
@@ -23,61 +21,8 @@ _FEWEST_OCTAVES = 3
 _LONGEST_HOLE = 3
 """Octaves of a part left out that has fitted ones on both sides."""
 _ROUNDS = 3
-_PROCESSES = 4
-
-
-@dataclass(frozen=True)
-class Joined:
-    """Slow and fast bins in one spectrum, (b,), and which of them are fitted."""
-
-    frequency_hz: Array
-    is_fast: NDArray[np.bool_]
-    spectrum: Spectrum
-    fitted: NDArray[np.bool_]
-    white: Array
-    """Expected power for unit N², (b,)."""
-
-    @property
-    def used(self) -> Spectrum:
-        """The fitted bins."""
-        return only_where(self.fitted, self.spectrum)
-
-    @property
-    def group(self) -> NDArray[np.int64]:
-        """Number of each bin's octave from 0, slow and fast apart, (b,)."""
-        key = np.floor(np.log2(self.frequency_hz)) * 2 + self.is_fast
-        return np.unique(key, return_inverse=True)[1].astype(np.int64)
-
-    def without(self, groups: range) -> "Joined":
-        """The same, some octaves not fitted, and an edge of the white noise allowed for."""
-        group = self.group
-        return replace(self, fitted=self.fitted & ~((group >= groups.start) & (group < groups.stop)))._edged()
-
-    def _edged(self) -> "Joined":
-        """White noise that falls or rises towards the highest fitted frequency f₁, in its own and a fifth column.
-
-        ``N²·(1 − x²) + q·x²``, x = f/f₁, q ≥ 0: the first term of any filter's edge, and of any reading noise. A band
-        that merely ends where a misfit is seen would take the unseen part of the edge for less white noise.
-        """
-        s, white = self.spectrum, self.white
-        x2 = np.minimum(1.0, (self.frequency_hz / float(np.max(self.frequency_hz[self.fitted]))) ** 2)
-        columns = np.column_stack([s.columns[:, :_PROCESSES], x2 * white])
-        columns[:, RANDOM_WALK] = (1.0 - x2) * white
-        return replace(self, spectrum=replace(s, columns=columns))
-
-    def octaves(self, variances: Array, amplitudes: Array, ramp: bool) -> tuple[Octave, ...]:
-        """Goodness of the bins in each octave, slow and fast apart, and fitted and left out apart."""
-        s = self.spectrum if ramp else self.spectrum.without_ramp
-        z = deviates(s, variances, amplitudes)
-        key = self.group * 2 + ~self.fitted
-        found: list[Octave] = []
-        for one in np.unique(key):
-            own = key == one
-            frequency = self.frequency_hz[own]
-            fitted, is_fast = bool(self.fitted[own][0]), bool(self.is_fast[own][0])
-            ends = float(frequency[0]), float(frequency[-1])
-            found.append(Octave(*ends, *judged(z[own]), is_fast, fitted))
-        return tuple(found)
+_SLOW_PART = 0.2
+"""Of a cell's frequency: up to here the slow model is chosen where no whole spectrum fits."""
 
 
 @dataclass(frozen=True)
@@ -90,68 +35,66 @@ class Agreement:
     """Bins left out that have fitted ones above them, (b,): what only they show is not described."""
     described: bool
     """Whether what is fitted fits."""
+    model: Extension | None = None
+    """What the model has beside the five coefficients."""
 
 
 def agreed(slow: Powers, fast: Powers | None) -> Agreement:
-    """The bins to fit, and sentences on what was left out of them. Raises `UnfitRecording`."""
+    """The bins to fit, the model that they need, and sentences on what was left out. Raises `UnfitRecording`."""
+    ways = _ways(slow, fast)
+    found, state = _first_that_fits(ways)
+    base = ways[-1].joined.below(_SLOW_PART / slow.period_s) if found is None else found.joined
+    model = extension(base, state or _best(base))
+    if model is not None:
+        ways = tuple(replace(way, joined=model.applied(way.joined)) for way in ways)
+        found, _ = _first_that_fits(ways)
+    if found is None:
+        return replace(_parted(ways[-1].joined, ways[-1].own), model=model)
+    text = f"At the full rate the power is not that of white reading noise and the slower processes{found.own}."
+    return Agreement(found.joined, (text,) if found.own else (), ~found.joined.fitted, described=True, model=model)
+
+
+@dataclass(frozen=True)
+class _Way:
+    """Slow and fast bins joined in one of two ways."""
+
+    joined: Joined
+    own: str
+    """What is said of Q where the fast bins have their own."""
+
+
+def _ways(slow: Powers, fast: Powers | None) -> tuple[_Way, ...]:
+    """The ways to join them, the one that knows most first."""
     if fast is None:
-        alone = joined_at(slow, None, inf)
-        return _whole(alone) if fits(alone) else _parted(alone, "")
+        return (_Way(joined_at(slow, None, inf), ""),)
     crossover = float(fast.frequency_hz[0])
     if np.sum(slow.frequency_hz < crossover) < _FEWEST_BINS:
         raise UnfitRecording(f"fewer than {_FEWEST_BINS} bins below {crossover:.3g} Hz: fit the slow powers alone")
-    whole = joined_at(slow, fast, crossover)
-    if fits(whole):
-        return _whole(whole)
-    apart = joined_at(slow, fast, 0.5 / slow.period_s)
     own = f"; Q is that of readings {slow.period_s:g} s apart"
-    if fits(apart):
-        text = f"At the full rate the power is not that of white reading noise and the slower processes{own}."
-        return replace(_whole(apart), remarks=(text,))
-    return _parted(apart, own)
+    return _Way(joined_at(slow, fast, crossover), ""), _Way(joined_at(slow, fast, 0.5 / slow.period_s), own)
 
 
-def joined_at(slow: Powers, fast: Powers | None, crossover_hz: float) -> Joined:
-    """Slow bins below the crossover and fast ones above.
-
-    Fast bins that do not follow the slow ones at once have a quantization of their own, in a fifth column.
-    """
-    parts = [(slow, slow.frequency_hz < crossover_hz)]
-    if fast is not None:
-        parts.append((fast, fast.frequency_hz >= crossover_hz))
-    counts = [int(np.sum(keep)) for _, keep in parts]
-    is_fast = np.repeat([False, True], [*counts, 0][:2])
-    frequency = np.concatenate([p.frequency_hz[keep] for p, keep in parts])
-    columns = np.concatenate([p.columns[keep] for p, keep in parts])
-    if fast is not None and crossover_hz > fast.frequency_hz[0] and np.any(is_fast):
-        own = np.where(is_fast, columns[:, QUANTIZATION], 0.0)
-        columns = np.column_stack([columns, own])
-        columns[is_fast, QUANTIZATION] = 0.0
-    dof = np.concatenate([p.dof[keep] for p, keep in parts])
-    power = np.concatenate([p.power[keep] for p, keep in parts])
-    products = np.concatenate([p.products[keep] for p, keep in parts])
-    gram = np.concatenate([p.gram[keep] for p, keep in parts])
-    spectrum = Spectrum(power * dof, dof, columns, products, gram)
-    return Joined(frequency, is_fast, spectrum, np.ones(len(frequency), dtype=bool), columns[:, RANDOM_WALK].copy())
+def _first_that_fits(ways: tuple[_Way, ...]) -> tuple[_Way | None, State | None]:
+    for way in ways:
+        state = _best(way.joined)
+        if misfit(way.joined, state) <= 1.0:
+            return way, state
+    return None, None
 
 
-def fits(joined: Joined) -> bool:
-    """Whether all fitted octaves fit; the fit has all processes and a ramp."""
-    return misfit(joined) <= 1.0
+def _best(joined: Joined) -> State:
+    """All processes allowed, and a ramp."""
+    return maximum(joined.used, range(joined.spectrum.columns.shape[1]))
 
 
-def misfit(joined: Joined) -> float:
-    """Logarithm of the least p-value of the fitted octaves over that of the test's level; above 1 the fit is rejected."""
-    best = maximum(joined.used, range(joined.spectrum.columns.shape[1]))
+def misfit(joined: Joined, best: State | None = None) -> float:
+    """Logarithm of the least p-value of the fitted octaves over that of the test's level; above 1 it does not fit."""
+    best = best or _best(joined)
     if best.log_likelihood == -np.inf:
         return inf
     octaves = [o for o in joined.octaves(best.variances, best.amplitudes, ramp=True) if o.fitted]
     least = max(min(o.p_value for o in octaves), 1e-300)
     return float(np.log(least) / np.log(MISFIT_LEVEL / len(octaves)))
-
-
-def _whole(joined: Joined) -> Agreement:
-    return Agreement(joined, (), ~joined.fitted, described=True)
 
 
 def _parted(joined: Joined, own: str) -> Agreement:

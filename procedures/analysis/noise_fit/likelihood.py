@@ -10,8 +10,10 @@ from math import sqrt
 import numpy as np
 from scipy.special import chdtri
 
+from procedures.analysis.noise_fit.alternatives import Doubt, allowed_for
 from procedures.analysis.noise_fit.bands import agreed
 from procedures.analysis.noise_fit.estimate import PROCESSES, Estimate, NoiseFit
+from procedures.analysis.noise_fit.joined import Joined
 from procedures.analysis.noise_fit.powers import Powers
 from procedures.analysis.noise_fit.restricted import Profile, Spectrum, State, information, maximum
 from procedures.analysis.noise_fit.selection import VARIANCES, Selection, inverse_information, select
@@ -40,7 +42,7 @@ def fit_noise(slow: Powers, fast: Powers | None = None, *, level: float = 0.01, 
     agreement = agreed(slow, fast)
     joined = agreement.joined
     selection = select(joined.used, level)
-    estimates = _estimates(joined.used, selection, confidence)
+    estimates, doubt = _estimates(joined, selection, confidence)
     correlated, correlation = _correlation(selection)
     octaves = joined.octaves(selection.best.variances, selection.best.amplitudes, selection.ramp)
     fitted = joined.frequency_hz[joined.fitted]
@@ -54,16 +56,17 @@ def fit_noise(slow: Powers, fast: Powers | None = None, *, level: float = 0.01, 
         octaves=octaves,
         lines=(*slow.lines, *(() if fast is None else fast.lines)),
         band_hz=(float(fitted[0]), float(fitted[-1])),
-        remarks=(*agreement.remarks, *_remarks(selection)),
+        remarks=(*agreement.remarks, *_remarks(selection), *_doubts(doubt)),
     )
 
 
-def _estimates(spectrum: Spectrum, selection: Selection, confidence: float) -> tuple[Estimate, ...]:
+def _estimates(joined: Joined, selection: Selection, confidence: float) -> tuple[tuple[Estimate, ...], Doubt]:
     """Of Q, N, B, K, R. Values are those of the processes present; intervals allow the others as well.
 
     A process not observed is not proven absent: an interval that took it for zero would be too narrow. An absent
     process's limit allows the ramp, too.
     """
+    spectrum = joined.used
     everything = tuple(range(spectrum.columns.shape[1]))
     own, full = (maximum(s, everything) for s in (selection.spectrum, spectrum))
     fit_sd = _standard_uncertainties(selection.spectrum, selection.best, selection.free)
@@ -79,7 +82,12 @@ def _estimates(spectrum: Spectrum, selection: Selection, confidence: float) -> t
         else:
             limit = Profile(spectrum, everything, k, full).crossing(_one_sided(), upwards=True, scale=full_sd[k])
             found.append(Estimate(None, None, None, None, sqrt(limit), p_value))
-    return (*found, _of_ramp(selection, confidence))
+    losses = float(chdtri(1, 1.0 - confidence)), _one_sided()
+    doubt = Doubt({}, None)
+    if not joined.added:
+        doubt = allowed_for(joined, selection, own, dict(enumerate(found)), losses)
+        found = [doubt.estimates.get(k, estimate) for k, estimate in enumerate(found)]
+    return (*found, _of_ramp(selection, confidence)), doubt
 
 
 def _one_sided() -> float:
@@ -140,3 +148,13 @@ def _remarks(selection: Selection) -> tuple[str, ...]:
         return ()
     taken, other = ("rate ramp", "rate random walk")[:: 1 if selection.ramp else -1]
     return (f"The slow drift is taken for a {taken}, but one record does not tell it from a {other}.",)
+
+
+def _doubts(doubt: Doubt) -> tuple[str, ...]:
+    if doubt.model is None:
+        return ()
+    if doubt.model.time_s is None:
+        other = f"a flicker whose shortest relaxation time is about {doubt.model.corner_s:.2g} s"
+    else:
+        other = f"a Gauss–Markov process of about {doubt.model.time_s:.2g} s"
+    return (f"The slow noise may as well be {other}: the intervals of B and K allow for it.",)

@@ -1,0 +1,112 @@
+"""Slow noise that could be another process as well: intervals of B and K that hold whichever it is.
+
+One record does not tell a flicker, a rate random walk and a Gauss–Markov process apart where it shows only a little of
+them. The test that finds one of them compares it with nothing, not with the others.
+"""
+
+from dataclasses import dataclass, replace
+from math import inf, sqrt
+
+import numpy as np
+
+from procedures.analysis.noise_fit.columns import BIAS_INSTABILITY, RATE_RANDOM_WALK
+from procedures.analysis.noise_fit.estimate import Estimate
+from procedures.analysis.noise_fit.extensions import Extension, candidates
+from procedures.analysis.noise_fit.joined import Joined
+from procedures.analysis.noise_fit.restricted import Profile, Spectrum, State, information, maximum
+from procedures.analysis.noise_fit.selection import Selection, inverse_information
+
+DOUBT = 4.0
+"""Twice the log likelihood that another process gains, from which on intervals allow for it."""
+SLOW = (BIAS_INSTABILITY, RATE_RANDOM_WALK)
+_EVERY = 2
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """One other model: all processes allowed, and its own."""
+
+    model: Extension
+    spectrum: Spectrum
+    best: State
+
+    @property
+    def everything(self) -> tuple[int, ...]:
+        """All columns."""
+        return tuple(range(self.spectrum.columns.shape[1]))
+
+    def without(self, k: int) -> float:
+        """The log likelihood with the process k left out."""
+        free = [i for i in self.everything if i != k]
+        return maximum(self.spectrum, free, start=self.best.variances).log_likelihood
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """What else the slow noise may be."""
+
+    estimates: dict[int, Estimate]
+    """By process, with intervals that allow for it."""
+    model: Extension | None
+    """The likeliest other model; None: there is no doubt."""
+
+
+def allowed_for(
+    joined: Joined, selection: Selection, own: State, estimates: dict[int, Estimate], losses: tuple[float, float]
+) -> Doubt:
+    """Widens the intervals of B and K that are present; `own` is the fit of all processes with the selection's ramp.
+
+    `losses` are those of an interval's and of an upper limit's end. A process whose absence costs no more than an
+    interval's end once another is allowed has an interval from zero.
+    """
+    present = [k for k in SLOW if k in selection.present]
+    if not present:
+        return Doubt({}, None)
+    fits = _fits(joined, selection, own)
+    if not fits:
+        return Doubt({}, None)
+    top = max(own.log_likelihood, *(f.best.log_likelihood for f in fits))
+    likely = max(fits, key=lambda f: f.best.log_likelihood)
+    doubtful = 2.0 * (top - own.log_likelihood) >= DOUBT
+    changed: dict[int, Estimate] = {}
+    for k in present:
+        missing = [f for f in fits if 2.0 * (top - f.without(k)) <= losses[0]]
+        if missing or doubtful:
+            others = {id(f): f for f in (*missing[:1], *([likely] if doubtful else []))}
+            changed[k] = _wider(estimates[k], k, list(others.values()), top, losses, zero=bool(missing))
+    return Doubt(changed, likely.model if changed else None)
+
+
+def _fits(joined: Joined, selection: Selection, own: State) -> list[_Fit]:
+    """The likeliest model of each kind, and the others that are about as likely."""
+    found: list[_Fit] = []
+    start = np.append(own.variances, 0.0)
+    for model in candidates(joined)[::_EVERY]:
+        spectrum = model.applied(joined).used
+        spectrum = spectrum if selection.ramp else spectrum.without_ramp
+        columns = spectrum.columns.shape[1]
+        begin = start[:columns].copy()
+        if model.time_s is not None:  # half of the slow power to begin with: nothing grows from zero by itself
+            added = spectrum.columns[:, -1]
+            begin[-1] = 0.5 * float(np.min(own.power / added))
+        found.append(_Fit(model, spectrum, maximum(spectrum, range(columns), start=begin)))
+    found.sort(key=lambda f: -f.best.log_likelihood)
+    return found[:3]
+
+
+def _wider(
+    estimate: Estimate, k: int, fits: list[_Fit], top: float, losses: tuple[float, float], *, zero: bool
+) -> Estimate:
+    """The interval and the limit over all models."""
+    ends = [estimate.lower or 0.0], [estimate.upper or 0.0], [estimate.upper_limit]
+    for fit in fits:
+        variance = inverse_information(information(fit.spectrum, fit.best))[k, k]
+        profile = Profile(fit.spectrum, fit.everything, k, fit.best)
+        lost = 2.0 * (top - fit.best.log_likelihood)
+        for into, loss in ((ends[1], losses[0]), (ends[2], losses[1])):
+            if loss > lost:
+                found = profile.crossing(loss - lost, upwards=True, scale=sqrt(variance))
+                into.append(sqrt(found) if found < inf else 0.0)
+        if not zero and losses[0] > lost:
+            ends[0].append(sqrt(profile.crossing(losses[0] - lost, upwards=False, scale=sqrt(variance))))
+    return replace(estimate, lower=0.0 if zero else min(ends[0]), upper=max(ends[1]), upper_limit=max(ends[2]))
