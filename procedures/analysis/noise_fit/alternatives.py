@@ -52,52 +52,62 @@ class Doubt:
 
 
 def allowed_for(
-    joined: Joined, selection: Selection, own: State, estimates: dict[int, Estimate], losses: tuple[float, float]
+    joined: Joined,
+    plain: Joined,
+    selection: Selection,
+    own: State,
+    estimates: dict[int, Estimate],
+    losses: tuple[float, float],
 ) -> Doubt:
     """Widens the intervals of B and K that are present; `own` is the fit of all processes with the selection's ramp.
 
-    `losses` are those of an interval's and of an upper limit's end. A process whose absence costs no more than an
-    interval's end once another is allowed has an interval from zero.
+    `plain` are the bins without what extends the model. `losses` are those of an interval's and of an upper limit's
+    end. A process whose absence costs no more than an interval's end once another is allowed has an interval from
+    zero; the limit of one that was not observed is raised where the other model is as likely.
     """
-    present = [k for k in SLOW if k in selection.present]
-    if not present:
+    extended = joined is not plain
+    if not extended and not any(k in selection.present for k in SLOW):
         return Doubt({}, None)
-    fits = _fits(joined, selection, own)
+    fits = _fits(plain, selection, own)
     if not fits:
         return Doubt({}, None)
     top = max(own.log_likelihood, *(f.best.log_likelihood for f in fits))
-    likely = max(fits, key=lambda f: f.best.log_likelihood)
-    doubtful = 2.0 * (top - own.log_likelihood) >= DOUBT
+    likely = fits[0]
+    doubtful = extended or 2.0 * (top - own.log_likelihood) >= DOUBT
     changed: dict[int, Estimate] = {}
-    for k in present:
-        missing = [f for f in fits if 2.0 * (top - f.without(k)) <= losses[0]]
+    for k in SLOW:
+        missing = [f for f in fits if k in selection.present and 2.0 * (top - f.without(k)) <= losses[0]]
         if missing or doubtful:
-            others = {id(f): f for f in (*missing[:1], *([likely] if doubtful else []))}
+            others = {id(f): f for f in (*missing[:1], *(fits if doubtful else []))}
             changed[k] = _wider(estimates[k], k, list(others.values()), top, losses, zero=bool(missing))
+    changed = {k: e for k, e in changed.items() if e != estimates[k]}
     return Doubt(changed, likely.model if changed else None)
 
 
-def _fits(joined: Joined, selection: Selection, own: State) -> list[_Fit]:
-    """The likeliest model of each kind, and the others that are about as likely."""
+def _fits(plain: Joined, selection: Selection, own: State) -> list[_Fit]:
+    """The likeliest two models of each kind, the likeliest first."""
     found: list[_Fit] = []
-    start = np.append(own.variances, 0.0)
-    for model in candidates(joined)[::_EVERY]:
-        spectrum = model.applied(joined).used
+    for model in candidates(plain, _EVERY):
+        spectrum = model.applied(plain).used
         spectrum = spectrum if selection.ramp else spectrum.without_ramp
         columns = spectrum.columns.shape[1]
-        begin = start[:columns].copy()
-        if model.time_s is not None:  # half of the slow power to begin with: nothing grows from zero by itself
-            added = spectrum.columns[:, -1]
-            begin[-1] = 0.5 * float(np.min(own.power / added))
+        begin = np.zeros(columns)
+        known = min(plain.spectrum.columns.shape[1], columns)
+        begin[:known] = own.variances[:known]
+        if model.time_s is not None:  # nothing grows from zero by itself
+            begin[-1] = 0.5 * float(np.min(own.power / spectrum.columns[:, -1]))
         found.append(_Fit(model, spectrum, maximum(spectrum, range(columns), start=begin)))
     found.sort(key=lambda f: -f.best.log_likelihood)
-    return found[:3]
+    times = [f for f in found if f.model.time_s is not None]
+    corners = [f for f in found if f.model.time_s is None]
+    return sorted((*times[:2], *corners[:2]), key=lambda f: -f.best.log_likelihood)
 
 
 def _wider(
     estimate: Estimate, k: int, fits: list[_Fit], top: float, losses: tuple[float, float], *, zero: bool
 ) -> Estimate:
     """The interval and the limit over all models."""
+    present = estimate.value is not None
     ends = [estimate.lower or 0.0], [estimate.upper or 0.0], [estimate.upper_limit]
     for fit in fits:
         variance = inverse_information(information(fit.spectrum, fit.best))[k, k]
@@ -107,6 +117,8 @@ def _wider(
             if loss > lost:
                 found = profile.crossing(loss - lost, upwards=True, scale=sqrt(variance))
                 into.append(sqrt(found) if found < inf else 0.0)
-        if not zero and losses[0] > lost:
+        if present and not zero and losses[0] > lost:
             ends[0].append(sqrt(profile.crossing(losses[0] - lost, upwards=False, scale=sqrt(variance))))
+    if not present:
+        return replace(estimate, upper_limit=max(ends[2]))
     return replace(estimate, lower=0.0 if zero else min(ends[0]), upper=max(ends[1]), upper_limit=max(ends[2]))

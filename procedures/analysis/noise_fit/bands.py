@@ -38,6 +38,11 @@ class Agreement:
     model: Extension | None = None
     """What the model has beside the five coefficients."""
 
+    @property
+    def plain(self) -> Joined:
+        """The same bins without what extends the model."""
+        return self.joined if self.model is None else self.model.taken_from(self.joined)
+
 
 def agreed(slow: Powers, fast: Powers | None) -> Agreement:
     """The bins to fit, the model that they need, and sentences on what was left out. Raises `UnfitRecording`."""

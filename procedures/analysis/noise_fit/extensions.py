@@ -23,6 +23,9 @@ from procedures.core.arrays import Array
 
 SHORTEST_S, CELLS = 2.0, 2.0
 """Least correlation time, in seconds and in cells: what is shorter is a filter's edge."""
+SHORT_CORNERS_S = (0.05, 0.1, 0.2, 1.0)
+"""Shortest relaxation times of a flicker that are tried beside those of a Gauss–Markov process."""
+_CORNER_OF_LONGEST = 0.3
 LONGEST = 0.1
 """Greatest correlation time, of the record: what is longer is no other than a random walk."""
 SCORE = 3.0
@@ -55,6 +58,13 @@ class Extension:
         columns = np.column_stack([columns, gauss_markov(joined, self.time_s)])
         return replace(joined, spectrum=replace(s, columns=columns), added=1)
 
+    def taken_from(self, joined: Joined) -> Joined:
+        """The bins with the columns they had before."""
+        s = joined.spectrum
+        columns = s.columns[:, : s.columns.shape[1] - joined.added].copy()
+        columns[:, BIAS_INSTABILITY] = joined.flicker
+        return replace(joined, spectrum=replace(s, columns=columns), added=0)
+
 
 def gauss_markov(joined: Joined, time_s: float) -> Array:
     """Expected power (b,) of unit variance.
@@ -75,7 +85,7 @@ def gauss_markov(joined: Joined, time_s: float) -> Array:
 
 def flicker_from(joined: Joined, corner_s: float) -> Array:
     """Expected power (b,) of unit B² with another shortest relaxation time than the columns were made with."""
-    count = max(2, round(_PER_E_FOLD * log(corner_s / _FIRST_CORNER_S)) + 1)
+    count = max(2, round(_PER_E_FOLD * abs(log(corner_s / _FIRST_CORNER_S))) + 1)
     times = np.geomspace(_FIRST_CORNER_S, corner_s, count)
     weights = np.full(count, log(corner_s / _FIRST_CORNER_S) / (count - 1))
     weights[[0, -1]] *= 0.5
@@ -95,15 +105,18 @@ def extension(joined: Joined, at: State) -> Extension | None:
     return best if gain > 0.0 else None
 
 
-def candidates(joined: Joined) -> list[Extension]:
-    """Every extension that is tried."""
+def candidates(joined: Joined, every: int = 1) -> list[Extension]:
+    """Every extension that is tried, or every so many of them."""
     shortest = max(SHORTEST_S, CELLS * float(np.max(joined.period_s)))
     longest = LONGEST * 0.5 / float(joined.frequency_hz[0])
     if longest <= shortest:
         return []
     times = shortest * _RATIO ** np.arange(int(log(longest / shortest) / log(_RATIO)) + 1)
-    corners = [t for t in times.tolist() if t <= 0.3 * longest]
-    return [*(Extension(time_s=t) for t in times.tolist()), *(Extension(corner_s=t) for t in corners)]
+    corners = [*SHORT_CORNERS_S, *(t for t in times.tolist() if t <= _CORNER_OF_LONGEST * longest)]
+    return [
+        *(Extension(time_s=t) for t in times.tolist()[::every]),
+        *(Extension(corner_s=t) for t in corners[::every]),
+    ]
 
 
 def _score(joined: Joined, at: State, one: Extension) -> float:

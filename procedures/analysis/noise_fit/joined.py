@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.analysis.noise_fit.columns import QUANTIZATION, RANDOM_WALK
+from procedures.analysis.noise_fit.columns import BIAS_INSTABILITY, QUANTIZATION, RANDOM_WALK
 from procedures.analysis.noise_fit.estimate import Octave
 from procedures.analysis.noise_fit.goodness import deviates, judged
 from procedures.analysis.noise_fit.powers import Powers
@@ -13,6 +13,8 @@ from procedures.analysis.noise_fit.restricted import Spectrum, only_where
 from procedures.core.arrays import Array
 
 _PROCESSES = 4
+_BESIDE = 4
+"""Modes of a segment, on each side of a slow line."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,8 @@ class Joined:
     fitted: NDArray[np.bool_]
     white: Array
     """Expected power for unit N², (b,)."""
+    flicker: Array
+    """Expected power for unit B², (b,), before an extension of the model changes it."""
     period_s: Array
     """Of the samples that each bin's modes were made of, (b,)."""
     added: int = 0
@@ -85,7 +89,7 @@ def joined_at(slow: Powers, fast: Powers | None, crossover_hz: float) -> Joined:
     """
     parts = [(slow, slow.frequency_hz < crossover_hz)]
     if fast is not None:
-        parts.append((fast, fast.frequency_hz >= crossover_hz))
+        parts.append((fast, (fast.frequency_hz >= crossover_hz) & _clear(slow, fast)))
     counts = [int(np.sum(keep)) for _, keep in parts]
     is_fast = np.repeat([False, True], [*counts, 0][:2])
     frequency = np.concatenate([p.frequency_hz[keep] for p, keep in parts])
@@ -96,10 +100,19 @@ def joined_at(slow: Powers, fast: Powers | None, crossover_hz: float) -> Joined:
         columns[is_fast, QUANTIZATION] = 0.0
     dof = np.concatenate([p.dof[keep] for p, keep in parts])
     power = np.concatenate([p.power[keep] for p, keep in parts])
-    products = np.concatenate([p.products[keep] for p, keep in parts])
-    gram = np.concatenate([p.gram[keep] for p, keep in parts])
+    regressors = slow.products.shape[1]
+    products, gram = np.zeros((len(dof), regressors)), np.zeros((len(dof), regressors, regressors))
+    products[: counts[0]], gram[: counts[0]] = slow.products[parts[0][1]], slow.gram[parts[0][1]]
     period = np.concatenate([np.full(count, p.period_s) for (p, _), count in zip(parts, counts, strict=True)])
+    white, flicker = columns[:, RANDOM_WALK].copy(), columns[:, BIAS_INSTABILITY].copy()
     spectrum = Spectrum(power * dof, dof, columns, products, gram)
-    return Joined(
-        frequency, is_fast, spectrum, np.ones(len(frequency), dtype=bool), columns[:, RANDOM_WALK].copy(), period
-    )
+    return Joined(frequency, is_fast, spectrum, np.ones(len(frequency), dtype=bool), white, flicker, period)
+
+
+def _clear(slow: Powers, fast: Powers) -> NDArray[np.bool_]:
+    """Fast bins that hold nothing of a line of the slow part, which is still in the samples that they are made of."""
+    clear = np.ones(len(fast.frequency_hz), dtype=bool)
+    beside = _BESIDE * float(fast.frequency_hz[1] - fast.frequency_hz[0]) if len(clear) > 1 else 0.0
+    for line in slow.lines:
+        clear &= np.abs(fast.frequency_hz - line.frequency_hz) > beside
+    return clear

@@ -11,9 +11,10 @@ import numpy as np
 from scipy.special import chdtri
 
 from procedures.analysis.noise_fit.alternatives import Doubt, allowed_for
-from procedures.analysis.noise_fit.bands import agreed
+from procedures.analysis.noise_fit.bands import Agreement, agreed
 from procedures.analysis.noise_fit.estimate import PROCESSES, Estimate, NoiseFit
-from procedures.analysis.noise_fit.joined import Joined
+from procedures.analysis.noise_fit.gauss_markov import gauss_markov
+from procedures.analysis.noise_fit.lines import SpectralLine
 from procedures.analysis.noise_fit.powers import Powers
 from procedures.analysis.noise_fit.restricted import Profile, Spectrum, State, information, maximum
 from procedures.analysis.noise_fit.selection import VARIANCES, Selection, inverse_information, select
@@ -21,6 +22,8 @@ from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 
 METHOD = "likelihood"
+_NEARLY = 0.97
+"""A line that both parts show is told once."""
 LIMIT = 0.95
 """Probability of an upper limit."""
 
@@ -40,9 +43,9 @@ def fit_noise(slow: Powers, fast: Powers | None = None, *, level: float = 0.01, 
         if not 0.0 < value < 1.0:
             raise BadParameter(name, value, f"0 < {name} < 1")
     agreement = agreed(slow, fast)
-    joined = agreement.joined
+    joined, model = agreement.joined, agreement.model
     selection = select(joined.used, level)
-    estimates, doubt = _estimates(joined, selection, confidence)
+    estimates, doubt = _estimates(agreement, selection, confidence)
     correlated, correlation = _correlation(selection)
     octaves = joined.octaves(selection.best.variances, selection.best.amplitudes, selection.ramp)
     fitted = joined.frequency_hz[joined.fitted]
@@ -54,19 +57,21 @@ def fit_noise(slow: Powers, fast: Powers | None = None, *, level: float = 0.01, 
         correlated=correlated,
         correlation=correlation,
         octaves=octaves,
-        lines=(*slow.lines, *(() if fast is None else fast.lines)),
+        lines=_lines(slow, fast),
         band_hz=(float(fitted[0]), float(fitted[-1])),
         remarks=(*agreement.remarks, *_remarks(selection), *_doubts(doubt)),
+        gauss_markov=None if model is None else gauss_markov(agreement.plain, model, selection.free),
+        flicker_corner_s=None if model is None else model.corner_s,
     )
 
 
-def _estimates(joined: Joined, selection: Selection, confidence: float) -> tuple[tuple[Estimate, ...], Doubt]:
+def _estimates(agreement: Agreement, selection: Selection, confidence: float) -> tuple[tuple[Estimate, ...], Doubt]:
     """Of Q, N, B, K, R. Values are those of the processes present; intervals allow the others as well.
 
     A process not observed is not proven absent: an interval that took it for zero would be too narrow. An absent
     process's limit allows the ramp, too.
     """
-    spectrum = joined.used
+    spectrum = agreement.joined.used
     everything = tuple(range(spectrum.columns.shape[1]))
     own, full = (maximum(s, everything) for s in (selection.spectrum, spectrum))
     fit_sd = _standard_uncertainties(selection.spectrum, selection.best, selection.free)
@@ -83,10 +88,8 @@ def _estimates(joined: Joined, selection: Selection, confidence: float) -> tuple
             limit = Profile(spectrum, everything, k, full).crossing(_one_sided(), upwards=True, scale=full_sd[k])
             found.append(Estimate(None, None, None, None, sqrt(limit), p_value))
     losses = float(chdtri(1, 1.0 - confidence)), _one_sided()
-    doubt = Doubt({}, None)
-    if not joined.added:
-        doubt = allowed_for(joined, selection, own, dict(enumerate(found)), losses)
-        found = [doubt.estimates.get(k, estimate) for k, estimate in enumerate(found)]
+    doubt = allowed_for(agreement.joined, agreement.plain, selection, own, dict(enumerate(found)), losses)
+    found = [doubt.estimates.get(k, estimate) for k, estimate in enumerate(found)]
     return (*found, _of_ramp(selection, confidence)), doubt
 
 
@@ -158,3 +161,12 @@ def _doubts(doubt: Doubt) -> tuple[str, ...]:
     else:
         other = f"a Gauss–Markov process of about {doubt.model.time_s:.2g} s"
     return (f"The slow noise may as well be {other}: the intervals of B and K allow for it.",)
+
+
+def _lines(slow: Powers, fast: Powers | None) -> tuple[SpectralLine, ...]:
+    """Those of the slow part up to where the fast modes tell lines apart, which know them before they are folded."""
+    if fast is None:
+        return slow.lines
+    first = fast.lines[0].frequency_hz if fast.lines else np.inf
+    below = min(float(first), 0.5 / slow.period_s) * _NEARLY
+    return (*(line for line in slow.lines if line.frequency_hz < below), *fast.lines)

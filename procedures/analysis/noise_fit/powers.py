@@ -18,6 +18,7 @@ from procedures.analysis.allan.statistic import FEWEST_SAMPLES
 from procedures.analysis.noise_fit import columns
 from procedures.analysis.noise_fit.columns import FlickerBand
 from procedures.analysis.noise_fit.lines import SpectralLine, find_lines
+from procedures.analysis.noise_fit.slow_lines import without_lines
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.noise import NoiseCoefficients
@@ -48,17 +49,23 @@ class Powers:
     columns: Array
     """Expected power for unit Q², N², B², K², (b, 4)."""
     products: Array
-    """Sums over the bin's modes of coefficient × regressor: unit ramp, first and last reading, (b, 3)."""
+    """Sums over the bin's modes of coefficient × regressor: unit ramp, first and last reading, others, (b, r)."""
     gram: Array
-    """Sums of products of those regressors, (b, 3, 3)."""
+    """Sums of products of those regressors, (b, r, r)."""
     period_s: float
     """Of the samples the modes were made of."""
     lines: tuple[SpectralLine, ...] = ()
     """Cut out of the bins."""
 
 
-def slow_powers(cells: Array, cell_s: float, *, flicker_band_s: FlickerBand = FLICKER_BAND_S) -> Powers:
-    """The whole record's spectrum from its cell means, (n,) [rate]. Raises `UnfitRecording` and `BadParameter`."""
+def slow_powers(
+    cells: Array, cell_s: float, *, regressors: Array | None = None, flicker_band_s: FlickerBand = FLICKER_BAND_S
+) -> Powers:
+    """The whole record's spectrum from its cell means, (n,) [rate], less its lines.
+
+    `regressors` (r, n) are what the rate may follow beside a ramp (a temperature, a shift of the level), any units.
+    Raises `UnfitRecording` and `BadParameter`.
+    """
     _check_rate("cell_s", cell_s)
     y = _checked(cells, 0)
     n = len(y)
@@ -66,24 +73,28 @@ def slow_powers(cells: Array, cell_s: float, *, flicker_band_s: FlickerBand = FL
         raise UnfitRecording(f"{n} cell means are too few for noise coefficients; it takes {FEWEST_SAMPLES}")
     if np.all(y == y[0]):
         raise UnfitRecording(f"the channel is constant ({y[0]!r}): a stuck channel has no noise to analyse")
-    coefficients = _cosines(y - np.mean(y))
+    clean = without_lines(y, cell_s)
+    coefficients = _cosines(clean.cells - np.mean(clean.cells))
     # one process at a time: transforms of all four would be the largest thing in memory
     expected = np.stack([columns.cosine_powers(gamma) for gamma in columns.covariances(n, cell_s, flicker_band_s)])
     expected[columns.QUANTIZATION] = columns.free_ended_quantization(n, cell_s)
     ends = np.zeros((2, n))
     ends[0, 0] = ends[1, -1] = 1.0
     time = (np.arange(n) - 0.5 * (n - 1)) * cell_s
-    regressors = np.stack([_cosines(time), _cosines(ends[0]), _cosines(ends[1])])
-    bins = _Bins.over(np.arange(1, n), SINGLE_MODES, BINS)
-    pairs = regressors[:, None, :] * regressors[None, :, :]
+    others = np.empty((0, n)) if regressors is None else regressors
+    follows = np.stack([_cosines(one) for one in (time, *ends, *others)])
+    kept = np.flatnonzero(~clean.beside)
+    bins = _Bins.over(kept + 1, SINGLE_MODES, BINS)
+    pairs = follows[:, None, kept] * follows[None, :, kept]
     return Powers(
-        frequency_hz=bins.mean(np.arange(1, n) / (2.0 * n * cell_s)),
-        power=bins.mean(coefficients**2),
+        frequency_hz=bins.mean((kept + 1) / (2.0 * n * cell_s)),
+        power=bins.mean(coefficients[kept] ** 2),
         dof=bins.count,
-        columns=bins.mean(expected).T,
-        products=bins.sum(coefficients * regressors).T,
+        columns=bins.mean(expected[:, kept]).T,
+        products=bins.sum(coefficients[kept] * follows[:, kept]).T,
         gram=np.ascontiguousarray(np.moveaxis(bins.sum(pairs), -1, 0)),
         period_s=cell_s,
+        lines=clean.lines,
     )
 
 
