@@ -98,8 +98,25 @@ def analyse_launches(result: type[R], recordings: Sequence[Recording], params: N
     checks = _checks(channels, params.noise_limits)
     longest = max((s.averaging_time_s for s in channels if s.averaging_time_s is not None), default=None)
     return result(
-        checks=checks, verdict=verdict(checks), launches=launches, channels=channels, averaging_time_s=longest
+        checks=checks,
+        verdict=verdict(checks),
+        warnings=_warnings(launches),
+        launches=launches,
+        channels=channels,
+        averaging_time_s=longest,
     )
+
+
+def _warnings(launches: Sequence[LaunchNoise]) -> tuple[str, ...]:
+    """What the inspection and the noise model say of each channel, each sentence once."""
+    several = len(launches) > 1
+    found: list[str] = []
+    for launch in launches:
+        begin = f"{launch.label}, " if several else ""
+        for channel in launch.channels:
+            found += channel.findings
+            found += (f"{begin}{channel.channel}: {sentence}" for sentence in channel.model)
+    return tuple(dict.fromkeys(found))
 
 
 def noise_report(result: NoiseResult) -> Report:

@@ -35,6 +35,18 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class Followed:
+    """A regressor of the slow part that the rate follows."""
+
+    index: int
+    """Among those given, from 0."""
+    slope: float
+    """Rate per unit of the regressor."""
+    standard_uncertainty: float
+    p_value: float
+
+
+@dataclass(frozen=True)
 class GaussMarkov:
     """An exponentially correlated process ``dx/dt = −x/τ + q·w``, w white of unit density."""
 
@@ -92,6 +104,8 @@ class NoiseFit:
     """Lowest and highest frequency used."""
     remarks: tuple[str, ...]
     """What a reader must know, a sentence each."""
+    followed: tuple[Followed, ...] = ()
+    """The regressors beside a ramp that were kept."""
     gauss_markov: GaussMarkov | None = None
     """Beside the five processes."""
     flicker_corner_s: float | None = None

@@ -1,5 +1,6 @@
 """Slow and fast powers in one spectrum, octave by octave: what is fitted of it, and how well the model describes it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,6 +50,10 @@ class Joined:
         """The same, some octaves not fitted, and an edge of the white noise allowed for."""
         group = self.group
         return replace(self, fitted=self.fitted & ~((group >= groups.start) & (group < groups.stop)))._edged()
+
+    def with_regressors(self, keep: Sequence[int]) -> "Joined":
+        """The same bins with some of the regressors."""
+        return replace(self, spectrum=self.spectrum.only(keep))
 
     def below(self, highest_hz: float) -> "Joined":
         """The same, fitted up to a frequency only."""

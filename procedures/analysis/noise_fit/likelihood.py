@@ -5,6 +5,8 @@ powers hold all that the record tells; the coefficients reach the Cramér-Rao bo
 approximate stands in `powers`; the maximum in `restricted`, the presence of a process in `selection`.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -13,25 +15,37 @@ from scipy.special import chdtri
 from procedures.analysis.noise_fit.alternatives import Doubt, allowed_for
 from procedures.analysis.noise_fit.bands import Agreement, agreed
 from procedures.analysis.noise_fit.estimate import PROCESSES, Estimate, NoiseFit
+from procedures.analysis.noise_fit.followed import followed
 from procedures.analysis.noise_fit.gauss_markov import gauss_markov
 from procedures.analysis.noise_fit.lines import SpectralLine
 from procedures.analysis.noise_fit.powers import Powers
 from procedures.analysis.noise_fit.restricted import Profile, Spectrum, State, information, maximum
 from procedures.analysis.noise_fit.selection import VARIANCES, Selection, inverse_information, select
+from procedures.analysis.noise_fit.undescribed import limited, undescribed
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 
 METHOD = "likelihood"
-_NEARLY = 0.97
-"""A line that both parts show is told once."""
+_SAME = 0.05
+"""Relative difference of frequencies below which a line that both parts show is told once."""
 LIMIT = 0.95
 """Probability of an upper limit."""
 
 
-def fit_noise(slow: Powers, fast: Powers | None = None, *, level: float = 0.01, confidence: float = 0.95) -> NoiseFit:
+def fit_noise(
+    slow: Powers,
+    fast: Powers | None = None,
+    *,
+    level: float = 0.01,
+    confidence: float = 0.95,
+    follow_levels: Sequence[float] = (),
+    coarse: bool = False,
+) -> NoiseFit:
     """Q, N, B, K, R of one channel from its slow and, where there are any, its fast powers.
 
-    `level` is the probability at which each absent process is reported present; `confidence` that of the intervals.
+    `level` is the probability at which each absent process is reported present; `confidence` that of the intervals;
+    `coarse`: the noise is less than a count, and the error of reading no white noise.
+    `follow_levels` those at which each of the slow powers' other regressors is kept though the rate does not follow it.
     The fast powers are used from their first frequency up, the slow ones below. Where they disagree with the
     model (chi-square per octave, see `bands`), the reading noise at the full rate is not white: the slow
     powers are then used whole, the fast ones above them with a quantization of their own, less as many of their
@@ -43,23 +57,28 @@ def fit_noise(slow: Powers, fast: Powers | None = None, *, level: float = 0.01, 
         if not 0.0 < value < 1.0:
             raise BadParameter(name, value, f"0 < {name} < 1")
     agreement = agreed(slow, fast)
+    reduced, follows = followed(agreement.joined, follow_levels)
+    agreement = replace(agreement, joined=reduced)
     joined, model = agreement.joined, agreement.model
     selection = select(joined.used, level)
     estimates, doubt = _estimates(agreement, selection, confidence)
-    correlated, correlation = _correlation(selection)
+    left = undescribed(agreement, coarse=coarse)
+    estimates = limited(agreement, estimates, left)
+    correlated, correlation = _correlation(selection, left)
     octaves = joined.octaves(selection.best.variances, selection.best.amplitudes, selection.ramp)
     fitted = joined.frequency_hz[joined.fitted]
     return NoiseFit(
         METHOD,
         *estimates,
-        slope=selection.slope.slope if selection.ramp else 0.0,
+        slope=selection.slope.slope if estimates[-1].present else 0.0,
         confidence=confidence,
         correlated=correlated,
         correlation=correlation,
         octaves=octaves,
         lines=_lines(slow, fast),
         band_hz=(float(fitted[0]), float(fitted[-1])),
-        remarks=(*agreement.remarks, *_remarks(selection), *_doubts(doubt)),
+        remarks=(*agreement.remarks, *_remarks(selection), *_doubts(doubt), *_left(left)),
+        followed=follows,
         gauss_markov=None if model is None else gauss_markov(agreement.plain, model, selection.free),
         flicker_corner_s=None if model is None else model.corner_s,
     )
@@ -135,15 +154,17 @@ def _covariance(spectrum: Spectrum, at: State, free: tuple[int, ...]) -> Array:
     return inverse_information(information(spectrum, at)[np.ix_(free, free)])
 
 
-def _correlation(selection: Selection) -> tuple[tuple[str, ...], Array]:
-    """Of the processes observed; slope and variances are independent in the information."""
+def _correlation(selection: Selection, left: tuple[int, ...]) -> tuple[tuple[str, ...], Array]:
+    """Of the processes observed, less those not described; slope and variances are independent in the information."""
     count = len(selection.present)
     covariance = _covariance(selection.spectrum, selection.best, selection.free)[:count, :count]
     sd = np.sqrt(np.diag(covariance))
     names = [PROCESSES[k] for k in selection.present]
     correlation = np.eye(count + selection.ramp)
     correlation[:count, :count] = covariance / np.outer(sd, sd)
-    return tuple(names + [PROCESSES[-1]] * selection.ramp), correlation
+    names += [PROCESSES[-1]] * selection.ramp
+    kept = [i for i, name in enumerate(names) if PROCESSES.index(name) not in left]
+    return tuple(names[i] for i in kept), correlation[np.ix_(kept, kept)]
 
 
 def _remarks(selection: Selection) -> tuple[str, ...]:
@@ -167,6 +188,18 @@ def _lines(slow: Powers, fast: Powers | None) -> tuple[SpectralLine, ...]:
     """Those of the slow part up to where the fast modes tell lines apart, which know them before they are folded."""
     if fast is None:
         return slow.lines
-    first = fast.lines[0].frequency_hz if fast.lines else np.inf
-    below = min(float(first), 0.5 / slow.period_s) * _NEARLY
-    return (*(line for line in slow.lines if line.frequency_hz < below), *fast.lines)
+    below = 0.25 / slow.period_s
+    seen = [line.frequency_hz for line in fast.lines]
+    own = [
+        line
+        for line in slow.lines
+        if line.frequency_hz < below and not any(abs(f / line.frequency_hz - 1.0) < _SAME for f in seen)
+    ]
+    return (*own, *fast.lines)
+
+
+def _left(left: tuple[int, ...]) -> tuple[str, ...]:
+    if not left:
+        return ()
+    names = ", ".join("QNBKR"[i] for i in left)
+    return (f"Not described by the noise model, and given as limits only: {names}.",)
