@@ -115,7 +115,7 @@ def _warnings(launches: Sequence[LaunchNoise]) -> tuple[str, ...]:
         begin = f"{launch.label}, " if several else ""
         for channel in launch.channels:
             found += channel.findings
-            found += (f"{begin}{channel.channel}: {sentence}" for sentence in channel.model)
+            found += (f"{begin}{channel.channel}: {sentence}" for sentence in channel.warnings)
     return tuple(dict.fromkeys(found))
 
 

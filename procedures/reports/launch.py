@@ -45,7 +45,7 @@ def side_by_side(summaries: Sequence[ChannelSummary], launches: Sequence[LaunchN
     )
     note = (
         "Efficient estimates. A dash: not observed; “<” is what it stays below (95 %). The mean counts a process that "
-        "was not observed as zero; its uncertainty is the greater of what the fits claim and what the launches scatter. "
+        "was not observed as zero; its uncertainty is the greater of what fits claim and launches scatter. "
         "Bandwidth: half of the sample rate. Samples picked out of faster ones, not averaged, have a random walk that "
         "is too large by the root of how many were passed over."
     )

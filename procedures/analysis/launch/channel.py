@@ -60,7 +60,7 @@ def channel_noise(
     # from one cell on: what the notch filter leaves of the dither stands above the model at shorter times
     least_squares = fit_allan(whole, from_s=cell_s, level=settings.level, confidence=settings.confidence)
     found = found_noise(signal, cells, powers, beside, settings)
-    likelihood = found.fit
+    likelihood, warnings = found.fit, found.warnings(rate_unit)
     last = Stage(signal.steps[-1].name, _curve(whole), _values(graphical), signal.steps[-1].note)
     stages = [*_stages(signal.steps[:-1], cell_s, settings), last, *_split(series, cell_s, rate_unit, settings)]
     return ChannelNoise(
@@ -80,7 +80,8 @@ def channel_noise(
             for p in PROCESSES
         ),
         disagreements=compare(graphical, least_squares, likelihood),
-        model=found.sentences(rate_unit),
+        model=(*warnings, *likelihood.notes),
+        warnings=warnings,
         averaging=_averaging(likelihood),
         bandwidth_hz=0.5 * whole.rate_hz,
         band_hz=likelihood.band_hz,

@@ -1,6 +1,7 @@
 """The likelihood fit of one channel, with what its rate follows beside noise, and sentences on what the model lacks."""
 
 from dataclasses import dataclass
+from math import log
 
 import numpy as np
 
@@ -10,15 +11,16 @@ from procedures.analysis.launch.results import CorrelatedProcess, LevelShift, Te
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.signal import CleanSignal
 from procedures.analysis.noise_fit.estimate import NoiseFit
-from procedures.analysis.noise_fit.followed import likeliest_shift
+from procedures.analysis.noise_fit.followed import Candidate, likeliest_shift
 from procedures.analysis.noise_fit.likelihood import fit_noise
 from procedures.analysis.noise_fit.powers import Powers, slow_powers
+from procedures.core.arrays import Array
 from procedures.core.units import DEVIATION_DISPLAY
 
-TEMPERATURE_LEVEL = 1e-3
-"""Probability that a temperature which matters nothing is said to matter."""
-SHIFT_LEVEL = 1e-3
-"""Probability that a record without one is said to have a shift of its level: over all cells where it may be."""
+TEMPERATURE_LEVEL, TEMPERATURE_GAIN = 1e-3, 4.0
+"""Probability that a temperature which matters nothing is said to matter, and what it must gain over drifting noise."""
+SHIFT_LEVEL, SHIFT_GAIN = 1e-3, 2.0
+"""The same of a shift of the level: a probability over all cells where it may be, a gain beside ln(cells)."""
 SHOWN_LINES = 5
 
 
@@ -37,7 +39,7 @@ class FoundNoise:
         g = self.fit.gauss_markov
         return None if g is None else CorrelatedProcess(g.time_s, g.time_sd_s, g.driving, g.driving_sd, g.sd)
 
-    def sentences(self, rate_unit: str) -> tuple[str, ...]:
+    def warnings(self, rate_unit: str) -> tuple[str, ...]:
         """What a reader must know before believing a coefficient."""
         unit, size = DEVIATION_DISPLAY[rate_unit]
         found = [self.coarse] if self.coarse else []
@@ -85,22 +87,23 @@ def found_noise(
     temperatures = {name: row[signal.first_cell :] for name, row in beside.temperatures.items()}
     followed = most_followed(series, {n: row for n, row in temperatures.items() if np.ptp(row) > 0.0})
     rest = series
-    rows, levels = [], []
+    rows: list[Array] = []
+    candidates: list[Candidate] = []
     if followed is not None:
         own = temperatures[followed] - np.mean(temperatures[followed])
         rows.append(own)
-        levels.append(TEMPERATURE_LEVEL)
+        candidates.append(Candidate(TEMPERATURE_LEVEL, TEMPERATURE_GAIN))
         rest = series - own * (float(np.dot(own, series)) / float(np.dot(own, own)))
     at = likeliest_shift(rest)
     if at is not None:
         rows.append(np.where(np.arange(len(series)) >= at, 1.0, 0.0) - (len(series) - at) / len(series))
-        levels.append(SHIFT_LEVEL / len(series))
+        candidates.append(Candidate(SHIFT_LEVEL / len(series), SHIFT_GAIN + log(len(series))))
     fit = fit_noise(
         slow_powers(series, cell_s, regressors=np.array(rows) if rows else None),
         powers,
         level=settings.level,
         confidence=settings.confidence,
-        follow_levels=levels,
+        candidates=candidates,
         coarse=bool(beside.coarse),
     )
     temperature, shift = None, None

@@ -200,6 +200,8 @@ class ChannelNoise:
     model: tuple[str, ...]
     """What the likelihood's model does not describe: spectral lines, frequencies left out."""
     averaging: Averaging
+    warnings: tuple[str, ...] = ()
+    """Those of `model` that a reader must know; the rest are notes on what one record does not tell apart."""
     bandwidth_hz: float = 0.0
     """Half of the rate of the samples: a random walk is that of noise so wide, unless a filter's edge is named."""
     band_hz: tuple[float, float] = (0.0, 0.0)

@@ -21,6 +21,8 @@ _FEWEST_OCTAVES = 3
 _LONGEST_HOLE = 3
 """Octaves of a part left out that has fitted ones on both sides."""
 _ROUNDS = 3
+_UNFOLDED = 4.0
+"""Of a cell's frequency: with a band that ends above, what the cells lack of the noise beyond it is below 2 %."""
 _SLOW_PART = 0.2
 """Of a cell's frequency: up to here the slow model is chosen where no whole spectrum fits."""
 
@@ -54,7 +56,7 @@ def agreed(slow: Powers, fast: Powers | None) -> Agreement:
         ways = tuple(replace(way, joined=model.applied(way.joined)) for way in ways)
         found, _ = _first_that_fits(ways)
     if found is None:
-        return replace(_parted(ways[-1].joined, ways[-1].own), model=model)
+        return replace(_cut(ways, _UNFOLDED / slow.period_s), model=model)
     text = f"At the full rate the power is not that of white reading noise and the slower processes{found.own}."
     return Agreement(found.joined, (text,) if found.own else (), ~found.joined.fitted, described=True, model=model)
 
@@ -100,6 +102,19 @@ def misfit(joined: Joined, best: State | None = None) -> float:
     octaves = [o for o in joined.octaves(best.variances, best.amplitudes, ramp=True) if o.fitted]
     least = max(min(o.p_value for o in octaves), 1e-300)
     return float(np.log(least) / np.log(MISFIT_LEVEL / len(octaves)))
+
+
+def _cut(ways: tuple[_Way, ...], unfolded_hz: float) -> Agreement:
+    """Less what does not fit. Cell means fold what is faster into their band, and miss it where a filter took it away:
+    where the band ends low, only what they know without it is used, and the fast bins above."""
+    part = _parted(ways[-1].joined, ways[-1].own)
+    top = float(part.joined.frequency_hz[part.joined.fitted][-1])
+    first = ways[0].joined
+    if len(ways) == 1 or top > unfolded_hz or not np.any(first.is_fast & (first.frequency_hz < top)):
+        return part
+    below = first.below(np.nextafter(top, inf))
+    own = "; Q is not told from the edge"
+    return _told(below, own, described=True) if misfit(below) <= 1.0 else _parted(first, own)
 
 
 def _parted(joined: Joined, own: str) -> Agreement:

@@ -104,6 +104,8 @@ class NoiseFit:
     """Lowest and highest frequency used."""
     remarks: tuple[str, ...]
     """What a reader must know, a sentence each."""
+    notes: tuple[str, ...] = ()
+    """On processes that one record does not tell apart: the intervals allow for it."""
     followed: tuple[Followed, ...] = ()
     """The regressors beside a ramp that were kept."""
     gauss_markov: GaussMarkov | None = None

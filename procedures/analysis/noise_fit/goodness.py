@@ -15,7 +15,9 @@ def deviates(spectrum: Spectrum, variances: Array, amplitudes: Array) -> Array:
     """Normal deviates (b,): a bin's power over its expectation is χ²_ν/ν, whose quantile is given as z."""
     s = spectrum
     explained = 2.0 * s.products @ amplitudes - np.einsum("i,bij,j->b", amplitudes, s.gram, amplitudes)
-    ratio = np.maximum(s.squares - explained, 0.0) / (s.columns @ variances)
+    expected = s.columns @ variances
+    # a bin that is not fitted may be one where none of the fitted processes has any power
+    ratio = np.maximum(s.squares - explained, 0.0) / np.where(expected > 0.0, expected, np.finfo(float).tiny)
     half = 0.5 * s.dof
     z = np.where(ratio < s.dof, ndtri(gammainc(half, 0.5 * ratio)), -ndtri(gammaincc(half, 0.5 * ratio)))
     return np.clip(z, -_LARGEST_Z, _LARGEST_Z)

@@ -15,7 +15,7 @@ from scipy.special import chdtri
 from procedures.analysis.noise_fit.alternatives import Doubt, allowed_for
 from procedures.analysis.noise_fit.bands import Agreement, agreed
 from procedures.analysis.noise_fit.estimate import PROCESSES, Estimate, NoiseFit
-from procedures.analysis.noise_fit.followed import followed
+from procedures.analysis.noise_fit.followed import Candidate, followed
 from procedures.analysis.noise_fit.gauss_markov import gauss_markov
 from procedures.analysis.noise_fit.lines import SpectralLine
 from procedures.analysis.noise_fit.powers import Powers
@@ -38,14 +38,14 @@ def fit_noise(
     *,
     level: float = 0.01,
     confidence: float = 0.95,
-    follow_levels: Sequence[float] = (),
+    candidates: Sequence[Candidate] = (),
     coarse: bool = False,
 ) -> NoiseFit:
     """Q, N, B, K, R of one channel from its slow and, where there are any, its fast powers.
 
     `level` is the probability at which each absent process is reported present; `confidence` that of the intervals;
     `coarse`: the noise is less than a count, and the error of reading no white noise.
-    `follow_levels` those at which each of the slow powers' other regressors is kept though the rate does not follow it.
+    `candidates` say when each of the slow powers' other regressors is kept.
     The fast powers are used from their first frequency up, the slow ones below. Where they disagree with the
     model (chi-square per octave, see `bands`), the reading noise at the full rate is not white: the slow
     powers are then used whole, the fast ones above them with a quantization of their own, less as many of their
@@ -57,7 +57,7 @@ def fit_noise(
         if not 0.0 < value < 1.0:
             raise BadParameter(name, value, f"0 < {name} < 1")
     agreement = agreed(slow, fast)
-    reduced, follows = followed(agreement.joined, follow_levels)
+    reduced, follows = followed(agreement.joined, candidates)
     agreement = replace(agreement, joined=reduced)
     joined, model = agreement.joined, agreement.model
     selection = select(joined.used, level)
@@ -77,7 +77,8 @@ def fit_noise(
         octaves=octaves,
         lines=_lines(slow, fast),
         band_hz=(float(fitted[0]), float(fitted[-1])),
-        remarks=(*agreement.remarks, *_remarks(selection), *_doubts(doubt), *_left(left)),
+        remarks=(*agreement.remarks, *_left(left)),
+        notes=(*_remarks(selection), *_doubts(doubt)),
         followed=follows,
         gauss_markov=None if model is None else gauss_markov(agreement.plain, model, selection.free),
         flicker_corner_s=None if model is None else model.corner_s,
