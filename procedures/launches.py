@@ -163,7 +163,9 @@ def _check(s: ChannelSummary, process: str, maximum: float, unit: str, size: flo
     if found.mean is not None:
         return check(name, found.mean / size, limit, None if found.sd is None else found.sd / size)
     bound = min((r.upper_limit for r in found.values if r.upper_limit is not None), default=float("inf"))
-    return check(name, bound / size, limit, note="not observed: the value is what it stays below")
+    described = all(reading.described for reading in found.values)
+    reason = "not observed" if described else "not described by the noise model"
+    return check(name, bound / size, limit, note=f"{reason}: the value is what it stays below")
 
 
 def _summary(result: NoiseResult) -> str:

@@ -107,8 +107,14 @@ def report(result: Result) -> Report:
 
 def learns(result: Result, unit: Unit, origin: str) -> Unit:
     """The unit with the noise and the averaging time that were found: what later previews and dwells rest on."""
-    noise = {s.channel: s.noise for s in result.channels}
     records: dict[str, TriadRecord | None] = {"gyro": unit.gyro, "accelerometer": unit.accelerometer}
+    known = {
+        name: noise
+        for triad, names in TRIADS.items()
+        if (record := records[triad]) is not None
+        for name, noise in zip(names, record.noise, strict=True)
+    }
+    noise = {s.channel: s.noise_over(known.get(s.channel)) for s in result.channels}
     for triad, (x, y, z) in TRIADS.items():
         if all(name in noise for name in (x, y, z)):
             old = records[triad] or TriadRecord((noise[x], noise[y], noise[z]))

@@ -42,8 +42,8 @@ class FoundNoise:
     def warnings(self, rate_unit: str) -> tuple[str, ...]:
         """What a reader must know before believing a coefficient."""
         unit, size = DEVIATION_DISPLAY[rate_unit]
-        found = [self.coarse] if self.coarse else []
-        lines = sorted(self.fit.lines, key=lambda line: -line.amplitude)
+        found = [self.coarse] if self.coarse else list[str]()
+        lines = [] if self.coarse else sorted(self.fit.lines, key=lambda line: -line.amplitude)
         found += [
             f"a spectral line at {line.frequency_hz:.4g} Hz of {line.amplitude / size:.3g} {unit} was taken out"
             for line in sorted(lines[:SHOWN_LINES], key=lambda line: line.frequency_hz)

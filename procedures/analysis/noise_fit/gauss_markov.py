@@ -28,7 +28,9 @@ def gauss_markov(plain: Joined, model: Extension, free: tuple[int, ...]) -> Gaus
     bend = (low - 2.0 * middle + high) / step**2
     drivings = [sqrt(max(0.0, 2.0 * float(s.variances[-1]) / t)) for (s, _), t in zip(found, times, strict=True)]
     relative = found[1][1]
-    if bend >= 0.0 or drivings[1] == 0.0:
+    if drivings[1] == 0.0:  # the octaves that are fitted do without it
+        return None
+    if bend >= 0.0:
         return GaussMarkov(model.time_s, None, drivings[1], None)
     moved = float(np.clip(-(high - low) / (2.0 * step) / bend, -step, step))
     slope = (drivings[2] - drivings[0]) / (2.0 * step)

@@ -26,8 +26,12 @@ from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 
 METHOD = "likelihood"
-_SAME = 0.05
-"""Relative difference of frequencies below which a line that both parts show is told once."""
+_SAME_MODES = 3.0
+"""Modes of a segment between two frequencies below which a line that both parts show is told once."""
+_TOLD = 0.25
+"""Of a cell's frequency: lines above it are those of the fast part, or folded from there."""
+CHOSEN_BAND = 1.4
+"""Variance of an estimate from a band that its own record chose, over that from one which was given (Monte Carlo)."""
 LIMIT = 0.95
 """Probability of an upper limit."""
 
@@ -92,6 +96,8 @@ def _estimates(agreement: Agreement, selection: Selection, confidence: float) ->
     process's limit allows the ramp, too.
     """
     spectrum = agreement.joined.used
+    slack = 1.0 if np.all(agreement.joined.fitted) else CHOSEN_BAND
+    losses = slack * float(chdtri(1, 1.0 - confidence)), slack * _one_sided()
     everything = tuple(range(spectrum.columns.shape[1]))
     own, full = (maximum(s, everything) for s in (selection.spectrum, spectrum))
     fit_sd = _standard_uncertainties(selection.spectrum, selection.best, selection.free)
@@ -103,11 +109,10 @@ def _estimates(agreement: Agreement, selection: Selection, confidence: float) ->
         if k in selection.present:
             alone = Profile(selection.spectrum, selection.free, k, selection.best)
             allowed = Profile(selection.spectrum, everything, k, own)
-            found.append(_present(((alone, fit_sd[k]), (allowed, own_sd[k])), p_value, confidence))
+            found.append(_present(((alone, fit_sd[k]), (allowed, own_sd[k])), p_value, losses, slack))
         else:
-            limit = Profile(spectrum, everything, k, full).crossing(_one_sided(), upwards=True, scale=full_sd[k])
+            limit = Profile(spectrum, everything, k, full).crossing(losses[1], upwards=True, scale=full_sd[k])
             found.append(Estimate(None, None, None, None, sqrt(limit), p_value))
-    losses = float(chdtri(1, 1.0 - confidence)), _one_sided()
     doubt = allowed_for(agreement.joined, agreement.plain, selection, own, dict(enumerate(found)), losses)
     found = [doubt.estimates.get(k, estimate) for k, estimate in enumerate(found)]
     return (*found, _of_ramp(selection, confidence)), doubt
@@ -118,19 +123,21 @@ def _one_sided() -> float:
     return float(chdtri(1, 2.0 * (1.0 - LIMIT)))
 
 
-def _present(profiles: tuple[tuple[Profile, float], ...], p_value: float, confidence: float) -> Estimate:
+def _present(
+    profiles: tuple[tuple[Profile, float], ...], p_value: float, losses: tuple[float, float], slack: float
+) -> Estimate:
     """A process with variance v: ``coefficient = √v``, its uncertainty ``sd(v)/(2√v)``, its interval by profile.
 
     The profiles, each with sd(v): that of the processes present, then that of all. The interval is from the lowest to
     the highest end: alone the first is blind to what was not observed, alone the second is low where all that it
     allows is absent, since variances cannot be negative (N alone: upper limits held in 76 % instead of 95 %).
     """
-    loss = float(chdtri(1, 1.0 - confidence))
     first, sd = profiles[0]
+    sd *= sqrt(slack)
     variance = float(first.best.variances[first.k])
-    lower = min(p.crossing(loss, upwards=False, scale=s) for p, s in profiles)
-    upper = max(p.crossing(loss, upwards=True, scale=s) for p, s in profiles)
-    limit = max(p.crossing(_one_sided(), upwards=True, scale=s) for p, s in profiles)
+    lower = min(p.crossing(losses[0], upwards=False, scale=s) for p, s in profiles)
+    upper = max(p.crossing(losses[0], upwards=True, scale=s) for p, s in profiles)
+    limit = max(p.crossing(losses[1], upwards=True, scale=s) for p, s in profiles)
     return Estimate(sqrt(variance), 0.5 * sd / sqrt(variance), sqrt(lower), sqrt(upper), sqrt(limit), p_value)
 
 
@@ -186,15 +193,18 @@ def _doubts(doubt: Doubt) -> tuple[str, ...]:
 
 
 def _lines(slow: Powers, fast: Powers | None) -> tuple[SpectralLine, ...]:
-    """Those of the slow part up to where the fast modes tell lines apart, which know them before they are folded."""
+    """Those of the slow part up to where the fast modes tell lines apart, which know them unfolded."""
     if fast is None:
         return slow.lines
-    below = 0.25 / slow.period_s
+    cells_hz = 1.0 / slow.period_s
     seen = [line.frequency_hz for line in fast.lines]
+    folded = [abs(f - cells_hz * round(f / cells_hz)) for f in seen]
+    beside = _SAME_MODES * float(np.diff(fast.frequency_hz[:2])[0])
     own = [
         line
         for line in slow.lines
-        if line.frequency_hz < below and not any(abs(f / line.frequency_hz - 1.0) < _SAME for f in seen)
+        if line.frequency_hz < _TOLD * cells_hz
+        and not any(abs(f - line.frequency_hz) < beside for f in (*seen, *folded))
     ]
     return (*own, *fast.lines)
 
