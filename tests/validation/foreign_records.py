@@ -130,7 +130,7 @@ def resonance(dice: Dice) -> Record:
     at_peak = 1.0 / abs(np.polyval(a, np.exp(1j * angle)))
     gain = np.sqrt(dice.uniform(1.0, 100.0)) / at_peak
     # zeros at 0 Hz and at half the rate: the peak adds nothing to the random walk
-    driven = lfilter([gain, 0.0, -gain], a, white(dice, n + SETTLED, rate)) / 2.0
+    driven = lfilter([gain, 0.0, -gain], a, white(dice, n + SETTLED, rate)) / (2.0 * np.sin(angle))
     return Record(white(dice, n, rate) + driven[SETTLED:], rate, {"random_walk": WALK})
 
 

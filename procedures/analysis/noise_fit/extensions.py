@@ -69,7 +69,7 @@ class Extension:
 def gauss_markov(joined: Joined, time_s: float) -> Array:
     """Expected power (b,) of unit variance.
 
-    Where it falls as a random walk does, tapers and ends leak as they do for that, whose exact column tells how much.
+    A process that lasts as long as a segment leaks as a random walk does, whose exact column tells how much.
     """
     period, omega = joined.period_s, 2.0 * pi * joined.frequency_hz * joined.period_s
     ratio, cosine = time_s / period, np.cos(omega)
@@ -79,7 +79,9 @@ def gauss_markov(joined: Joined, time_s: float) -> Array:
         1.0 - 2.0 * a * cosine + a**2
     )
     walk = period / (2.0 - 2.0 * cosine) - period / 6.0
-    steep = (2.0 * pi * joined.frequency_hz * time_s) ** 2
+    fast = joined.frequency_hz[joined.is_fast]
+    lasting = (2.0 * pi * float(np.min(np.diff(fast))) * time_s) ** 2 if len(fast) > 1 else 0.0
+    steep = np.where(joined.is_fast, lasting, 0.0)
     return power * (joined.spectrum.columns[:, RATE_RANDOM_WALK] / walk) ** (steep / (1.0 + steep))
 
 

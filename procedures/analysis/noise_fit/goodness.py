@@ -9,6 +9,7 @@ from procedures.analysis.noise_fit.restricted import Spectrum
 from procedures.core.arrays import Array
 
 _LARGEST_Z = 38.0
+_LEAST_SHARE = 1e-12
 
 
 def deviates(spectrum: Spectrum, variances: Array, amplitudes: Array) -> Array:
@@ -16,8 +17,9 @@ def deviates(spectrum: Spectrum, variances: Array, amplitudes: Array) -> Array:
     s = spectrum
     explained = 2.0 * s.products @ amplitudes - np.einsum("i,bij,j->b", amplitudes, s.gram, amplitudes)
     expected = s.columns @ variances
+    left = np.maximum(s.squares - explained, 0.0)
     # a bin that is not fitted may be one where none of the fitted processes has any power
-    ratio = np.maximum(s.squares - explained, 0.0) / np.where(expected > 0.0, expected, np.finfo(float).tiny)
+    ratio = left / np.maximum(expected, _LEAST_SHARE * left + np.finfo(float).tiny)
     half = 0.5 * s.dof
     z = np.where(ratio < s.dof, ndtri(gammainc(half, 0.5 * ratio)), -ndtri(gammaincc(half, 0.5 * ratio)))
     return np.clip(z, -_LARGEST_Z, _LARGEST_Z)

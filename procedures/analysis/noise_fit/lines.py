@@ -39,7 +39,7 @@ def levels_around(power: Array, dof: float) -> tuple[Array, Array]:
     """
     count = len(power)
     half = np.minimum(np.arange(count) // 2, _HALF_WINDOW)
-    level = median_filter(power, min(2 * _HALF_WINDOW + 1, 2 * count - 1), mode="nearest")
+    level = median_filter(power, min(2 * _HALF_WINDOW + 1, 2 * count - 1), mode="reflect")
     number = np.full(count, 2.0 * _HALF_WINDOW + 1.0)
     for k in range(min(2 * _HALF_WINDOW, count)):  # evenly in the logarithm, so that a power law has no bias
         ends = max(1, k - half[k]), min(count, 2 * k + 1, k + _HALF_WINDOW + 1)

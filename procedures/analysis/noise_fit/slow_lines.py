@@ -23,6 +23,8 @@ _FIRST = 3
 """Cycles in the record; what has less is a drift."""
 _BESIDE = 3
 """Modes of half a cycle in the record, on each side of a line, that are left out with it."""
+_MANY = 100
+"""Cycles from which on a mode has enough neighbours to tell its level."""
 _FINE = 65
 _EFFICIENCY = 0.35
 """Of a median of neighbouring, overlapping modes, against a mean of independent ones."""
@@ -40,15 +42,19 @@ class WithoutLines:
     """Modes 1…n−1 of the cosine transform that lie beside a line, (n−1,)."""
 
 
-def without_lines(cells: Array, cell_s: float) -> WithoutLines:
-    """Takes lines of at least three cycles out of cell means (n,)."""
+def without_lines(cells: Array, cell_s: float, expected: Array) -> WithoutLines:
+    """Takes lines of at least three cycles out of cell means (n,).
+
+    `expected` (n−1,) is what the noise puts into modes 1…n−1 of the cosine transform. Of many cycles, the level about
+    a mode counts where it is higher: noise of a filter's edge is no line.
+    """
     n = len(cells)
     found: list[float] = []
     rest, amplitudes = cells, np.empty(0)
     if n >= _FEWEST_CELLS:
         taper = np.hanning(n + 1)[:-1]
         while len(found) < MOST_LINES:
-            cycles = _strongest(_detrended(rest), taper)
+            cycles = _strongest(_detrended(rest), taper, expected)
             if cycles is None or any(abs(cycles - other) < 1.0 for other in found):
                 break
             found.append(cycles)
@@ -73,14 +79,17 @@ def _detrended(y: Array) -> Array:
     return y - np.mean(y) - t * (float(np.dot(t, y)) / float(np.dot(t, t)))
 
 
-def _strongest(y: Array, taper: Array) -> float | None:
+def _strongest(y: Array, taper: Array, expected: Array) -> float | None:
     """Cycles in the record of the mode that stands out most; None where none does."""
     power = np.abs(np.fft.rfft(y * taper)) ** 2
     power = power[:-1]
-    level, count = levels_around(power, 2.0)
-    limit = standing_out(2.0, count * _EFFICIENCY, LEVEL / len(power))
+    around, _ = levels_around(power, 2.0)
+    level = np.zeros(len(power))
+    level[1:] = 0.5 * float(np.sum(taper**2)) * expected[1 : 2 * len(power) - 2 : 2]
+    level[_MANY:] = np.maximum(level[_MANY:], around[_MANY:])
+    limit = float(standing_out(2.0, np.array([_EFFICIENCY * _MANY]), LEVEL / len(power))[0])
     ratio = np.zeros(len(power))
-    ratio[_FIRST:] = power[_FIRST:] / np.maximum(level[_FIRST:], np.finfo(float).tiny) / limit[_FIRST:]
+    ratio[_FIRST:] = power[_FIRST:] / np.maximum(level[_FIRST:], np.finfo(float).tiny) / limit
     ratio[level <= 1e-24 * float(np.max(power))] = 0.0  # a noiseless record: rounding has no lines
     first = int(np.argmax(ratio))
     if ratio[first] <= 1.0:
