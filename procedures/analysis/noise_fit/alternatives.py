@@ -19,7 +19,7 @@ from procedures.analysis.noise_fit.selection import Selection, inverse_informati
 DOUBT = 4.0
 """Twice the log likelihood that another process gains, from which on intervals allow for it."""
 SLOW = (BIAS_INSTABILITY, RATE_RANDOM_WALK)
-_EVERY = 2
+_EVERY = 3
 
 
 @dataclass(frozen=True)

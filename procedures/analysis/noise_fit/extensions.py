@@ -28,13 +28,15 @@ SHORT_CORNERS_S = (0.05, 0.1, 0.2, 1.0)
 _CORNER_OF_LONGEST = 0.3
 LONGEST = 0.1
 """Greatest correlation time, of the record: what is longer is no other than a random walk."""
-SCORE = 3.0
+SCORE = 2.7
 """Standard deviations of a score from which on the extension is fitted."""
 GAIN_OF_TIME, GAIN_OF_CORNER = 16.0, 11.0
 """Twice the log likelihood that an extension must gain: χ² of two and of one degree at 5e-4, of several times tried."""
 _RATIO = 2.0**0.5
 """Between two times that are tried."""
-_PER_E_FOLD = 6
+_PER_E_FOLD = 3
+_EVERY = 2
+"""Of the times, so many are looked at first."""
 _FIRST_CORNER_S = FLICKER_BAND_S[0]
 
 
@@ -57,6 +59,12 @@ class Extension:
             return replace(joined, spectrum=replace(s, columns=columns))
         columns = np.column_stack([columns, gauss_markov(joined, self.time_s)])
         return replace(joined, spectrum=replace(s, columns=columns), added=1)
+
+    def scaled(self, factor: float) -> "Extension":
+        """With its time longer by a factor."""
+        if self.time_s is not None:
+            return Extension(time_s=factor * self.time_s)
+        return Extension(corner_s=factor * (self.corner_s or 0.0))
 
     def taken_from(self, joined: Joined) -> Joined:
         """The bins with the columns they had before."""
@@ -98,13 +106,20 @@ def flicker_from(joined: Joined, corner_s: float) -> Array:
 
 def extension(joined: Joined, at: State) -> Extension | None:
     """What the record needs beside the five coefficients; `at` is their fit, all allowed, with a ramp."""
-    tried: list[tuple[float, Extension]] = []
-    for one in candidates(joined):
+    best, most = None, 0.0
+    for one in candidates(joined, _EVERY):
         if _score(joined, at, one) > SCORE:
-            gain = _gain(joined, at, one) - (GAIN_OF_CORNER if one.time_s is None else GAIN_OF_TIME)
-            tried.append((gain, one))
-    gain, best = max(tried, key=lambda t: t[0], default=(0.0, None))
-    return best if gain > 0.0 else None
+            gain = _gain(joined, at, one)
+            if gain > most:
+                best, most = one, gain
+    if best is None:
+        return None
+    for factor in (1.0 / _RATIO, _RATIO):
+        other = best.scaled(factor)
+        gain = _gain(joined, at, other)
+        if gain > most:
+            best, most = other, gain
+    return best if most > (GAIN_OF_CORNER if best.time_s is None else GAIN_OF_TIME) else None
 
 
 def candidates(joined: Joined, every: int = 1) -> list[Extension]:
@@ -126,11 +141,11 @@ def _score(joined: Joined, at: State, one: Extension) -> float:
     used = joined.fitted
     if one.time_s is not None:
         column = gauss_markov(joined, one.time_s)[used]
+    elif at.variances[BIAS_INSTABILITY] == 0.0:
+        return 0.0
     else:
         own = joined.spectrum.columns[:, BIAS_INSTABILITY]
         column = (flicker_from(joined, one.corner_s or 0.0) - own)[used]
-        if at.variances[BIAS_INSTABILITY] == 0.0:
-            return 0.0
     free = np.flatnonzero(at.variances > 0.0)
     scaled = column / at.power
     others = joined.used.columns[:, free] / at.power[:, None]

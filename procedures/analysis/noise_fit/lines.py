@@ -32,16 +32,17 @@ class SpectralLine:
     """Of the sine of the same power [rate]."""
 
 
-def levels_around(power: Array, dof: float) -> tuple[Array, Array]:
+def levels_around(power: Array, dof: float, first: int = 0) -> tuple[Array, Array]:
     """Level of the noise about each mode, as of a χ²_dof of unit scale, and from how many modes, (m,) each.
 
     The median of as many modes as lie within ±100, at low modes within a factor of two: on a slope its middle value.
+    Below the mode `first` it is not wanted.
     """
     count = len(power)
     half = np.minimum(np.arange(count) // 2, _HALF_WINDOW)
     level = median_filter(power, min(2 * _HALF_WINDOW + 1, 2 * count - 1), mode="reflect")
     number = np.full(count, 2.0 * _HALF_WINDOW + 1.0)
-    for k in range(min(2 * _HALF_WINDOW, count)):  # evenly in the logarithm, so that a power law has no bias
+    for k in range(first, min(2 * _HALF_WINDOW, count)):  # evenly in the logarithm, so that a power law has no bias
         ends = max(1, k - half[k]), min(count, 2 * k + 1, k + _HALF_WINDOW + 1)
         if ends[1] > ends[0]:
             level[k] = np.median(power[ends[0] : ends[1]])
@@ -54,7 +55,8 @@ def standing_out(dof: float, count: Array, level: float) -> Array:
 
     The level is itself of `count` modes: an F ratio of dof and dof·count degrees of freedom.
     """
-    return dof * np.asarray(fdtri(dof, np.maximum(1.0, dof * count), 1.0 - level))
+    some, where = np.unique(count, return_inverse=True)  # the quantile is slow, and most modes have one count
+    return (dof * np.asarray(fdtri(dof, np.maximum(1.0, dof * some), 1.0 - level)))[where]
 
 
 def find_lines(

@@ -83,7 +83,7 @@ def _strongest(y: Array, taper: Array, expected: Array) -> float | None:
     """Cycles in the record of the mode that stands out most; None where none does."""
     power = np.abs(np.fft.rfft(y * taper)) ** 2
     power = power[:-1]
-    around, _ = levels_around(power, 2.0)
+    around, _ = levels_around(power, 2.0, _MANY)
     level = np.zeros(len(power))
     level[1:] = 0.5 * float(np.sum(taper**2)) * expected[1 : 2 * len(power) - 2 : 2]
     level[_MANY:] = np.maximum(level[_MANY:], around[_MANY:])
