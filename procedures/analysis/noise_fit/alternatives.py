@@ -5,7 +5,7 @@ them. The test that finds one of them compares it with nothing, not with the oth
 """
 
 from dataclasses import dataclass, replace
-from math import inf, sqrt
+from math import sqrt
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from procedures.analysis.noise_fit.columns import BIAS_INSTABILITY, RATE_RANDOM_
 from procedures.analysis.noise_fit.estimate import Estimate
 from procedures.analysis.noise_fit.extensions import Extension, candidates
 from procedures.analysis.noise_fit.joined import Joined
-from procedures.analysis.noise_fit.restricted import Profile, Spectrum, State, information, maximum
+from procedures.analysis.noise_fit.restricted import Spectrum, State, information, maximum
 from procedures.analysis.noise_fit.selection import Selection, inverse_information
 
 DOUBT = 4.0
@@ -72,16 +72,19 @@ def allowed_for(
     if not fits:
         return Doubt({}, None)
     top = max(own.log_likelihood, *(f.best.log_likelihood for f in fits))
-    likely = fits[0]
-    doubtful = extended or 2.0 * (top - own.log_likelihood) >= DOUBT
+    missing = {k for k in SLOW if k in selection.present and _can_miss(k, fits, top, losses[0])}
+    doubtful = extended or bool(missing) or 2.0 * (top - own.log_likelihood) >= DOUBT
     changed: dict[int, Estimate] = {}
     for k in SLOW:
-        missing = [f for f in fits if k in selection.present and 2.0 * (top - f.without(k)) <= losses[0]]
-        if missing or doubtful:
-            others = {id(f): f for f in (*missing[:1], *(fits if doubtful else []))}
-            changed[k] = _wider(estimates[k], k, list(others.values()), top, losses, zero=bool(missing))
-    changed = {k: e for k, e in changed.items() if e != estimates[k]}
-    return Doubt(changed, likely.model if changed else None)
+        # how fast a flicker ends is part of its level; another process only where there is a doubt
+        others = fits if doubtful else [f for f in fits if f.model.corner_s is not None and k == BIAS_INSTABILITY]
+        changed[k] = _wider(estimates[k], k, others, top, losses, zero=k in missing)
+    return Doubt(changed, fits[0].model if doubtful else None)
+
+
+def _can_miss(k: int, fits: list[_Fit], top: float, loss: float) -> bool:
+    """Whether some other model does without the process k at no more than an interval's loss."""
+    return any(2.0 * (top - f.best.log_likelihood) <= loss and 2.0 * (top - f.without(k)) <= loss for f in fits)
 
 
 def _fits(plain: Joined, selection: Selection, own: State) -> list[_Fit]:
@@ -106,19 +109,17 @@ def _fits(plain: Joined, selection: Selection, own: State) -> list[_Fit]:
 def _wider(
     estimate: Estimate, k: int, fits: list[_Fit], top: float, losses: tuple[float, float], *, zero: bool
 ) -> Estimate:
-    """The interval and the limit over all models."""
+    """The interval and the limit over all models, by their information: ``v ± √(loss left)·sd``."""
     present = estimate.value is not None
     ends = [estimate.lower or 0.0], [estimate.upper or 0.0], [estimate.upper_limit]
     for fit in fits:
-        variance = inverse_information(information(fit.spectrum, fit.best))[k, k]
-        profile = Profile(fit.spectrum, fit.everything, k, fit.best)
         lost = 2.0 * (top - fit.best.log_likelihood)
-        for into, loss in ((ends[1], losses[0]), (ends[2], losses[1])):
+        free = [i for i in fit.everything if fit.best.variances[i] > 0.0 or i == k]
+        known = inverse_information(information(fit.spectrum, fit.best)[np.ix_(free, free)])
+        v, sd = float(fit.best.variances[k]), sqrt(float(known[free.index(k), free.index(k)]))
+        for into, loss, sign in zip(ends, (losses[0], *losses), (-1.0, 1.0, 1.0), strict=True):
             if loss > lost:
-                found = profile.crossing(loss - lost, upwards=True, scale=sqrt(variance))
-                into.append(sqrt(found) if found < inf else 0.0)
-        if present and not zero and losses[0] > lost:
-            ends[0].append(sqrt(profile.crossing(losses[0] - lost, upwards=False, scale=sqrt(variance))))
+                into.append(sqrt(max(0.0, v + sign * sqrt(loss - lost) * sd)))
     if not present:
         return replace(estimate, upper_limit=max(ends[2]))
     return replace(estimate, lower=0.0 if zero else min(ends[0]), upper=max(ends[1]), upper_limit=max(ends[2]))
