@@ -15,7 +15,8 @@ from bench_service.jobs.queue_service import QueueService
 from bench_service.jobs.service import JobService
 from bench_service.jobs.stops import StopService
 from bench_service.jobs.worker import Worker
-from bench_service.model.errors import NotReady
+from bench_service.model.errors import NotDriving, NotReady
+from bench_service.model.records import reasons_of
 from bench_service.telemetry.tracing import Traces
 
 LEAST_FREE_BYTES = 200_000_000
@@ -80,6 +81,20 @@ class BenchService:
             self._worker.begin([lambda: (self.catalogue.procedures, self.catalogue.methods), *warm_up])
             self.campaigns.conductor.begin()
 
+    def at_failed_start(self, then: Callable[[], object]) -> None:
+        """Have `then` called where the job engine does not start. To be called before `begin`."""
+        if self._worker is not None:
+            self._worker.at_failed_start(then)
+
+    def failed_start(self) -> NotDriving | None:
+        """Return the error of an engine that did not start; None where it runs, or may yet."""
+        return None if self._worker is None else self._worker.failed_start()
+
+    def require_start(self) -> None:
+        """Wait until the engine runs. Raises `NotDriving` where it does not start."""
+        if self._worker is not None:
+            self._worker.require_engine()
+
     def ready(self) -> tuple[str, ...]:
         """Return once a job could start, with what a person should know all the same.
 
@@ -95,8 +110,9 @@ class BenchService:
             reasons += self._worker.troubles()
         if reasons:
             raise NotReady(reasons)
-        stops = (self.stores.benches.bench_stop(bench) for bench in self.benches.ids())
-        return tuple(f"bench {stop.bench} is stopped: {stop.reason}" for stop in stops if stop is not None)
+        standing = ((bench, self.stores.benches.standing_stops(bench)) for bench in self.benches.ids())
+        stopped = (f"bench {bench} is stopped: {reasons_of(stops)}" for bench, stops in standing if stops)
+        return (*stopped, *self.catalogue.notes())
 
     def stop(self) -> None:
         """End the service: the running job is left for the next start, the bench made safe."""

@@ -1,6 +1,7 @@
-"""Recordings at rest, one a launch: parameters, result and report that `static_run` and `noise_analysis` share.
+"""Recordings at rest, one a launch: parameters, result and analysis that `static_run` and `noise_analysis` share.
 
-Knows how the answers are asked for and shown; the numerics are in `procedures.analysis.launch`.
+Knows how the answers are asked for and judged. The numerics are in `procedures.analysis.launch`, the report is in
+`procedures.reports.launch`.
 """
 
 from collections.abc import Sequence
@@ -16,9 +17,7 @@ from procedures.core import units
 from procedures.core.errors import UnfitRecording
 from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording
-from procedures.core.report import Report
 from procedures.procedure import Outcome, Parameters
-from procedures.reports import launch as pictures
 
 Part = Literal["gyros", "accelerometers", "all", "none"]
 
@@ -119,22 +118,6 @@ def _warnings(launches: Sequence[LaunchNoise]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def noise_report(result: NoiseResult) -> Report:
-    """Tables 4.1 and 4.2, the three ways, every step's effect, and the plots of every channel."""
-    launches, channels = result.launches, result.channels
-    doubts = pictures.disagreements(launches)
-    tables = [
-        pictures.side_by_side(channels, launches),
-        *((doubts,) if doubts else ()),
-        pictures.averaging_table(channels, launches),
-        pictures.steps_table(launches),
-        pictures.launch_means_table(channels, launches),
-        *(pictures.three_ways(launch) for launch in launches),
-    ]
-    figures = [figure for s in channels for figure in pictures.channel_figures(s.channel, launches)]
-    return Report(_summary(result), (*tables, *figures))
-
-
 def _checks(channels: Sequence[ChannelSummary], limits: NoiseLimits) -> tuple[Check, ...]:
     """Random walk of gyros and bias instability of both triads; of channels in counts only that there is a noise."""
     found: list[Check] = []
@@ -166,13 +149,3 @@ def _check(s: ChannelSummary, process: str, maximum: float, unit: str, size: flo
     described = all(reading.described for reading in found.values)
     reason = "not observed" if described else "not described by the noise model"
     return check(name, bound / size, limit, note=f"{reason}: the value is what it stays below")
-
-
-def _summary(result: NoiseResult) -> str:
-    hours = sum(launch.duration_s for launch in result.launches) / units.HOUR
-    dwell = (
-        "Quantization rules at no averaging time."
-        if result.averaging_time_s is None
-        else f"Quantization falls below the rest of the noise after {result.averaging_time_s:.0f} s at the latest."
-    )
-    return f"{len(result.launches)} launches at rest, {hours:.3g} h in all. {dwell}"

@@ -9,12 +9,17 @@ from pathlib import Path
 
 import uvicorn
 
+from bench_service.api.http.door import Door, may_listen
 from bench_service.app import create_app, open_service
 from bench_service.cli.logs import set_up
+from bench_service.cli.private_files import protect
 from bench_service.cli.refusal import Refused
+from bench_service.service import BenchService
 from bench_service.settings import Settings
 from bench_service.wall_clock import pause
 
+EMBEDDED = "embedded"
+"""Name that commands give to a service in their own process, which they reach over a socket file."""
 GRACE_S = 3
 """How long open connections may take to end at shutdown [s]."""
 
@@ -26,13 +31,28 @@ def ready(
     """A server around an open service, ready to run; the service is closed at the end, or when the server shuts down.
 
     `level`: from which on lines are logged, where the settings do not say.
-    Raises what `open_service` raises: before any thread or signal handler is there.
+    Raises `Refused` for an address that it may not listen on, `Misconfigured` for a token that cannot be used, and what
+    `open_service` raises, before any thread or signal handler is there. Where the job engine does not start the server
+    ends, and `NotDriving` is raised at the end of the block.
     """
+    with _opened(settings, drive, socket_file, level) as (server, service):
+        yield server
+        _check_start(service)
+
+
+@contextmanager
+def _opened(
+    settings: Settings, drive: bool, socket_file: Path | None, level: str
+) -> Generator[tuple[uvicorn.Server, BenchService]]:
     set_up(settings, level)
+    protect(settings)
+    if socket_file is None:
+        check_address(settings)
+    rules = Door.of(settings) if socket_file is None else Door.of(settings, EMBEDDED)
     with ExitStack() as closing:
         service = open_service(settings, closing, drive)
         config = uvicorn.Config(
-            create_app(service, int(settings.max_import_mb * 1e6), closing.close),
+            create_app(service, int(settings.max_import_mb * 1e6), closing.close, rules),
             settings.host,
             settings.port,
             uds=None if socket_file is None else str(socket_file),
@@ -40,11 +60,34 @@ def ready(
             access_log=settings.log_access,
             timeout_graceful_shutdown=GRACE_S,
         )
-        yield uvicorn.Server(config)
+        server = uvicorn.Server(config)
+
+        def end() -> None:
+            server.should_exit = True
+
+        service.at_failed_start(end)
+        yield server, service
+
+
+def _check_start(service: BenchService) -> None:
+    failure = service.failed_start()
+    if failure is not None:
+        raise failure
+
+
+def check_address(settings: Settings) -> None:
+    """Raises `Refused` for an address from which anybody could ask, with what it takes to listen there."""
+    if not may_listen(settings):
+        raise Refused(
+            f"BENCH_HOST = {settings.host}: this service listens on another address than a loopback one only with a "
+            "token for those who ask from there, BENCH_TOKEN_FILE, or where that address is reached through a loopback "
+            "one alone, BENCH_PUBLISHED=loopback"
+        )
 
 
 def check_port(settings: Settings) -> None:
-    """Raises `Refused` with a hint where the port is taken."""
+    """Raises `Refused` with a hint where the port is taken, and as `check_address`."""
+    check_address(settings)
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -59,15 +102,20 @@ def check_port(settings: Settings) -> None:
 
 @contextmanager
 def serving(settings: Settings, drive: bool = True, socket_file: Path | None = None) -> Generator[None]:
-    """A server in a thread beside this one, answering from the first line of the block. Raises as `ready`."""
-    with ready(settings, drive, socket_file) as running:
+    """A server in a thread beside this one, answering from the first line of the block, its job engine running.
+
+    Raises as `ready`, but before the block is entered.
+    """
+    with _opened(settings, drive, socket_file, "warning") as (running, service):
         thread = threading.Thread(target=running.run, name="http")
         thread.start()
         try:
             while not running.started:
                 if not thread.is_alive():
+                    _check_start(service)
                     raise Refused("the service did not start; the lines above say why")
                 pause(0.01)
+            service.require_start()
             yield
         finally:
             running.should_exit = True

@@ -9,7 +9,8 @@ of the old one.
 
 import json
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from threading import Event, Lock
 from typing import Any
 
@@ -18,10 +19,11 @@ from pydantic import TypeAdapter
 
 from bench_service.bench.session import ShuttingDown
 from bench_service.jobs.dispatcher import Unfinished
-from bench_service.jobs.queue import RunningJob
+from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.runner import JobRunner, StepOutcome
-from bench_service.model.errors import NotUnderstood, ServiceError, StorageFailure, StorageFull
+from bench_service.model.errors import NotUnderstood, ServiceError, StorageFailure, StorageFull, UnfitValue
 from bench_service.model.job import Failure, Job
+from bench_service.telemetry.defects import described
 
 PROCEDURE_ABI = "1"
 """Raise it when stored workflows can no longer be continued by this code."""
@@ -103,10 +105,18 @@ class Engine:
         self._workflow = run_job
 
     def launch(self) -> None:
-        """Start working; jobs that a dead process left go on. The bench's lease must be held."""
-        DBOS.listen_queues([])
-        DBOS.launch()
-        self._never_wait_for_the_database()
+        """Start working; jobs that a dead process left go on. The bench's lease must be held.
+
+        Raises what kept it from starting, and leaves nothing running then.
+        """
+        try:
+            DBOS.listen_queues([])
+            with _failure_said_once():
+                DBOS.launch()
+            self._never_wait_for_the_database()
+        except Exception as error:
+            DBOS.destroy(destroy_registry=True)
+            raise self._understood(error) from error
 
     def run(self, job: Job) -> None:
         """Run a claimed job to its end. Raises `ShuttingDown`, or what kept its workflow from being written."""
@@ -114,7 +124,7 @@ class Engine:
             handle = DBOS.start_workflow(self._workflow, job.id, job.attempt)
         handle.get_result()
 
-    def unfinished(self, job: RunningJob) -> Unfinished:
+    def unfinished(self, job: QueueEntry) -> Unfinished:
         """What became of a running job's workflow."""
         status = DBOS.get_workflow_status(_workflow_id(job))
         if status is None:
@@ -189,7 +199,7 @@ class Engine:
             try:
                 self._runner.end_early(job_id, outcome)
                 return
-            except NotUnderstood:  # no end of ours can be noted: the dispatcher interrupts it
+            except (NotUnderstood, UnfitValue):  # no end of ours can be noted: the dispatcher interrupts it
                 return
             except (StorageFull, StorageFailure) as error:
                 log.warning("the end of job %s cannot be noted yet: %s", job_id, error)
@@ -226,12 +236,27 @@ class Engine:
         """A defect, or books that cannot be kept."""
         error = self._understood(raised)
         refused = isinstance(error, ServiceError)
-        log.error("job %s failed inside the service: %s", job_id, error, exc_info=None if refused else error)
-        kind = type(error).__name__
-        return StepOutcome(Failure(kind, str(error)) if refused else Failure("InternalError", f"{kind}: {error}"))
+        said = str(error) if refused else described(error)
+        log.error("job %s failed inside the service: %s", job_id, said, exc_info=None if refused else error)
+        return StepOutcome(Failure(type(error).__name__ if refused else "InternalError", said))
 
 
-def _workflow_id(job: Job | RunningJob) -> str:
+@contextmanager
+def _failure_said_once() -> Generator[None]:
+    """DBOS logs the traceback of a failed launch and raises it too; who asked for the launch says it."""
+    logger = logging.getLogger("dbos")
+
+    def dropped(record: logging.LogRecord) -> bool:
+        return record.exc_info is None
+
+    logger.addFilter(dropped)
+    try:
+        yield
+    finally:
+        logger.removeFilter(dropped)
+
+
+def _workflow_id(job: Job | QueueEntry) -> str:
     """Each attempt of a job is a workflow of its own."""
     return f"{job.id}/{job.attempt}"
 

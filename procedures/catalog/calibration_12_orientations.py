@@ -29,11 +29,11 @@ from procedures.analysis.calibration.scalar import require_scalar_determined
 from procedures.analysis.calibration.station_means import launch_warnings
 from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS, windows
 from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
-from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers, analyse_triad
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
+from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import BadParameter, Undetermined
 from procedures.core.frames import orientation_beta_gamma, orientation_gamma_beta
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
@@ -156,7 +156,8 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
     """Least squares over the station means of both triads."""
     params = resolve(params, context)
-    site, uncertainty = params.site(context), _uncertainty(params, context)
+    site = params.site(context)
+    uncertainty = params.table(site)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     _require_scalar(params, plans[1])
     gyro, accelerometer = (context.unit.triad(triad) for triad in TRIAD_NAMES)
@@ -185,7 +186,7 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
 def report(result: Result) -> Report:
     """Coefficients, checks, residuals and magnitudes (thesis Tables 5.1-5.4, figures 5.6-5.12)."""
     magnitudes = [t.magnitudes for t in result.triads]
-    tables = [pictures.coefficient_table(t) for t in result.triads]
+    tables = [pictures.triad_table(t) for t in result.triads]
     tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
     tables += [pictures.magnitude_table(magnitudes, "Magnitudes over the orientations")]
     figures = [f for t in result.triads for f in pictures.triad_figures(t)]
@@ -194,19 +195,9 @@ def report(result: Result) -> Report:
     return Report(sections=(*tables, *thermal, *figures, *stations))
 
 
-def _uncertainty(params: Params, context: Context) -> TableUncertainty:
-    site = params.site(context)
-    return TableUncertainty(
-        params.orthogonality_sd_arcsec or 0.0,
-        params.pointing_sd_arcsec or 0.0,
-        params.level_sd_arcsec or 0.0,
-        site.azimuth_sd_arcsec,
-        site.gravity_sd_m_s2 / site.gravity_m_s2,
-    )
-
-
 def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
-    site, uncertainty = params.site(context), _uncertainty(params, context)
+    site = params.site(context)
+    uncertainty = params.table(site)
     return triad_plan(
         triad, context.unit, schedule(params), context.bench.axis_motion, site, uncertainty, params.weighting
     )
@@ -229,9 +220,10 @@ def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
     parts, unit = predicted_parts(plan), INPUT_UNITS[plan.triad]
     if parts is None:
         return []
+    rows = [(name, coefficient_unit(name, unit, unit)) for name in COEFFICIENT_NAMES]
     return [
-        PredictedUncertainty(f"{plan.triad}.{name}", coefficient_unit(name, unit, unit), float(np.hypot(n, t)), n, t)
-        for name, n, t in zip(COEFFICIENT_NAMES, parts[0].tolist(), parts[1].tolist(), strict=True)
+        PredictedUncertainty(CoefficientName(plan.triad, name), of, float(np.hypot(n, t)), n, t)
+        for (name, of), n, t in zip(rows, parts[0].tolist(), parts[1].tolist(), strict=True)
     ]
 
 

@@ -1,23 +1,10 @@
 """What a monitor scrapes: right for every process of a database, also after a restart, and true to what happened."""
 
-import httpx
-from prometheus_client.parser import text_string_to_metric_families
-
 from bench_service.cli.client import connect
 from bench_service.settings import Settings
+from tests.kit.metrics import scraped
 from tests.service.campaigns import add, ended, named, start, until
 from tests.service.client import FAST, Client
-
-
-def scraped(http: httpx.Client) -> dict[tuple[str, ...], float]:
-    """(name, label values in the order of their names) -> value."""
-    answer = http.get("/metrics")
-    assert answer.status_code == 200, answer.text
-    return {
-        (sample.name, *(sample.labels[name] for name in sorted(sample.labels))): sample.value
-        for family in text_string_to_metric_families(answer.text)
-        for sample in family.samples
-    }
 
 
 def test_the_numbers_follow_what_happened_in_every_process_alike(client: Client, database_url: str) -> None:

@@ -86,8 +86,10 @@ def slow_powers(
     time = (np.arange(n) - 0.5 * (n - 1)) * cell_s
     others = np.empty((0, n)) if regressors is None else regressors
     follows = np.stack([_cosines(one) for one in (time, *ends, *others)])
-    rest = _less(y, others)
-    clean = without_lines(rest, cell_s, _expected_powers(_cosines(_less(rest, time[None])), expected))
+    rest = _less(y, np.asarray(others, dtype=np.float64))
+    clean = without_lines(
+        rest, cell_s, _expected_powers(_cosines(_less(rest, np.asarray(time[None], dtype=np.float64))), expected)
+    )
     coefficients = _cosines(y - np.mean(y) - (rest - clean.cells))
     kept = np.flatnonzero(~clean.beside)
     bins = _Bins.over(kept + 1, SINGLE_MODES, BINS)
@@ -121,12 +123,14 @@ def _expected_powers(coefficients: Array, expected: Array) -> Array:
     none = np.zeros((len(bins.count), 1))
     squares, unit = bins.sum(coefficients**2), bins.mean(expected).T
     shown = np.asarray(chdtri(bins.count, _CUT))
+    gram = none[:, :, None] + 1.0
+    found = maximum(Spectrum(squares, bins.count, unit, none, gram), VARIANCES)
     for _ in range(_ROUNDS):
-        found = maximum(Spectrum(squares, bins.count, unit, none, none[:, :, None] + 1.0), VARIANCES)
         most = shown * found.power
         if not np.any(squares > most):
             break
         squares = np.minimum(squares, most)
+        found = maximum(Spectrum(squares, bins.count, unit, none, gram), VARIANCES)
     return found.variances @ expected
 
 
