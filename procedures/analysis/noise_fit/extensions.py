@@ -123,17 +123,15 @@ def extension(joined: Joined, at: State) -> Extension | None:
 
 
 def candidates(joined: Joined, every: int = 1) -> list[Extension]:
-    """Every extension that is tried, or every so many of them."""
+    """Every extension that is tried, or every so many of the longer times."""
     shortest = max(SHORTEST_S, CELLS * float(np.max(joined.period_s)))
     longest = LONGEST * 0.5 / float(joined.frequency_hz[0])
     if longest <= shortest:
         return []
     times = shortest * _RATIO ** np.arange(int(log(longest / shortest) / log(_RATIO)) + 1)
-    corners = [*SHORT_CORNERS_S, *(t for t in times.tolist() if t <= _CORNER_OF_LONGEST * longest)]
-    return [
-        *(Extension(time_s=t) for t in times.tolist()[::every]),
-        *(Extension(corner_s=t) for t in corners[::every]),
-    ]
+    some = times.tolist()[::every]
+    corners = [*SHORT_CORNERS_S, *(t for t in some if t <= _CORNER_OF_LONGEST * longest)]
+    return [*(Extension(time_s=t) for t in some), *(Extension(corner_s=t) for t in corners)]
 
 
 def _score(joined: Joined, at: State, one: Extension) -> float:
