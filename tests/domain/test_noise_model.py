@@ -74,7 +74,7 @@ def test_a_flicker_of_another_corner_has_the_powers_of_its_covariance(corner_s: 
     fast = tapered_powers(covariances(length, 1.0 / RATE_HZ, band), taper)[2]
     told = bins.frequency_hz < 8.0 / (2.0 * np.pi * corner_s)
     ratio = (flicker_from(bins, corner_s) / exact_in_bins(bins, slow, fast, length))[told]
-    assert np.quantile(np.abs(ratio - 1.0), 0.9) < 0.02
+    assert np.quantile(np.abs(ratio - 1.0), 0.9) < 0.03
     assert np.max(np.abs(ratio - 1.0)) < 0.15
 
 
