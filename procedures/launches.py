@@ -9,7 +9,7 @@ from typing import Literal, TypeVar
 
 from pydantic import Field
 
-from procedures.analysis.launch.analysis import analyse_launch
+from procedures.analysis.launch.analysis import INSPECTION, analyse_launch
 from procedures.analysis.launch.results import LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.summary import ChannelSummary, summarise
@@ -19,6 +19,8 @@ from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording
 from procedures.procedure import Outcome, Parameters
 
+LAUNCH = INSPECTION
+"""How launches are inspected: each by itself, at rest throughout."""
 Part = Literal["gyros", "accelerometers", "all", "none"]
 
 
@@ -107,13 +109,12 @@ def analyse_launches(result: type[R], recordings: Sequence[Recording], params: N
 
 
 def _warnings(launches: Sequence[LaunchNoise]) -> tuple[str, ...]:
-    """What the inspection and the noise model say of each channel, each sentence once."""
+    """What the noise model says of each channel, each sentence once; what the inspection says is added elsewhere."""
     several = len(launches) > 1
     found: list[str] = []
     for launch in launches:
         begin = f"{launch.label}, " if several else ""
         for channel in launch.channels:
-            found += channel.findings
             found += (f"{begin}{channel.channel}: {sentence}" for sentence in channel.warnings)
     return tuple(dict.fromkeys(found))
 

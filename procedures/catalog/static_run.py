@@ -19,7 +19,7 @@ from procedures.core.recording import TRIADS, Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
-from procedures.launches import NoiseParameters, NoiseResult, analyse_launches
+from procedures.launches import LAUNCH, NoiseParameters, NoiseResult, analyse_launches
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 from procedures.reports.launch import noise_report
 
@@ -157,4 +157,5 @@ PROCEDURE = Procedure(
     report,
     learns=learns,
     quantities=quantities,
+    inspection=lambda _: LAUNCH,
 )

@@ -9,6 +9,7 @@ import pytest
 from bench_service.cli.client import connect
 from bench_service.settings import Settings
 from simulators.truth import default_bench, save_bench
+from tests.kit.registered import register_bench
 from tests.service.client import Client
 from tests.service.page import drawn
 
@@ -111,7 +112,8 @@ def test_a_bench_at_the_pole_is_refused(tmp_path: Path) -> None:
     )
     save_bench(pole, tmp_path / "pole.toml")
     settings = Settings(database_url=f"sqlite:///{tmp_path / 'bench.sqlite'}", bench_truth=tmp_path / "pole.toml")
-    with connect(settings, None, drive=True) as http:
+    register_bench(settings)
+    with connect(settings, None, drive=False) as http:
         answer = Client(http).preview("initial_alignment")
     assert answer.status_code == 422
     (error,) = answer.json()["errors"]

@@ -11,8 +11,8 @@ from procedures.analysis.allan.correlated import Uncorrelatable
 from procedures.analysis.allan.deviation import Deviation, DeviationStream
 from procedures.analysis.allan.statistic import Sizes, decade_sizes
 from procedures.analysis.cells import Cells, CellStream, cell_samples, channel_rows
-from procedures.analysis.fitness.findings import require_fit
-from procedures.analysis.fitness.stream import FitnessStream
+from procedures.analysis.fitness.findings import FitnessSettings
+from procedures.analysis.fitness.watched import Inspection, Watched
 from procedures.analysis.launch.beside import Beside, Resolution, smooth_temperatures, temperature_names
 from procedures.analysis.launch.channel import channel_noise
 from procedures.analysis.launch.results import LaunchNoise
@@ -23,6 +23,8 @@ from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.recording import Quantity, RawArray, Recording
 
+INSPECTION = Inspection(FitnessSettings())
+"""A launch is at rest throughout."""
 FEWEST_CELLS = 120
 """Fewer cells are no launch to analyse."""
 CROSSOVER = 0.03
@@ -68,23 +70,20 @@ def _first_pass(
 ) -> tuple[Cells, dict[str, Beside]]:
     """Cell means, temperatures' too, and what else is known, channel by channel. Raises `UnfitRecording`."""
     info = recording.info
-    columns = [info.column(name) for name in names]
-    fitness = FitnessStream([info.channels[c] for c in columns], info.rate_hz, info.count)
     temperatures = temperature_names(info)
+    columns = [info.column(name) for name in names]
     resolution = Resolution([info.channels[c] for c in columns])
+    watched = recording if isinstance(recording, Watched) else Watched(recording, INSPECTION)
     stream = CellStream(info, (*names, *temperatures), settings.cell_s)
 
-    def inspected() -> Iterator[RawArray]:
-        for block in recording.blocks():
-            part = block[:, columns]
-            fitness.add(part)
-            resolution.add(part)
+    def seen() -> Iterator[RawArray]:
+        for block in watched.blocks():
+            resolution.add(block, columns)
             yield block
 
-    for rows in channel_rows(info, (*names, *temperatures), inspected()):
+    for rows in channel_rows(info, (*names, *temperatures), seen()):
         stream.add(rows)
-    found = fitness.finish()
-    require_fit(info.id, found)
+    found = watched.fitness()
     cells = stream.finish()
     if cells.rates.shape[1] < FEWEST_CELLS:
         raise UnfitRecording(
@@ -92,10 +91,8 @@ def _first_pass(
             f"analysis, at least {FEWEST_CELLS} are needed"
         )
     coarse, warm = resolution.finish(), smooth_temperatures(cells, temperatures)
-    return cells, {
-        f.channel: Beside(tuple(finding.sentence for finding in f.findings), coarse.get(f.channel, ""), warm)
-        for f in found
-    }
+    sentences = {f.channel: tuple(finding.sentence for finding in f.findings) for f in found}
+    return cells, {name: Beside(sentences.get(name, ()), coarse.get(name, ""), warm) for name in names}
 
 
 @dataclass
