@@ -9,55 +9,45 @@ from fastapi import Depends, FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
-from bench_service.api import (
-    analyses,
-    audit,
-    benches,
-    bodies,
-    campaigns,
-    errors,
-    event_stream,
-    health,
-    jobs,
-    metrics,
-    procedures,
-    recordings,
-    request_id,
-    reservations,
-    schedules,
-    trends,
-    units,
-)
+from bench_service.api import audit, benches, health, metrics, procedures, recordings, reservations, results, trends
+from bench_service.api.campaigns import routes as campaigns
+from bench_service.api.campaigns import schedules
+from bench_service.api.http import bodies, errors, request_id
+from bench_service.api.jobs import event_stream
+from bench_service.api.jobs import routes as jobs
+from bench_service.api.units import routes as units
+from bench_service.bench.devices import BenchDevices
+from bench_service.bench.directory import BenchDirectory
+from bench_service.bench.live.values import Heartbeat, LiveBoard
+from bench_service.bench.prompts import AskedOperator, Asking
+from bench_service.bench.safety import SafetyService
+from bench_service.campaigns.stores import Stores
 from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
-from bench_service.jobs.code_version import code_version
-from bench_service.jobs.devices import BenchDevices
-from bench_service.jobs.directory import BenchDirectory
+from bench_service.evidence.catalogue import Catalogue
 from bench_service.jobs.dispatcher import Dispatcher, JobEngine
-from bench_service.jobs.event_hub import EventHub
-from bench_service.jobs.live import Heartbeat, LiveBoard
+from bench_service.jobs.events.hub import EventHub
+from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.planning import Planner
-from bench_service.jobs.prompts import AskedOperator, Asking
 from bench_service.jobs.runner import JobRunner
-from bench_service.jobs.safety import SafetyDesk
-from bench_service.jobs.service import BenchService
-from bench_service.jobs.store import Stores
-from bench_service.jobs.told_runner import ToldRunner
-from bench_service.jobs.tracing import traces_to
 from bench_service.jobs.worker import Worker
-from bench_service.pages import campaign_pages, figures, routes
+from bench_service.pages import campaign_pages, figures
+from bench_service.pages import routes as pages
 from bench_service.persistence import BenchLease, acquire_lease, engine_database, lease_holder, open_stores
-from bench_service.persistence.database import in_our_words
-from bench_service.persistence.host_files import HostFiles
+from bench_service.persistence.bench.host_files import HostFiles
+from bench_service.persistence.database import as_storage_error
+from bench_service.service import BenchService
 from bench_service.settings import Settings
+from bench_service.telemetry.code_version import code_version
+from bench_service.telemetry.tracing import traces_to
 
 ROUTERS = (
     procedures,
     jobs,
     recordings,
-    analyses,
+    results,
     units,
     trends,
     benches,
@@ -82,7 +72,11 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     closing.callback(database.dispose)
     driver = _driver(settings, partial(AskedOperator, stores.prompts)) if drive else None
     holder = partial(lease_holder, database, settings.database_url)
-    planner = Planner(stores, BenchDirectory(stores.units, driver, settings.bench_id, drawn_unit, holder))
+    planner = Planner(
+        stores.units,
+        BenchDirectory(stores.benches, stores.units, driver, settings.bench_id, drawn_unit, holder),
+        Catalogue(),
+    )
     code = code_version()
     traces = traces_to(settings.traces_url, settings.bench_id, code)
     closing.callback(traces.close)
@@ -98,9 +92,11 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
         heartbeat = Heartbeat(board, stores.live)
         heartbeat.begin()
         closing.callback(heartbeat.end)
-        runner = ToldRunner(stores, planner, driver, code, lease.held, board, settings.retry_scale, traces)
+        runner = InstrumentedRunner(stores, planner, driver, code, lease.held, board, settings.retry_scale, traces)
         worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease))
-    safety = SafetyDesk(stores, partial(_devices, settings), partial(HostFiles, settings.devices_in()))
+    safety = SafetyService(
+        stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
+    )
     service = BenchService(stores, driver, planner, worker, code, safety, board, database.free_bytes, traces)
     closing.callback(service.stop)
     service.register()
@@ -126,7 +122,7 @@ def _engine(settings: Settings, runner: JobRunner) -> JobEngine:
     from bench_service.jobs.engine import Engine
 
     books = engine_database(settings.database_url, settings.bench_id)
-    return Engine(*books, settings.bench_id, runner, in_our_words)
+    return Engine(*books, settings.bench_id, runner, as_storage_error)
 
 
 def _dispatcher(
@@ -159,7 +155,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
     app.state.max_import_bytes = max_import_bytes
     for module in ROUTERS:
         app.include_router(module.router)
-    app.include_router(routes.router)
+    app.include_router(pages.router)
     app.include_router(campaign_pages.router)
     app.add_middleware(bodies.Bounded)
     errors.install(app)

@@ -6,14 +6,14 @@ from alembic import context
 from sqlalchemy import Connection
 
 from bench_service.persistence.database import connect
-from bench_service.persistence.tables_around_jobs import Table  # with them, every table is known
+from bench_service.persistence.tables.every import METADATA
 from bench_service.settings import Settings
 
 
 def _migrate(connection: Connection) -> None:
     context.configure(
         connection=connection,
-        target_metadata=Table.metadata,
+        target_metadata=METADATA,
         render_as_batch=connection.dialect.name == "sqlite",
         compare_type=True,
     )

@@ -31,7 +31,8 @@ link), calibration (a set of coefficients of a unit with its lineage), launch (o
 
 Where does it live?
 -------------------
-One device's behaviour: its driver or its simulated plant. An order of things over several devices: a procedure
-(``catalog``). Arithmetic on recordings: ``analysis``. A question asked of recordings already taken: ``methods``.
-Remembering: ``bench_service.persistence``. When and whether: ``bench_service.jobs``.
+One device's behaviour: its driver or its simulated plant. An order of things over several devices: a
+procedure (``catalog``). Arithmetic on recordings: ``analysis``. Its tables and figures: ``reports``. A
+question asked of recordings already taken: ``methods``. Remembering: ``bench_service.persistence``. When and
+whether: ``bench_service.jobs``.
 """

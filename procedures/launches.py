@@ -8,7 +8,6 @@ from typing import Literal, TypeVar
 
 from pydantic import Field
 
-from procedures.analysis.launch import report as pictures
 from procedures.analysis.launch.analysis import analyse_launch
 from procedures.analysis.launch.results import LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
@@ -19,6 +18,7 @@ from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording
 from procedures.core.report import Report
 from procedures.procedure import Outcome, Parameters
+from procedures.reports import launch as pictures
 
 Part = Literal["gyros", "accelerometers", "all", "none"]
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from procedures.analysis.reference import site_with
+from procedures.analysis.calibration.reference import site_with
 from procedures.core.site import Site
 from procedures.procedure import Context, Parameters
 

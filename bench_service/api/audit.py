@@ -9,12 +9,12 @@ from pydantic import BaseModel, Field
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from bench_service.api.bodies import is_json
-from bench_service.api.dependencies import NO_CONTROL_CHARACTERS, REQUESTED_BY, WHO_LENGTH, After, Limit, Service
-from bench_service.api.errors import FieldError, problems, respond
+from bench_service.api.http.bodies import is_json
+from bench_service.api.http.dependencies import NO_CONTROL_CHARACTERS, REQUESTED_BY, WHO_LENGTH, After, Limit, Service
+from bench_service.api.http.errors import FieldError, problems, respond
 from bench_service.formats.plain_json import faults, mended, shown
-from bench_service.jobs.audit import AuditEntry, AuditTrail, record
-from bench_service.jobs.log_context import request_id
+from bench_service.telemetry.audit import AuditEntry, AuditTrail, record
+from bench_service.telemetry.log_context import request_id
 
 router = APIRouter(prefix="/api/v1/audit", tags=["audit"])
 
@@ -61,7 +61,7 @@ def list_audit(
 
 
 class Audited:
-    """Pure ASGI. The order is: the act, its entry, the answer. See `bench_service.jobs.audit`."""
+    """Pure ASGI. The order is: the act, its entry, the answer. See `bench_service.telemetry.audit`."""
 
     def __init__(self, app: ASGIApp, trail: AuditTrail) -> None:
         self._app = app

@@ -5,18 +5,24 @@ from datetime import datetime
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from bench_service.api.dependencies import Service
-from bench_service.api.errors import problems
-from bench_service.api.requests import StopRequest
-from bench_service.jobs.devices import DeviceState
-from bench_service.jobs.live import BenchLive
+from bench_service.api.http.dependencies import Service
+from bench_service.api.http.errors import problems
+from bench_service.api.http.fields import Request
+from bench_service.bench.devices import DeviceState
+from bench_service.bench.live.values import BenchLive
+from bench_service.bench.safety import Safety
 from bench_service.jobs.queue import Place, QueueEntry
-from bench_service.jobs.safety import Safety
-from bench_service.jobs.service import BenchService
+from bench_service.service import BenchService
 from bench_service.wall_clock import now
 from procedures.bench import BenchDescription
 
 router = APIRouter(prefix="/api/v1/benches", tags=["benches"])
+
+
+class StopRequest(Request):
+    """Why a bench is stopped."""
+
+    reason: str = Field("stopped by an operator", min_length=1, max_length=500)
 
 
 class DevicesView(BaseModel):
@@ -137,9 +143,9 @@ class Stopping(BaseModel):
 
 def _view(service: BenchService, bench_id: str) -> BenchView:
     description = service.benches.description(bench_id)
-    running = service.driving_job(bench_id)
+    running = service.jobs.driving_job(bench_id)
     live = service.live.of_bench(bench_id)
-    stop = service.stores.units.bench_stop(bench_id)
+    stop = service.stores.benches.bench_stop(bench_id)
     return BenchView(
         id=bench_id,
         description=description,
@@ -184,12 +190,12 @@ def stop(bench_id: str, service: Service, body: StopRequest | None = None) -> St
 
     It is noted first, so it holds whoever is alive: a worker sees it, and in its place the bench's supervisor.
     """
-    job, safety = service.stop_bench(bench_id, (body or StopRequest.model_validate({})).reason)
+    job, safety = service.stops.stop(bench_id, (body or StopRequest.model_validate({})).reason)
     return Stopping(bench=bench_id, job=job, safety=SafetyView.of(safety))
 
 
 @router.post("/{bench_id}/release", responses=problems(404, 409, 507))
 def release(bench_id: str, service: Service) -> BenchView:
     """Let a stopped bench work again, once it is known to be safe: the jobs that wait in its queue go on."""
-    service.release_bench(bench_id)
+    service.stops.release(bench_id)
     return _view(service, bench_id)

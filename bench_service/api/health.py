@@ -3,8 +3,8 @@
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from bench_service.api.dependencies import Service
-from bench_service.api.errors import problems
+from bench_service.api.http.dependencies import Service
+from bench_service.api.http.errors import problems
 
 router = APIRouter(tags=["health"])
 

@@ -17,13 +17,13 @@ from prometheus_client.core import (
 from prometheus_client.registry import Collector
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from bench_service.api.dependencies import Hub, Service
-from bench_service.api.errors import problems
-from bench_service.jobs.event_hub import EventHub
-from bench_service.jobs.job import FINAL, JobState
-from bench_service.jobs.live import BenchLive
-from bench_service.jobs.service import BenchService
-from bench_service.jobs.tallies import DURATION_S, Spread, Tallies
+from bench_service.api.http.dependencies import Hub, Service
+from bench_service.api.http.errors import problems
+from bench_service.bench.live.values import BenchLive
+from bench_service.jobs.events.hub import EventHub
+from bench_service.model.job import FINAL, JobState
+from bench_service.service import BenchService
+from bench_service.telemetry.tallies import DURATION_S, Spread, Tallies
 from bench_service.wall_clock import monotonic_s, now
 
 router = APIRouter(tags=["health"])
@@ -99,13 +99,13 @@ class Snapshot(Collector):
         yield from (still, finished)
 
     def _benches(self) -> Iterator[Metric]:
-        units, at = self._service.stores.units, now()
+        benches, at = self._service.stores.benches, now()
         busy = GaugeMetricFamily("bench_busy", "1 while a job drives the bench", labels=["bench"])
         state = GaugeMetricFamily("bench_state", "1 for the state that the bench is in", labels=["bench", "state"])
         seen = GaugeMetricFamily("bench_driver_seen_seconds", "Since the driver gave a sign", labels=["bench"])
-        for bench in units.benches():
+        for bench in benches.benches():
             live = self._service.live.of_bench(bench.id)
-            found = _state(live, units.bench_stop(bench.id) is not None)
+            found = _state(live, benches.bench_stop(bench.id) is not None)
             busy.add_metric([bench.id], live is not None and live.there(at) and live.job is not None)
             for name in BENCH_STATES:
                 state.add_metric([bench.id, name], name == found)

@@ -1,14 +1,51 @@
 """What the bench can do, and what a plan would be worth before anything moves."""
 
-from fastapi import APIRouter
+from typing import Annotated, Any
 
-from bench_service.api.dependencies import Service
-from bench_service.api.errors import problems
-from bench_service.api.requests import PreviewRequest
-from bench_service.api.schemas import Preview, ProcedureView
-from procedures.procedure import Method, Outcome, Parameters, Procedure
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+
+from bench_service.api.http.dependencies import Service
+from bench_service.api.http.errors import problems
+from bench_service.api.http.fields import NAME, Request
+from procedures.core.recording import Station
+from procedures.procedure import Method, Outcome, Parameters, PredictedUncertainty, Procedure
 
 router = APIRouter(prefix="/api/v1", tags=["procedures"])
+
+
+class ProcedureView(BaseModel):
+    """A procedure with the JSON Schemas of what it takes and gives."""
+
+    name: str
+    title: str
+    version: str
+    parameters: dict[str, Any]
+    result: dict[str, Any]
+
+
+class PreviewRequest(Request):
+    """What a plan would be worth."""
+
+    unit: str = NAME
+    bench: Annotated[str, NAME] | None = None
+    parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+
+
+class Preview(BaseModel):
+    """A plan before anything moves."""
+
+    procedure: str
+    unit: str
+    bench: str
+    parameters: dict[str, Any]
+    stations: list[Station]
+    duration_s: float
+    data_bytes: int
+    predicted_uncertainties: list[PredictedUncertainty]
+    basis: str = Field(description="What the prediction rests on: a calibration, or nominal scale factors")
+    warnings: list[str]
+    violations: list[str]
 
 
 def _view(entry: Procedure[Parameters, Outcome] | Method[Parameters, Outcome]) -> ProcedureView:
@@ -24,13 +61,13 @@ def _view(entry: Procedure[Parameters, Outcome] | Method[Parameters, Outcome]) -
 @router.get("/procedures", responses=problems())
 def list_procedures(service: Service) -> list[ProcedureView]:
     """Every procedure, with the JSON Schemas of its parameters and its result."""
-    return [_view(procedure) for procedure in service.planner.catalog.values()]
+    return [_view(procedure) for procedure in service.catalogue.procedures.values()]
 
 
 @router.get("/procedures/{name}", responses=problems(404))
 def read_procedure(name: str, service: Service) -> ProcedureView:
     """One procedure."""
-    return _view(service.planner.procedure(name))
+    return _view(service.catalogue.procedure(name))
 
 
 @router.post("/procedures/{name}/preview", responses=problems(404, 413))
@@ -55,4 +92,4 @@ def preview(name: str, request: PreviewRequest, service: Service) -> Preview:
 @router.get("/methods", tags=["analyses"], responses=problems())
 def list_methods(service: Service) -> list[ProcedureView]:
     """Every method that can be run on recordings or calibrations, with its JSON Schemas."""
-    return [_view(method) for method in service.analyses.methods.values()]
+    return [_view(method) for method in service.catalogue.methods.values()]

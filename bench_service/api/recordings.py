@@ -1,23 +1,82 @@
 """Recordings: what there is, the samples out, and a recorded file in."""
 
-from typing import Annotated
+from datetime import datetime
+from typing import Annotated, Any
 
 from fastapi import APIRouter, File, Form, Query, Request, Response, UploadFile
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import StreamingResponse
-from pydantic import ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
-from bench_service.api.bodies import refuse_unfit
-from bench_service.api.dependencies import After, IdempotencyKey, Limit, Service
-from bench_service.api.errors import made, problems
-from bench_service.api.schemas import RecordingPage, RecordingView
+from bench_service.api.http.bodies import refuse_unfit
+from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
+from bench_service.api.http.errors import made, problems
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.export import ExportFormat, export, extract
 from bench_service.formats.import_file import ImportFile
 from bench_service.formats.plain_json import shown
+from bench_service.model.records import RecordingState, StoredRecording
 from procedures.core.errors import BadParameter
+from procedures.core.recording import Channel, Station
 
 router = APIRouter(prefix="/api/v1/recordings", tags=["recordings"])
+
+
+class RecordingView(BaseModel):
+    """A recording without its samples."""
+
+    id: str
+    unit: str
+    job: str | None
+    bench: str | None
+    station: Station | None
+    state: RecordingState
+    channels: list[Channel]
+    rate_hz: float
+    count: int
+    duration_s: float
+    start_s: float
+    launched_s: float | None = Field(description="Bench time at which the unit was switched on; null: not known")
+    content_hash: str = Field(description="SHA-256 of samples and channel description, whatever the chunks")
+    simulated: bool
+    stored_bytes: int
+    chunks: int
+    created_at: datetime
+    source: dict[str, Any]
+    results: list[str] | None = Field(None, description="Results that used it; only where one recording is asked for")
+
+    @classmethod
+    def of(cls, stored: StoredRecording, results: tuple[str, ...] | None = None) -> "RecordingView":
+        info = stored.info
+        return cls(
+            id=info.id,
+            unit=info.unit,
+            job=stored.job_id,
+            bench=stored.bench,
+            station=info.station,
+            state=stored.state,
+            channels=list(info.channels),
+            rate_hz=info.rate_hz,
+            count=info.count,
+            duration_s=info.duration_s,
+            start_s=info.start_s,
+            launched_s=info.launched_s,
+            content_hash=info.content_hash,
+            simulated=info.simulated,
+            stored_bytes=stored.stored_bytes,
+            chunks=stored.chunks,
+            created_at=stored.created_at,
+            source=stored.source,
+            results=None if results is None else list(results),
+        )
+
+
+class RecordingPage(BaseModel):
+    """Recordings, newest first."""
+
+    items: list[RecordingView]
+    next: str | None
+
 
 DATA: dict[int | str, dict[str, object]] = {
     200: {
@@ -96,6 +155,6 @@ def import_recording(
     if size > limit:
         raise BadParameter("files", f"{size} bytes", f"at most {limit} bytes (BENCH_MAX_IMPORT_MB)")
     parts = [ImportFile(shown(file.filename or f"file {number}"), file.file) for number, file in enumerate(files)]
-    info = service.analyses.import_recording(parts, wanted, key)
+    info = service.imports.import_recording(parts, wanted, key)
     response.headers["Location"] = f"/api/v1/recordings/{info.id}"
     return RecordingView.of(service.stores.recordings.get(info.id))

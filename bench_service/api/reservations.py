@@ -6,10 +6,10 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 from pydantic import AwareDatetime, BaseModel, Field, model_validator
 
-from bench_service.api.dependencies import After, IdempotencyKey, Limit, Service
-from bench_service.api.errors import made, problems
-from bench_service.api.requests import NAME, Request
-from bench_service.jobs.queue_desk import LONGEST, ReservationRequest
+from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
+from bench_service.api.http.errors import made, problems
+from bench_service.api.http.fields import NAME, Request
+from bench_service.jobs.queue_service import LONGEST, ReservationRequest
 from bench_service.jobs.reservation import Reservation, Reserved
 from bench_service.wall_clock import now
 

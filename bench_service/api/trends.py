@@ -4,10 +4,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from bench_service.api.campaign_schemas import TrendView
-from bench_service.api.dependencies import Service
-from bench_service.api.errors import problems
-from bench_service.api.requests import NAME
+from bench_service.api.campaigns.schemas import TrendView
+from bench_service.api.http.dependencies import Service
+from bench_service.api.http.errors import problems
+from bench_service.api.http.fields import NAME
 
 router = APIRouter(prefix="/api/v1/units", tags=["campaigns"])
 

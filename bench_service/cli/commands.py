@@ -17,7 +17,7 @@ from bench_service.cli.client import RESULT, call, check, connect, segment
 from bench_service.cli.files import check_folder, text_of, whole_file
 from bench_service.cli.options import AsJson, Server, console, errors, parameter, wide
 from bench_service.cli.refusal import Refused
-from bench_service.jobs.errors import ServiceError
+from bench_service.model.errors import ServiceError
 from bench_service.settings import Settings
 
 log = logging.getLogger(__name__)

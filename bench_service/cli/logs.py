@@ -7,8 +7,8 @@ import logging
 import sys
 from datetime import UTC, datetime
 
-from bench_service.jobs.log_context import AddSubjects
 from bench_service.settings import Settings
+from bench_service.telemetry.log_context import AddSubjects
 
 FIELDS = "{asctime} {levelname} {name} {message}"
 OWN_HANDLERS = ("uvicorn", "uvicorn.error", "uvicorn.access", "dbos")

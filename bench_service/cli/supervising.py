@@ -10,15 +10,15 @@ from contextlib import ExitStack
 from functools import partial
 from types import FrameType
 
+from bench_service.bench.supervisor import Supervisor
 from bench_service.cli.logs import set_up
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
-from bench_service.jobs.errors import BenchBusy
-from bench_service.jobs.supervisor import Supervisor
+from bench_service.model.errors import BenchBusy
 from bench_service.persistence import acquire_lease
-from bench_service.persistence.host_files import HostFiles, SupervisorLock
-from bench_service.persistence.lease import SUPERVISOR
-from bench_service.persistence.safety_books import SqlSafetyBooks
+from bench_service.persistence.bench.host_files import HostFiles, SupervisorLock
+from bench_service.persistence.bench.lease import SUPERVISOR
+from bench_service.persistence.bench.safety_books import SqlSafetyBooks
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 

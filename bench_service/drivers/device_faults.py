@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from bench_service.drivers.device_cables import DeviceCables
-from bench_service.jobs.errors import Misconfigured
+from bench_service.model.errors import Misconfigured
 from procedures.bench.errors import DeviceFault, Disconnected
 
 HANG_S = 3600.0

@@ -16,10 +16,10 @@ from threading import Lock
 from typing import Any
 
 from bench_service import wall_clock
+from bench_service.bench.devices import DeviceState
+from bench_service.bench.processes import ProcessIdentity
 from bench_service.drivers.device_cables import DeviceCables
 from bench_service.drivers.device_journal import DeviceJournal
-from bench_service.jobs.devices import DeviceState
-from bench_service.jobs.processes import ProcessIdentity
 from procedures.bench.errors import DeviceBusy, Disconnected
 
 RECORD_BYTES = 4096

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from bench_service.bench.devices import AT_REST, MOVING, DeviceState
+from bench_service.bench.observed import ObservedBench
 from bench_service.drivers.device_cables import DeviceCables
 from bench_service.drivers.device_faults import DeviceFaults
 from bench_service.drivers.device_register import DeviceLink, DeviceRegister
-from bench_service.jobs.devices import AT_REST, MOVING, DeviceState
-from bench_service.jobs.observed import ObservedBench
 from procedures.bench import Bench
 from procedures.bench.errors import Disconnected, OutOfRange
 
@@ -155,7 +155,7 @@ class RegisteredBench(ObservedBench):
 
 
 class RegisteredDevices:
-    """`bench_service.jobs.devices.BenchDevices` over a register: no world is needed, as no job is with real devices."""
+    """`bench_service.bench.devices.BenchDevices` over a register: it needs no world, as real devices need no job."""
 
     def __init__(self, register: DeviceRegister) -> None:
         self._register = register

@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from bench_service.bench.devices import DeviceState
+from bench_service.bench.driver import TrueTriad
+from bench_service.bench.prompts import Asking
 from bench_service.drivers.device_faults import DeviceFaults, FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredBench, RegisteredDevices
-from bench_service.jobs.devices import DeviceState
-from bench_service.jobs.driver import TrueTriad
-from bench_service.jobs.errors import Misconfigured, NotMounted
-from bench_service.jobs.prompts import Asking
+from bench_service.model.errors import Misconfigured, NotMounted
 from bench_service.wall_clock import pause_async
 from procedures.bench import Bench, BenchDescription, BenchNeeds
 from procedures.bench.errors import BenchError

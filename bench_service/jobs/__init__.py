@@ -1,1 +1,1 @@
-"""Running procedures: what a job is, who may drive a bench, and how every job ends. Knows no HTTP and no SQL."""
+"""Jobs: from request to end. Planning, the queue of a bench, dispatching, retries. Knows no HTTP and no SQL."""

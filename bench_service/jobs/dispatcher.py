@@ -18,13 +18,13 @@ from dataclasses import dataclass
 from threading import Event, Thread
 from typing import Protocol
 
-from bench_service.jobs.driver import Lease
-from bench_service.jobs.errors import NotFound, NotUnderstood, ServiceError
-from bench_service.jobs.job import Failure, Job
+from bench_service.bench.driver import Lease
+from bench_service.bench.session import ShuttingDown
 from bench_service.jobs.queue import BenchQueue, QueueEntry, RunningJob
 from bench_service.jobs.runner import JobRunner
-from bench_service.jobs.session import ShuttingDown
-from bench_service.jobs.store import Stores
+from bench_service.jobs.stores import JobStores
+from bench_service.model.errors import NotFound, NotUnderstood, ServiceError
+from bench_service.model.job import Failure, Job
 from bench_service.wall_clock import now
 
 RETRY_S = 0.5
@@ -67,7 +67,7 @@ class Dispatcher:
     """Gives one bench its jobs, one after the other, in a thread of its own."""
 
     def __init__(
-        self, bench_id: str, stores: Stores, runner: JobRunner, engine: JobEngine, lease: Lease, poll_s: float
+        self, bench_id: str, stores: JobStores, runner: JobRunner, engine: JobEngine, lease: Lease, poll_s: float
     ) -> None:
         """`poll_s`: how often the queue is looked at for jobs that other processes put there."""
         self._bench_id = bench_id

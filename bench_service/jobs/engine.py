@@ -16,12 +16,12 @@ from typing import Any
 from dbos import DBOS, DBOSConfig, Serializer, SetWorkflowID
 from pydantic import TypeAdapter
 
+from bench_service.bench.session import ShuttingDown
 from bench_service.jobs.dispatcher import Unfinished
-from bench_service.jobs.errors import NotUnderstood, ServiceError, StorageFailure, StorageFull
-from bench_service.jobs.job import Failure, Job
 from bench_service.jobs.queue import RunningJob
 from bench_service.jobs.runner import JobRunner, StepOutcome
-from bench_service.jobs.session import ShuttingDown
+from bench_service.model.errors import NotUnderstood, ServiceError, StorageFailure, StorageFull
+from bench_service.model.job import Failure, Job
 
 PROCEDURE_ABI = "1"
 """Raise it when stored workflows can no longer be continued by this code."""

@@ -1,32 +1,22 @@
 """From a request to a plan: parameters complete, stations laid out, worth predicted, before anything moves."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
-from pydantic import TypeAdapter
-
-from bench_service.jobs.directory import BenchDirectory
-from bench_service.jobs.errors import NotFound, NotMounted, NotUnderstood
-from bench_service.jobs.job import Job
-from bench_service.jobs.store import Stores
-from procedures import catalog
+from bench_service.bench.directory import BenchDirectory
+from bench_service.evidence.catalogue import AnyProcedure, Catalogue
+from bench_service.evidence.units import UnitStore
+from bench_service.model.errors import NotFound, NotMounted
 from procedures.bench import BenchDescription
-from procedures.core.errors import DomainError
 from procedures.core.recording import Station
 from procedures.core.unit import Unit
-from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
+from procedures.procedure import Context, Parameters, Prediction
 
 BYTES_PER_SAMPLE = 2
 """What a stored sample is allowed to weigh (design.md, budgets); a preview says what a plan may need at most."""
 
 TEMPERATURE_CHANNELS = 7
 """Five sensors of the unit and two readings of the chamber, beside the triads where a station wants temperatures."""
-
-CONTEXT = TypeAdapter(Context)
-
-AnyProcedure = Procedure[Parameters, Outcome]
 
 
 @dataclass(frozen=True)
@@ -43,22 +33,12 @@ class Plan:
 
 
 class Planner:
-    """Knows the catalogue and the benches."""
+    """Lays out jobs from the catalogue on the benches that there are."""
 
-    def __init__(self, stores: Stores, benches: BenchDirectory) -> None:
+    def __init__(self, units: UnitStore, benches: BenchDirectory, catalogue: Catalogue) -> None:
         self.benches = benches
-        self._stores = stores
-
-    @cached_property
-    def catalog(self) -> Mapping[str, AnyProcedure]:
-        """Every procedure by name; read when it is first wanted, because that imports all of the numerics."""
-        return catalog.discover()
-
-    def procedure(self, name: str) -> AnyProcedure:
-        """Raises `NotFound`."""
-        if name not in self.catalog:
-            raise NotFound("procedure", name)
-        return self.catalog[name]
+        self.catalogue = catalogue
+        self._units = units
 
     def context(self, unit: str, bench: str | None = None) -> Context:
         """What is known now. Raises `NotFound` for an unknown bench, `NotMounted` for a unit it does not have."""
@@ -71,13 +51,13 @@ class Planner:
         if serial not in mounted:
             raise NotMounted(f"bench {bench!r} has no unit {serial!r}; it has {', '.join(mounted)}")
         try:
-            return self._stores.units.unit(serial)
+            return self._units.unit(serial)
         except NotFound:
             return mounted[serial]
 
     def plan(self, name: str, unit: str, requested: dict[str, Any], bench: str | None = None) -> Plan:
         """Raises pydantic's `ValidationError`, `DomainError`, `NotFound`, `NotMounted`. Nothing moves."""
-        procedure = self.procedure(name)
+        procedure = self.catalogue.procedure(name)
         context = self.context(unit, bench)
         parameters = procedure.resolve(procedure.params.model_validate(requested), context)
         stations = procedure.schedule(parameters)
@@ -90,15 +70,7 @@ class Planner:
 
     def refreshed(self, context: Context) -> Context:
         """The same bench, and the unit as it is known now: its noise, and the calibration that is current."""
-        return replace(context, unit=self._stores.units.unit(context.unit.serial))
-
-
-def context_of(job: Job) -> Context:
-    """What was known of a job's unit and bench. Raises `NotUnderstood`."""
-    try:
-        return CONTEXT.validate_python(job.context)
-    except (ValueError, DomainError) as error:
-        raise NotUnderstood(job.id, job.code_version, error) from error
+        return replace(context, unit=self._units.unit(context.unit.serial))
 
 
 def _violations(station: Station, bench: BenchDescription) -> tuple[str, ...]:
@@ -115,11 +87,3 @@ def _samples(station: Station, unit: Unit) -> int:
     seconds = station.record_s if station.profile is None else station.profile.expected_s()
     channels = len(unit.channels) + TEMPERATURE_CHANNELS * station.temperatures
     return round(seconds * (station.sample_rate_hz or unit.sample_rate_hz)) * channels
-
-
-def register(stores: Stores, unit: Unit) -> None:
-    """Remember a unit that is met for the first time."""
-    try:
-        stores.units.unit(unit.serial)
-    except NotFound:
-        stores.units.put_unit(unit)

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, Protocol
 
-from bench_service.jobs.job import Failure, Job
 from bench_service.jobs.reservation import Reservation, Reserved
-from bench_service.jobs.stored import BenchStop
+from bench_service.model.job import Failure, Job
+from bench_service.model.records import BenchStop
 
 LONGEST_PAUSE_S = 300.0
 """No retry is put off for longer [s]. One that is due later than that was put off by a clock that was set back since:

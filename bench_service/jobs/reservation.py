@@ -5,7 +5,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Protocol
 
-from bench_service.jobs.stored import Idempotency, Page
+from bench_service.model.records import Idempotency, Page
 
 
 class Reserved(StrEnum):

@@ -2,8 +2,8 @@
 
 from datetime import timedelta
 
-from bench_service.jobs.job import BENCH_FAULTS, Failure, Job
 from bench_service.jobs.queue import LONGEST_PAUSE_S, QueueStore
+from bench_service.model.job import BENCH_FAULTS, Failure, Job
 from bench_service.wall_clock import now
 
 RETRY_PAUSES_S = (10.0, 30.0, 60.0, 120.0, LONGEST_PAUSE_S)

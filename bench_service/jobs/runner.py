@@ -1,31 +1,30 @@
 """The steps of a job, each safe to repeat: what the engine calls, and what it must not know."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from threading import Event
-from typing import Any
 
-from bench_service.jobs.driver import BenchDriver
-from bench_service.jobs.errors import ServiceError, StorageFailure
-from bench_service.jobs.job import Failure, Job, JobState
-from bench_service.jobs.live import LiveBoard
-from bench_service.jobs.live_tap import LiveTap
-from bench_service.jobs.planning import CONTEXT, AnyProcedure, Planner, context_of
-from bench_service.jobs.processes import ProcessIdentity
+from bench_service.bench.driver import BenchDriver
+from bench_service.bench.live.tap import LiveTap
+from bench_service.bench.live.values import LiveBoard
+from bench_service.bench.processes import ProcessIdentity
+from bench_service.bench.session import BenchSession, ShuttingDown
+from bench_service.evidence.catalogue import AnyProcedure
+from bench_service.evidence.job_analysis import analysed, recordings_of
+from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.retries import try_again
-from bench_service.jobs.session import BenchSession, ShuttingDown
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import BenchStop, Idempotency, StoredResult
-from bench_service.wall_clock import new_id, now
+from bench_service.jobs.stores import JobStores
+from bench_service.model.context import CONTEXT, context_of
+from bench_service.model.errors import ServiceError, StorageFailure
+from bench_service.model.job import Failure, Job, JobState
+from bench_service.model.records import BenchStop, Idempotency, StoredResult
+from bench_service.wall_clock import now
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, Disconnected, Stopped
 from procedures.core.errors import DomainError
-from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
-from procedures.core.recording import Recording
-from procedures.core.unit_correction import UnitCorrection
 from procedures.procedure import Outcome
 
 
@@ -47,7 +46,7 @@ class JobRunner:
 
     def __init__(
         self,
-        stores: Stores,
+        stores: JobStores,
         planner: Planner,
         driver: BenchDriver,
         code_version: str,
@@ -154,7 +153,7 @@ class JobRunner:
         job = self._stores.jobs.get(job_id)
         if job.state is not JobState.RUNNING:  # a crash came after its end was noted, or it is another attempt's by now
             return StepOutcome()
-        procedure = self._planner.procedure(job.procedure)
+        procedure = self._planner.catalogue.procedure(job.procedure)
         try:
             recordings = recordings_of(self._stores, job_id)
             result = analysed(job, procedure, job.parameters, recordings, self._code_version)
@@ -221,7 +220,7 @@ class JobRunner:
 
     def _not_safe(self, job_id: str, why: str) -> StepOutcome:
         text = f"the bench could not be made safe: {why}"
-        self._stores.units.stop_bench(BenchStop(self._driver.description.id, now(), f"could not be made safe: {why}"))
+        self._stores.benches.stop_bench(BenchStop(self._driver.description.id, now(), f"could not be made safe: {why}"))
         self._stores.jobs.note(job_id, "note", now(), {"text": text})
         return StepOutcome(Failure("NotSafe", text))
 
@@ -231,7 +230,7 @@ class JobRunner:
         A database that does not answer now, because it is restarted, has nothing to say: the recording goes on.
         """
         try:
-            bench_stop = self._stores.units.bench_stop(self._driver.description.id)
+            bench_stop = self._stores.benches.bench_stop(self._driver.description.id)
             return bench_stop is not None or self._stores.jobs.cancel_requested(job_id)
         except StorageFailure:
             return False
@@ -239,7 +238,9 @@ class JobRunner:
     def _session_of(self, job: Job) -> BenchSession:
         if self._session is not None and self._session.job.id == job.id:
             return self._session
-        procedure = self._planner.procedure(job.procedure)  # before a link is taken that nobody would give back
+        procedure = self._planner.catalogue.procedure(
+            job.procedure
+        )  # before a link is taken that nobody would give back
         self._stores.recordings.interrupt_open(job.id)
         checkpoint = self._stores.recordings.checkpoint(job.id)
         bench = self._driver.open(job.unit, job.seed, checkpoint, BenchNeeds.of(job.stations), job.id)
@@ -247,53 +248,3 @@ class JobRunner:
         stop_wanted = partial(self._stop_wanted, job.id)
         self._session = BenchSession(job, procedure, bench, self._stores.recordings, stop_wanted, live)
         return self._session
-
-
-@dataclass(frozen=True)
-class Analysed:
-    """A result ready to be stored, with the calibrations and corrections that it gives."""
-
-    outcome: Outcome
-    stored: StoredResult
-    calibrations: tuple[TriadCalibration, ...]
-    corrections: tuple[UnitCorrection, ...]
-
-
-def recordings_of(stores: Stores, job_id: str) -> list[Recording]:
-    """A job's complete recordings for an analysis, in the order of their stations."""
-    return [stores.recordings.load(stored.info.id) for stored in stores.recordings.of_job(job_id)]
-
-
-def analysed(
-    job: Job,
-    procedure: AnyProcedure,
-    parameters: dict[str, Any],
-    recordings: Sequence[Recording],
-    code_version: str,
-) -> Analysed:
-    """Run a procedure's analysis on a job's recordings. Raises `DomainError`, `ValidationError` for the parameters."""
-    context = context_of(job)
-    params = procedure.resolve(procedure.params.model_validate(parameters), context)
-    outcome = procedure.analyse(recordings, params, context)
-    used = context.unit.calibration_id if procedure.uses_calibration else None
-    corrections = (context.unit.correction_id(kind) for kind in procedure.uses_corrections(params))
-    stored = StoredResult(
-        id=new_id(),
-        kind="procedure",
-        name=procedure.name,
-        version=procedure.version,
-        parameters=params.model_dump(mode="json"),
-        document=outcome.model_dump(mode="json"),
-        verdict=outcome.verdict,
-        recordings=tuple((r.info.id, r.info.content_hash) for r in recordings),
-        calibrations=(used,) if used else (),
-        code_version=code_version,
-        simulated=job.simulated,
-        created_at=now(),
-        unit=job.unit,
-        job_id=job.id,
-        seed=job.seed,
-        context=job.context,
-        corrections=tuple(c for c in corrections if c is not None),
-    )
-    return Analysed(outcome, stored, procedure.calibrations(outcome), procedure.corrections(outcome))

@@ -10,9 +10,9 @@ from threading import Event, Thread
 from typing import Protocol
 
 from bench_service.jobs.dispatcher import JobEngine
-from bench_service.jobs.errors import NotDriving
-from bench_service.jobs.job import Job
 from bench_service.jobs.runner import JobRunner
+from bench_service.model.errors import NotDriving
+from bench_service.model.job import Job
 
 log = logging.getLogger(__name__)
 

@@ -5,10 +5,10 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
-from bench_service.jobs.campaigns.quantities import quantities
-from bench_service.jobs.campaigns.run import CampaignRun, StepState
-from bench_service.jobs.campaigns.trend import Trend
-from bench_service.jobs.job import JobState
+from bench_service.campaigns.run import CampaignRun, StepState
+from bench_service.evidence.trend import Trend
+from bench_service.model.job import JobState
+from bench_service.model.quantities import quantities
 from bench_service.pages.figures import svg
 from bench_service.pages.routes import service_of, templates
 from procedures.core.report import Figure, Series
@@ -95,7 +95,7 @@ def trend_page(
     context = {
         "serial": serial,
         "procedure": procedure,
-        "procedures": sorted(service.planner.catalog),
+        "procedures": sorted(service.catalogue.procedures),
         "quantity": chosen,
         "names": names,
         "trend": trend,

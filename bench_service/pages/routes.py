@@ -7,10 +7,10 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from fastapi.templating import Jinja2Templates
 
-from bench_service.jobs.job import FINAL, Job, JobState
-from bench_service.jobs.service import BenchService
+from bench_service.model.job import FINAL, Job, JobState
 from bench_service.pages.corrections import correction_table
 from bench_service.pages.figures import svg
+from bench_service.service import BenchService
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import TRIADS
 from procedures.core.report import Figure, Report
@@ -106,9 +106,9 @@ def home(request: Request) -> HTMLResponse:
         benches=[
             {
                 "bench": service.benches.description(bench_id),
-                "running": service.running_job(bench_id),
+                "running": service.jobs.running_job(bench_id),
                 "safety": service.safety.known(bench_id),
-                "stop": service.stores.units.bench_stop(bench_id),
+                "stop": service.stores.benches.bench_stop(bench_id),
                 "driven": service.benches.driven(bench_id),
                 "queued": queued.get(bench_id, 0),
             }
@@ -141,8 +141,8 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
         fraction=job.stations_done / stations if live is None else live.fraction,
         recordings=service.stores.recordings.of_job(job_id),
         result=result,
-        sections=_sections(service.analyses.report(result)) if result else [],
-        report=service.analyses.report(result) if result else None,
+        sections=_sections(service.catalogue.report(result)) if result else [],
+        report=service.catalogue.report(result) if result else None,
     )
 
 
@@ -151,7 +151,7 @@ def result_page(result_id: str, request: Request) -> HTMLResponse:
     """A result: verdict, checks, tables, plots, lineage."""
     service = service_of(request)
     result = service.stores.results.get(result_id)
-    report = service.analyses.report(result)
+    report = service.catalogue.report(result)
     return _page(request, "result.html", result=result, report=report, sections=_sections(report))
 
 

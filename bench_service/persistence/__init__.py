@@ -6,12 +6,12 @@
 
 from typing import TYPE_CHECKING
 
+from bench_service.persistence.bench.lease import BenchLease, acquire_lease, lease_holder
 from bench_service.persistence.database import Database
 from bench_service.persistence.engine_database import engine_database
-from bench_service.persistence.lease import BenchLease, acquire_lease, lease_holder
 
 if TYPE_CHECKING:
-    from bench_service.jobs.store import Stores
+    from bench_service.campaigns.stores import Stores
 
 __all__ = ["BenchLease", "Database", "acquire_lease", "engine_database", "lease_holder", "open_stores"]
 

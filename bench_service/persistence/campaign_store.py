@@ -10,16 +10,16 @@ from pydantic import TypeAdapter
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from bench_service.jobs.campaigns.campaign import Campaign
-from bench_service.jobs.campaigns.run import CampaignRun
-from bench_service.jobs.campaigns.schedule import Schedule
-from bench_service.jobs.errors import NameTaken, NotFound
-from bench_service.jobs.job import FINAL, JobState
-from bench_service.jobs.stored import Idempotency, Page
+from bench_service.campaigns.campaign import Campaign
+from bench_service.campaigns.run import CampaignRun
+from bench_service.campaigns.schedule import Schedule
+from bench_service.model.errors import NameTaken, NotFound
+from bench_service.model.job import FINAL, JobState
+from bench_service.model.records import Idempotency, Page
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.pages import page
-from bench_service.persistence.tables_around_jobs import CampaignRow, CampaignRunRow, ScheduleRow
+from bench_service.persistence.tables.campaigns import CampaignRow, CampaignRunRow, ScheduleRow
 
 RUN = TypeAdapter(CampaignRun)
 SCHEDULE = TypeAdapter(Schedule)
@@ -27,7 +27,7 @@ OPEN = tuple(state.value for state in JobState if state not in FINAL)
 
 
 class SqlCampaignStore:
-    """`bench_service.jobs.campaigns.store.CampaignStore`."""
+    """`bench_service.campaigns.stores.CampaignStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

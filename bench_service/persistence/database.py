@@ -22,7 +22,7 @@ from sqlalchemy.pool import QueuePool
 
 from bench_service import wall_clock
 from bench_service.formats.plain_json import read_back
-from bench_service.jobs.errors import StorageFailure, StorageFull
+from bench_service.model.errors import StorageFailure, StorageFull
 
 BUSY_S = 30.0
 """How long a writer waits for another one."""
@@ -201,7 +201,7 @@ def storage_errors() -> Generator[None, None, None]:
         raise StorageFailure(f"a value cannot be stored, or not be read again: {error}") from error
 
 
-def in_our_words(error: Exception) -> Exception:
+def as_storage_error(error: Exception) -> Exception:
     """An error of a database or its driver that others met, as `StorageFull`, `Conflict` or `StorageFailure`; any other
     error as it is."""
     if not isinstance(error, (SQLAlchemyError, sqlite3.Error)):

@@ -6,10 +6,10 @@ from typing import TypeVar
 
 from sqlalchemy.orm import Session
 
-from bench_service.jobs.errors import IdempotencyConflict
-from bench_service.jobs.stored import Idempotency
+from bench_service.model.errors import IdempotencyConflict
+from bench_service.model.records import Idempotency
 from bench_service.persistence.database import Conflict, Database
-from bench_service.persistence.tables import IdempotencyKeyRow
+from bench_service.persistence.tables.jobs import IdempotencyKeyRow
 
 T = TypeVar("T")
 
@@ -18,7 +18,7 @@ _RIVALS = 32
 
 
 class SqlKeyStore:
-    """`bench_service.jobs.store.KeyStore`."""
+    """`bench_service.jobs.stores.KeyStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

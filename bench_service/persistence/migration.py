@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection, inspect, text
 
-from bench_service.jobs.errors import StorageFailure
+from bench_service.model.errors import StorageFailure
 from bench_service.persistence.database import Database, storage_errors
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "migrations"

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 from sqlalchemy import Select
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
-from bench_service.jobs.stored import Page
+from bench_service.model.records import Page
 
 R = TypeVar("R", bound=Any)
 T = TypeVar("T")

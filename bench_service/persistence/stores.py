@@ -1,21 +1,22 @@
 """Putting the stores together: one database, all stores. Must not know who uses them."""
 
-from bench_service.jobs.store import Stores
-from bench_service.persistence.audit_store import SqlAuditTrail
+from bench_service.campaigns.stores import Stores
+from bench_service.persistence.bench.live_store import SqlLiveStore
+from bench_service.persistence.bench.prompt_store import SqlPromptStore
+from bench_service.persistence.bench.registry_store import SqlBenchRegistry
 from bench_service.persistence.campaign_store import SqlCampaignStore
-from bench_service.persistence.correction_store import SqlCorrectionStore
 from bench_service.persistence.database import Database, connect
+from bench_service.persistence.evidence.correction_store import SqlCorrectionStore
+from bench_service.persistence.evidence.recording_store import SqlRecordingStore
+from bench_service.persistence.evidence.result_store import SqlResultStore
+from bench_service.persistence.evidence.unit_store import SqlUnitStore
 from bench_service.persistence.idempotency import SqlKeyStore
-from bench_service.persistence.job_store import SqlJobStore
-from bench_service.persistence.live_store import SqlLiveStore
+from bench_service.persistence.jobs.job_store import SqlJobStore
+from bench_service.persistence.jobs.queue_store import SqlQueueStore
+from bench_service.persistence.jobs.reservation_store import SqlReservationStore
 from bench_service.persistence.migration import upgrade_to_head
-from bench_service.persistence.prompt_store import SqlPromptStore
-from bench_service.persistence.queue_store import SqlQueueStore
-from bench_service.persistence.recording_store import SqlRecordingStore
-from bench_service.persistence.reservation_store import SqlReservationStore
-from bench_service.persistence.result_store import SqlResultStore
-from bench_service.persistence.tally_store import SqlTallyStore
-from bench_service.persistence.unit_store import SqlUnitStore
+from bench_service.persistence.telemetry.audit_store import SqlAuditTrail
+from bench_service.persistence.telemetry.tally_store import SqlTallyStore
 
 
 def open_stores(database_url: str) -> tuple[Stores, Database]:
@@ -38,6 +39,7 @@ def stores_of(database: Database) -> Stores:
         recordings=SqlRecordingStore(database),
         results=SqlResultStore(database),
         units=SqlUnitStore(database),
+        benches=SqlBenchRegistry(database),
         campaigns=SqlCampaignStore(database),
         corrections=SqlCorrectionStore(database),
         live=SqlLiveStore(database),

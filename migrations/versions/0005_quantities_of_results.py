@@ -3,12 +3,12 @@
 Revision: 0005, after 0004
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import sqlalchemy as sa
 from alembic import op
-
-from bench_service.jobs.campaigns.quantities import quantities
 
 revision = "0005"
 down_revision = "0004"
@@ -18,6 +18,16 @@ depends_on = None
 ID = sa.String().with_variant(sa.String(collation="C"), "postgresql")
 AT_ONCE = 20
 """Documents in memory."""
+
+
+@dataclass(frozen=True)
+class _Quantity:
+    """A copy of the product's class as this migration landed: migrations import nothing of the product."""
+
+    name: str
+    value: float
+    unit: str
+    standard_uncertainty: float | None = None
 
 
 def upgrade() -> None:
@@ -55,5 +65,33 @@ def _known() -> Iterator[list[dict[str, object]]]:
                 "standard_uncertainty": quantity.standard_uncertainty,
             }
             for result in found
-            for quantity in quantities(result.document).values()
+            for quantity in _quantities(result.document).values()
         ]
+
+
+def _quantities(document: Mapping[str, Any]) -> dict[str, _Quantity]:
+    """Every check and every named estimate (an entry with name, unit and estimate) of a document, by name."""
+    found = {
+        check["name"]: _Quantity(
+            check["name"], check["value"], check["limit"]["unit"], check.get("standard_uncertainty")
+        )
+        for check in document.get("checks", [])
+    }
+    for entry in _entries(document):
+        found.setdefault(
+            entry["name"],
+            _Quantity(entry["name"], entry["estimate"], entry["unit"], entry.get("standard_uncertainty")),
+        )
+    return found
+
+
+def _entries(node: Any) -> Iterator[Mapping[str, Any]]:
+    """Named estimates; lists of plain numbers are long, and are not looked through."""
+    if isinstance(node, Mapping):
+        if {"name", "unit", "estimate"} <= node.keys() and isinstance(node["estimate"], int | float):
+            yield node
+        for child in node.values():
+            yield from _entries(child)
+    elif isinstance(node, list) and node and isinstance(node[0], Mapping | list):
+        for child in node:
+            yield from _entries(child)

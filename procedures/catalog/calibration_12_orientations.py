@@ -13,9 +13,8 @@ import numpy as np
 from pydantic import Field
 
 from procedures import steps
-from procedures.analysis import calibration_report as pictures
-from procedures.analysis.calibration_analysis import AccelerometerSettings, analyse_accelerometers, analyse_triad
-from procedures.analysis.calibration_plan import (
+from procedures.analysis.calibration.estimator import Weighting
+from procedures.analysis.calibration.plan import (
     TriadPlan,
     basis,
     in_run_unresolved,
@@ -24,14 +23,14 @@ from procedures.analysis.calibration_plan import (
     triad_plan,
     unresolved,
 )
-from procedures.analysis.calibration_summary import TriadSummary, coefficient_unit
-from procedures.analysis.estimator import Weighting
-from procedures.analysis.reference import INPUT_UNITS, TRIAD_NAMES
-from procedures.analysis.reference_temperature import ThermalShare
-from procedures.analysis.scalar import require_scalar_determined
-from procedures.analysis.station_means import launch_warnings
-from procedures.analysis.station_plan import THESIS_ORIENTATIONS, windows
-from procedures.analysis.table_errors import TableUncertainty
+from procedures.analysis.calibration.reference import INPUT_UNITS, TRIAD_NAMES
+from procedures.analysis.calibration.reference_temperature import ThermalShare
+from procedures.analysis.calibration.scalar import require_scalar_determined
+from procedures.analysis.calibration.station_means import launch_warnings
+from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS, windows
+from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
+from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers, analyse_triad
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
@@ -42,6 +41,7 @@ from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+from procedures.reports import calibration as pictures
 from procedures.site_parameters import TableParameters, declared_table
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]

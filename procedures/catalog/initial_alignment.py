@@ -11,8 +11,9 @@ from typing import Annotated
 from pydantic import Field
 
 from procedures import steps
+from procedures.analysis.calibration.station_plan import windows
+from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.navigation.alignment import require_alignable
-from procedures.analysis.repeated_alignment import report as pictures
 from procedures.analysis.repeated_alignment.expected import (
     ANGLES,
     TABLE,
@@ -32,8 +33,6 @@ from procedures.analysis.repeated_alignment.observed import (
     thesis_prediction,
     told_alignments,
 )
-from procedures.analysis.station_plan import windows
-from procedures.analysis.table_errors import TableUncertainty
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
@@ -43,6 +42,7 @@ from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+from procedures.reports import repeated_alignment as pictures
 from procedures.site_parameters import TableParameters, declared_table
 
 MOST_ALIGNMENTS = 500

@@ -14,13 +14,12 @@ from typing import Annotated
 from pydantic import Field
 
 from procedures import steps
-from procedures.analysis import whole_turns_report as pictures
-from procedures.analysis.reference import site_with
-from procedures.analysis.station_means import launch_warnings
-from procedures.analysis.table_errors import TableUncertainty
-from procedures.analysis.whole_turns import TERMS, Term
-from procedures.analysis.whole_turns_plan import TurnPlan, TurnProgram, bench_time_s, coefficient_names, too_coarse
-from procedures.analysis.whole_turns_summary import WholeTurns, analyse_turns
+from procedures.analysis.calibration.reference import site_with
+from procedures.analysis.calibration.station_means import launch_warnings
+from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.turns.fit import TERMS, Term
+from procedures.analysis.turns.plan import TurnPlan, TurnProgram, bench_time_s, coefficient_names, too_coarse
+from procedures.analysis.turns.summary import WholeTurns, analyse_turns
 from procedures.bench import Bench, BenchDescription
 from procedures.bench.imu import Stream
 from procedures.core import units
@@ -32,6 +31,7 @@ from procedures.core.report import Report
 from procedures.core.site import Site
 from procedures.core.turn import PEAK_ACCELERATION
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+from procedures.reports import whole_turns as pictures
 from procedures.site_parameters import Arcsec
 
 Rate = Annotated[float, Field(ge=0.1, le=3600.0)]

@@ -11,8 +11,8 @@ from math import ceil
 from pydantic import Field
 
 from procedures import steps
+from procedures.analysis.calibration.station_plan import windows
 from procedures.analysis.launch.prediction import predicted_noise, unresolved_noise
-from procedures.analysis.station_plan import windows
 from procedures.analysis.wavelet_split import shortest_s
 from procedures.bench import Bench
 from procedures.bench.imu import Stream

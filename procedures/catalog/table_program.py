@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from procedures import steps
-from procedures.analysis.station_plan import move_time_s, windows
+from procedures.analysis.calibration.station_plan import move_time_s, windows
 from procedures.analysis.table_program.dialect import DELAY_MAX_S, Dwell, read_program, refusal
 from procedures.analysis.table_program.recorded import DwellRecord, channel_noise, dwell_records, mean_sd
 from procedures.analysis.table_program.writing import THESIS_POSITIONS, dwells_at, write_program

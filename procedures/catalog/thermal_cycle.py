@@ -12,15 +12,14 @@ from typing import Literal
 from pydantic import Field
 
 from procedures import steps
-from procedures.analysis.reference import site_with
-from procedures.analysis.thermal import cycle_figures, cycle_tables
-from procedures.analysis.thermal.cycle_analysis import KnownOfUnit, analyse_cycle
-from procedures.analysis.thermal.cycle_checks import CycleLimits, cycle_checks
-from procedures.analysis.thermal.cycle_results import ThermalCycle
-from procedures.analysis.thermal.cycle_runs import CycleSettings
-from procedures.analysis.thermal.cycle_series import read_cycle
+from procedures.analysis.calibration.reference import site_with
+from procedures.analysis.thermal.cycle.analysis import KnownOfUnit, analyse_cycle
+from procedures.analysis.thermal.cycle.checks import CycleLimits, cycle_checks
+from procedures.analysis.thermal.cycle.results import ThermalCycle
+from procedures.analysis.thermal.cycle.runs import CycleSettings
+from procedures.analysis.thermal.cycle.series import read_cycle
 from procedures.analysis.thermal.regime import RegimeSettings
-from procedures.analysis.whole_turns_plan import UPRIGHT
+from procedures.analysis.turns.plan import UPRIGHT
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
@@ -33,6 +32,7 @@ from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, Tempe
 from procedures.core.thermal_correction import Form
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
 from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
+from procedures.reports import thermal_figures, thermal_tables
 
 LEAST_OFF_S = 3.0 * units.HOUR
 """Thesis 4.2.1: at least three hours off between runs."""
@@ -238,7 +238,7 @@ def uses_corrections(params: Params) -> tuple[CorrectionKind, ...]:
 def report(result: Result) -> Report:
     """Tables 4.3 to 4.7 and figures 3.15 to 3.17 and 4.11 to 4.16 of the thesis, in our words."""
     cycle = result.cycle
-    return Report(cycle_tables.summary(cycle), (*cycle_tables.tables(cycle), *cycle_figures.figures(cycle)))
+    return Report(thermal_tables.summary(cycle), (*thermal_tables.tables(cycle), *thermal_figures.figures(cycle)))
 
 
 def _up(recording: Recording, context: Context) -> int:

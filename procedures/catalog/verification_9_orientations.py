@@ -12,19 +12,18 @@ import numpy as np
 from pydantic import Field
 
 from procedures import steps
-from procedures.analysis import calibration_report as pictures
-from procedures.analysis.calibration_plan import TriadPlan, basis, in_run_unresolved, triad_plan
-from procedures.analysis.reference import TRIAD_NAMES
-from procedures.analysis.station_means import launch_warnings
-from procedures.analysis.station_plan import windows
-from procedures.analysis.table_errors import TableUncertainty
-from procedures.analysis.verification import predicted_sd
-from procedures.analysis.verification_analysis import (
+from procedures.analysis.calibration.plan import TriadPlan, basis, in_run_unresolved, triad_plan
+from procedures.analysis.calibration.reference import TRIAD_NAMES
+from procedures.analysis.calibration.station_means import launch_warnings
+from procedures.analysis.calibration.station_plan import windows
+from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.calibration.triad_verification import (
     TriadVerification,
     calibration_of,
     planned_covariance,
     verify_triad,
 )
+from procedures.analysis.calibration.verification import predicted_sd
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
@@ -34,6 +33,7 @@ from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+from procedures.reports import calibration as pictures
 from procedures.site_parameters import Arcsec, SiteParameters, declared_site
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]

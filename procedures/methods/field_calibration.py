@@ -12,10 +12,10 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from procedures.analysis.calibration_analysis import noise_of_means
+from procedures.analysis.calibration.reference import INPUT_UNITS, reference_vectors
+from procedures.analysis.calibration.station_means import StationMeans, station_means
+from procedures.analysis.calibration.triad_analysis import noise_of_means
 from procedures.analysis.field.fit import FieldFit, FieldModel, FieldUncertainty, fit_field
-from procedures.analysis.reference import INPUT_UNITS, reference_vectors
-from procedures.analysis.station_means import StationMeans, station_means
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording

@@ -10,6 +10,8 @@ import numpy as np
 from pydantic import Field
 from scipy.linalg import block_diag
 
+from procedures.analysis.calibration.station_means import StationMeans, station_means
+from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.navigation.alignment import (
     InitialAttitude,
     azimuth_error,
@@ -17,8 +19,6 @@ from procedures.analysis.navigation.alignment import (
     require_alignable,
 )
 from procedures.analysis.navigation.instrument_errors import calibrated_triad
-from procedures.analysis.station_means import StationMeans, station_means
-from procedures.analysis.station_noise import triad_covariance
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, Undetermined, UnfitRecording

@@ -12,12 +12,12 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS
+from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.orientation_plan import comparison
 from procedures.analysis.orientation_plan.comparison import Requirements, ScoredPlan, Setting
 from procedures.analysis.orientation_plan.information import Model, Objective
 from procedures.analysis.orientation_plan.search import SearchSettings, best_orientations
-from procedures.analysis.station_plan import THESIS_ORIENTATIONS
-from procedures.analysis.table_errors import TableUncertainty
 from procedures.core import units
 from procedures.core.errors import BadParameter
 from procedures.core.frames import orientation_beta_gamma

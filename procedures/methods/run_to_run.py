@@ -4,7 +4,7 @@ from math import sqrt
 
 from pydantic import Field
 
-from procedures.analysis.run_to_run import Scatter, run_to_run
+from procedures.analysis.calibration.run_to_run import Scatter, run_to_run
 from procedures.core import units
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration

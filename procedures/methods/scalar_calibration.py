@@ -9,12 +9,12 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from procedures.analysis.calibration_analysis import noise_of_means
-from procedures.analysis.reference import INPUT_UNITS
-from procedures.analysis.scalar import PARAMETERS, ScalarFit, fit_scalar, nominal_start, start_from_data
-from procedures.analysis.station_means import station_means
-from procedures.analysis.station_noise import triad_covariance
-from procedures.analysis.still import StillSettings, pose_means, still_stretches
+from procedures.analysis.calibration.reference import INPUT_UNITS
+from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, fit_scalar, nominal_start, start_from_data
+from procedures.analysis.calibration.station_means import station_means
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.still import StillSettings, pose_means, still_stretches
+from procedures.analysis.calibration.triad_analysis import noise_of_means
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording

@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from bench_service.jobs.stored import NewRecording
+from bench_service.model.records import NewRecording
 from bench_service.persistence import open_stores
 from bench_service.wall_clock import monotonic_s
 from procedures.analysis.thermal.fit import fit_correction

@@ -238,7 +238,7 @@ def test_gravity_has_no_silent_default():
 
 def drawn_covariances(stations: object) -> tuple[np.ndarray, np.ndarray]:
     """Covariances of the means at the windows that `station_recordings` gives: 70 s from 10 s on, 5 s between."""
-    from procedures.analysis.station_noise import triad_covariance
+    from procedures.analysis.calibration.station_noise import triad_covariance
 
     n = len(stations)  # pyright: ignore
     windows = [[10.0 + 75.0 * i, 80.0 + 75.0 * i] for i in range(n)]

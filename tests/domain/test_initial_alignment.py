@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.repeated_alignment.expected import expected_errors, planned_alignments, reference_attitudes
 from procedures.analysis.repeated_alignment.observed import alignment_errors, found_attitudes, recorded_alignments
-from procedures.analysis.table_errors import TableUncertainty
 from procedures.catalog import discover
 from procedures.core import units
 from procedures.core.errors import BadParameter, DomainError, UnfitRecording

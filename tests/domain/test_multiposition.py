@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from procedures.analysis.bounds import bayesian_bound, cramer_rao_bound
-from procedures.analysis.estimator import Weighting, estimator, joint_table_covariance, table_share
-from procedures.analysis.multiposition import TriadFit, fit_triad
-from procedures.analysis.reference import reference_vectors
-from procedures.analysis.station_noise import mean_covariance
-from procedures.analysis.table_errors import TableErrors, TableUncertainty, table_errors
+from procedures.analysis.calibration.estimator import Weighting, estimator, joint_table_covariance, table_share
+from procedures.analysis.calibration.multiposition import TriadFit, fit_triad
+from procedures.analysis.calibration.reference import reference_vectors
+from procedures.analysis.calibration.station_noise import mean_covariance
+from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
 from procedures.core.errors import Undetermined
 from procedures.core.frames import orientation_beta_gamma
 from procedures.core.recording import Station
@@ -26,6 +25,7 @@ from tests.domain.forward_model import (
     Table,
     random_table,
 )
+from tests.validation.bounds import bayesian_bound, cramer_rao_bound
 
 N = 250
 BETA_GAMMA = [(0, -90), (0, 90), (90, 0), (-90, 0), (0, 0), (180, 0)]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from procedures.analysis.noise_scale import noise_factor
+from procedures.analysis.calibration.noise_scale import noise_factor
 
 
 def test_on_an_ideal_table_it_is_chi_square_over_its_degrees():

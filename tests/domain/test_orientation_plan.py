@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from procedures.analysis.estimator import estimator, table_share
+from procedures.analysis.calibration.estimator import estimator, table_share
+from procedures.analysis.calibration.scalar import fit_scalar, nominal_start
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS, windows
+from procedures.analysis.calibration.table_errors import TableUncertainty, table_errors
 from procedures.analysis.orientation_plan import comparison
 from procedures.analysis.orientation_plan.comparison import Requirements, Setting
 from procedures.analysis.orientation_plan.information import (
@@ -16,10 +20,6 @@ from procedures.analysis.orientation_plan.information import (
     unit_vectors,
 )
 from procedures.analysis.orientation_plan.search import SearchSettings, best_orientations, grid
-from procedures.analysis.scalar import fit_scalar, nominal_start
-from procedures.analysis.station_noise import triad_covariance
-from procedures.analysis.station_plan import THESIS_ORIENTATIONS, windows
-from procedures.analysis.table_errors import TableUncertainty, table_errors
 from procedures.core import units
 from procedures.core.errors import BadParameter, Undetermined
 from procedures.core.frames import orientation_beta_gamma

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from procedures.analysis.still import StillSettings, still_stretches
+from procedures.analysis.calibration.still import StillSettings, still_stretches
 from procedures.core.recording import ACCELEROMETER, Channel, MemoryRecording, Quantity, RecordingInfo
 from procedures.methods.scalar_calibration import METHOD, Result
 from procedures.procedure import Evidence

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from procedures.analysis.calibration_analysis import AccelerometerSettings, analyse_accelerometers
-from procedures.analysis.station_noise import triad_covariance
-from procedures.analysis.table_errors import TableUncertainty
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers
 from procedures.catalog.calibration_12_orientations import PROCEDURE, Params, schedule
 from procedures.core.converter import ConverterModel, Normalised
 from procedures.core.errors import BadParameter, MissingChannel

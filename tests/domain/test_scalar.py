@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import rq
 
-from procedures.analysis.reference import reference_vectors
-from procedures.analysis.scalar import (
+from procedures.analysis.calibration.reference import reference_vectors
+from procedures.analysis.calibration.scalar import (
     fit_scalar,
     linear_coefficients,
     nominal_start,

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import binom, chi2
 
 from procedures.analysis.allan.deviation import deviation
-from procedures.analysis.self_heating import SelfHeating, fit_self_heating
+from procedures.analysis.warm_up.self_heating import SelfHeating, fit_self_heating
 from procedures.core.errors import BadParameter, UnfitRecording
 from tests.validation.conditioning_noise import ACCELEROMETER, HOURS_6, STATIONARY, noise_cells
 

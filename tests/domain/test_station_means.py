@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from procedures.analysis.station_means import station_means
+from procedures.analysis.calibration.station_means import station_means
 from procedures.core.errors import MissingChannel, UnfitRecording
 from procedures.core.recording import ACCELEROMETER, GYRO, Channel, MemoryRecording, Quantity, RecordingInfo
 from procedures.core.units import ARCSEC

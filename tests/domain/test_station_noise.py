@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from procedures.analysis.station_noise import mean_covariance, triad_covariance
+from procedures.analysis.calibration.station_noise import mean_covariance, triad_covariance
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.unit import TriadRecord
 

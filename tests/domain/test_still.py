@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from procedures.analysis.still import Stretch, moving_variance, pose_means, still_stretches
+from procedures.analysis.calibration.still import Stretch, moving_variance, pose_means, still_stretches
 from procedures.core.errors import UnfitRecording
 
 

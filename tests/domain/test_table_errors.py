@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from procedures.analysis.reference import reference_vectors
-from procedures.analysis.table_errors import TableUncertainty, table_errors
+from procedures.analysis.calibration.reference import reference_vectors
+from procedures.analysis.calibration.table_errors import TableUncertainty, table_errors
 from procedures.core import units
 from procedures.core.recording import Station
 from procedures.core.table_angles import TableAngles

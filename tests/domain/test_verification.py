@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from procedures.analysis.reference import reference_vectors
-from procedures.analysis.station_noise import mean_covariance
-from procedures.analysis.verification import chi_square_p, error_covariance, magnitudes, predicted_sd
+from procedures.analysis.calibration.reference import reference_vectors
+from procedures.analysis.calibration.station_noise import mean_covariance
+from procedures.analysis.calibration.verification import chi_square_p, error_covariance, magnitudes, predicted_sd
 from procedures.core.imu_model import triad_calibration
 from procedures.core.table_angles import TableAngles
 from tests.domain.forward_model import ACCELEROMETER_NOISE, B_ACCELEROMETER, K_ACCELEROMETER, SITE

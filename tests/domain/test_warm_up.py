@@ -5,8 +5,8 @@ import pytest
 from scipy.fft import dct
 from scipy.stats import binom, chi2
 
+from procedures.analysis.calibration.station_noise import mean_covariance
 from procedures.analysis.coloured_noise import cosine_series, fit_noise, unit_variances
-from procedures.analysis.station_noise import mean_covariance
 from procedures.analysis.warm_up.end import WarmUp, find_warm_up
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.noise import NoiseCoefficients

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from procedures.analysis.table_errors import TableUncertainty
-from procedures.analysis.whole_turns import TERMS, Term, fit_turns, turning
-from procedures.analysis.whole_turns_plan import UPRIGHT, TurnPlan, TurnProgram, bench_time_s, longer_needed
+from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.turns.fit import TERMS, Term, fit_turns, turning
+from procedures.analysis.turns.plan import UPRIGHT, TurnPlan, TurnProgram, bench_time_s, longer_needed
 from procedures.bench.description import AxisLimits
 from procedures.catalog.scale_factor_whole_turns import PROCEDURE
 from procedures.core import units

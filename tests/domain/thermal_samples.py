@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from procedures.analysis.whole_turns_plan import UPRIGHT
+from procedures.analysis.turns.plan import UPRIGHT
 from procedures.core.imu_model import triad_calibration
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import ACCELEROMETER, GYRO, Channel, MemoryRecording, Quantity, RecordingInfo, Station

@@ -10,11 +10,11 @@ from typing import Any
 
 import httpx
 
+from bench_service.bench.devices import DeviceState
 from bench_service.drivers.device_register import DeviceRegister
-from bench_service.jobs.devices import DeviceState
-from bench_service.jobs.stored import BenchStop
+from bench_service.model.records import BenchStop
 from bench_service.persistence import open_stores
-from bench_service.persistence.host_files import HostFiles
+from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.wall_clock import monotonic_s, now, pause
 
 
@@ -118,7 +118,7 @@ class BenchProcess:
         """What another process does that has the database, and is asked to stop the bench."""
         stores, database = open_stores(self.environment["BENCH_DATABASE_URL"])
         try:
-            stores.units.stop_bench(BenchStop("sim", now(), "a test"))
+            stores.benches.stop_bench(BenchStop("sim", now(), "a test"))
         finally:
             database.dispose()
 

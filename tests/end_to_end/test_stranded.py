@@ -136,7 +136,7 @@ def test_a_job_that_takes_the_service_down_too_often_or_never_began(
     chosen = second.submit(procedure="no_operation")
     second.end()
     stores, database = open_stores(sqlite_url)
-    stores.units.release_bench("sim")
+    stores.benches.release_bench("sim")
     entry = stores.queue.look("sim", now()).next()
     assert entry is not None
     assert stores.queue.claim(entry, stores.jobs.get(chosen).context, now()) is not None  # and here the process died

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bench_service.jobs.supervisor import HUNG_S
+from bench_service.bench.supervisor import HUNG_S
 from bench_service.wall_clock import monotonic_s, pause
 from tests.end_to_end.bench_process import BenchProcess, one_master_at_a_time
 

@@ -8,12 +8,12 @@ import httpx
 import pytest
 from fastapi import Request
 
-from bench_service.api.bodies import BODY_BYTES
-from bench_service.api.errors import FieldError, respond
+from bench_service.api.http.bodies import BODY_BYTES
+from bench_service.api.http.errors import FieldError, respond
+from bench_service.campaigns.campaign import Campaign
 from bench_service.formats.plain_json import DEPTH
-from bench_service.jobs.audit import record
-from bench_service.jobs.campaigns.campaign import Campaign
 from bench_service.persistence import open_stores
+from bench_service.telemetry.audit import record
 from bench_service.wall_clock import now
 from tests.service.campaigns import named
 from tests.service.client import Client

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from bench_service.bench.session import BenchSession
 from bench_service.cli.client import connect
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.jobs.runner import JobRunner
-from bench_service.jobs.session import BenchSession
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from tests.database_away import Port

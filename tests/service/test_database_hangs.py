@@ -9,16 +9,16 @@ from typing import Any
 
 import pytest
 
+from bench_service.bench import session
+from bench_service.bench.processes import Driving
+from bench_service.bench.session import BenchSession, ShuttingDown
+from bench_service.bench.supervisor import Supervisor
 from bench_service.cli.client import connect
 from bench_service.drivers.registered import RegisteredDevices
-from bench_service.jobs import session
-from bench_service.jobs.processes import Driving
 from bench_service.jobs.runner import StepOutcome
-from bench_service.jobs.service import BenchService
-from bench_service.jobs.session import BenchSession, ShuttingDown
-from bench_service.jobs.supervisor import Supervisor
 from bench_service.persistence import acquire_lease, open_stores
-from bench_service.persistence.safety_books import SqlSafetyBooks
+from bench_service.persistence.bench.safety_books import SqlSafetyBooks
+from bench_service.service import BenchService
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from procedures.bench import Bench

@@ -5,8 +5,8 @@ from xml.etree import ElementTree
 
 import pytest
 
+from bench_service.campaigns.shipped import shipped
 from bench_service.drivers.simulated import SimulatedDriver
-from bench_service.jobs.campaigns.shipped import shipped
 from procedures import catalog
 from procedures.procedure import Context
 from tests.service.campaigns import SCALED_DOWN, SHORT, add, ended, named, start

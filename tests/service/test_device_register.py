@@ -13,14 +13,14 @@ from typing import Any
 
 import pytest
 
+from bench_service.bench.devices import AT_REST, MOVING
 from bench_service.drivers.device_cables import DeviceCables
 from bench_service.drivers.device_faults import DeviceFaults, FaultPlan
 from bench_service.drivers.device_journal import KEPT, ROTATE_BYTES
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.drivers.simulated import SimulatedDriver
-from bench_service.jobs.devices import AT_REST, MOVING
-from bench_service.jobs.errors import Misconfigured
+from bench_service.model.errors import Misconfigured
 from procedures.bench import Bench, BenchNeeds
 from procedures.bench.errors import DeviceBusy, DeviceFault, Disconnected, OutOfRange
 from procedures.core.table_angles import TableAngles

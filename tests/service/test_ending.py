@@ -12,7 +12,7 @@ import uvicorn
 from fastapi import FastAPI
 from starlette.responses import StreamingResponse
 
-from bench_service.api import errors
+from bench_service.api.http import errors
 from bench_service.wall_clock import pause
 
 

@@ -7,10 +7,10 @@ from xml.etree import ElementTree
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench_service.jobs.campaigns.campaign import Campaign
-from bench_service.jobs.campaigns.junit import document
-from bench_service.jobs.campaigns.run import ENDED, CampaignRun, StepRun, StepState
-from bench_service.jobs.job import JobState
+from bench_service.campaigns.campaign import Campaign
+from bench_service.campaigns.junit import document
+from bench_service.campaigns.run import ENDED, CampaignRun, StepRun, StepState
+from bench_service.model.job import JobState
 from procedures.core.limits import Limit, Verdict, check
 from tests.service.junit_readers import assert_readable
 

@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 
+from bench_service.bench.devices import AT_REST, DeviceState
 from bench_service.cli.client import connect
 from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.drivers.simulated import SimulatedDriver
-from bench_service.jobs.devices import AT_REST, DeviceState
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from procedures.bench import BenchNeeds

@@ -3,7 +3,7 @@
 import pytest
 import sqlalchemy as sa
 
-from bench_service.persistence.tables import JobRow
+from bench_service.persistence.tables.jobs import JobRow
 from tests.service.client import Client
 
 WORDS = {

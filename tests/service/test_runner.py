@@ -9,22 +9,23 @@ from typing import Any
 
 import pytest
 
+from bench_service.bench.directory import BenchDirectory
+from bench_service.bench.safety import SafetyService
+from bench_service.bench.session import ShuttingDown
+from bench_service.campaigns.stores import Stores
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
-from bench_service.jobs.directory import BenchDirectory
+from bench_service.evidence.catalogue import Catalogue
 from bench_service.jobs.dispatcher import Dispatcher, Unfinished
-from bench_service.jobs.errors import NotReady
-from bench_service.jobs.job import Failure, Job, JobState
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue import RunningJob
-from bench_service.jobs.request import JobRequest
 from bench_service.jobs.runner import JobRunner, StepOutcome
-from bench_service.jobs.safety import SafetyDesk
-from bench_service.jobs.service import BenchService
-from bench_service.jobs.session import ShuttingDown
-from bench_service.jobs.store import Stores
 from bench_service.jobs.worker import Worker
+from bench_service.model.errors import NotReady
+from bench_service.model.job import Failure, Job, JobState
+from bench_service.model.request import JobRequest
 from bench_service.persistence import open_stores
+from bench_service.service import BenchService
 from bench_service.wall_clock import new_id, now, pause
 from procedures.bench import Bench, BenchNeeds
 from procedures.bench.errors import DeviceFault
@@ -104,17 +105,24 @@ def stores(sqlite_url: str) -> Generator[Stores]:
     database.dispose()
 
 
+def planner_of(stores: Stores, driver: SimulatedDriver) -> Planner:
+    benches = BenchDirectory(stores.benches, stores.units, driver, "sim", drawn_unit, lambda _: "this process")
+    return Planner(stores.units, benches, Catalogue())
+
+
+def safety_of(stores: Stores, driver: SimulatedDriver) -> SafetyService:
+    return SafetyService(stores.benches, lambda _: driver, lambda _: NoWatch(), stores.jobs.note)
+
+
 def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], bool]) -> tuple[JobRunner, Job]:
     """A runner, and a job of its that has begun."""
-    planner = Planner(stores, BenchDirectory(stores.units, driver, "sim", drawn_unit, lambda _: "this process"))
+    planner = planner_of(stores, driver)
     runner = JobRunner(stores, planner, driver, "test", lease_held)
     worker = Worker(runner, lambda _: IdleEngine(), lambda *_: IdleDispatcher())
-    service = BenchService(
-        stores, driver, planner, worker, "test", SafetyDesk(stores, lambda _: driver, lambda _: NoWatch())
-    )
+    service = BenchService(stores, driver, planner, worker, "test", safety_of(stores, driver))
     service.register()
     service.begin()
-    job = service.submit(JobRequest("calibration_12_orientations", "SIM-0001", parameters=FAST, seed=1))
+    job = service.jobs.submit(JobRequest("calibration_12_orientations", "SIM-0001", parameters=FAST, seed=1))
     entry = stores.queue.look("sim", now()).next()
     assert entry is not None
     assert runner.claim(entry) is not None
@@ -159,15 +167,13 @@ def test_a_bench_is_made_safe_after_a_restart_in_which_nothing_was_driven(stores
 
 def test_an_engine_that_does_not_start_is_told_to_whoever_needs_it(stores: Stores) -> None:
     driver = SimulatedDriver("sim")
-    planner = Planner(stores, BenchDirectory(stores.units, driver, "sim", drawn_unit, lambda _: "this process"))
+    planner = planner_of(stores, driver)
 
     def fail(_: JobRunner) -> IdleEngine:
         raise OSError("no books")
 
     worker = Worker(JobRunner(stores, planner, driver, "test", lambda: True), fail, lambda *_: IdleDispatcher())
-    service = BenchService(
-        stores, driver, planner, worker, "test", SafetyDesk(stores, lambda _: driver, lambda _: NoWatch())
-    )
+    service = BenchService(stores, driver, planner, worker, "test", safety_of(stores, driver))
     service.register()
     service.begin()
     with pytest.raises(NotReady, match="did not start: no books"):

@@ -8,13 +8,13 @@ from pathlib import Path
 import httpx
 import pytest
 
+from bench_service.bench import safety
+from bench_service.bench.processes import ProcessIdentity
 from bench_service.cli.client import connect
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver
-from bench_service.jobs import safety
-from bench_service.jobs.processes import ProcessIdentity
 from bench_service.persistence import open_stores
-from bench_service.persistence.host_files import HostFiles
+from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.settings import Settings
 from bench_service.wall_clock import now
 from tests.service.client import Client
@@ -31,7 +31,7 @@ def url(tmp_path: Path) -> str:
 def reader(url: str) -> Generator[httpx.Client]:
     """A service that drives nothing, on the bench's host."""
     stores, database = open_stores(url)
-    stores.units.put_bench(SimulatedDriver("sim").description)
+    stores.benches.put_bench(SimulatedDriver("sim").description)
     database.dispose()
     with connect(Settings(database_url=url), None, drive=False) as http:
         yield http
@@ -95,7 +95,7 @@ def test_of_a_bench_on_another_host_only_that_host_can_say_that_it_is_safe(
     assert refused.status_code == 409
     assert "nobody on theirs has said that they are safe" in refused.json()["detail"]
     stores, database = open_stores(url)
-    stores.units.confirm_safe("sim", now(), "the supervisor, process 1 on bench-host")
+    stores.benches.confirm_safe("sim", now(), "the supervisor, process 1 on bench-host")
     database.dispose()
     said = reader.get(BENCH).json()["safety"]
     assert said["safe"] is True

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from bench_service import wall_clock
+from bench_service.bench.devices import DeviceState
+from bench_service.bench.processes import Driving, ProcessIdentity
+from bench_service.bench.supervisor import Supervisor
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
-from bench_service.jobs.devices import DeviceState
-from bench_service.jobs.errors import BenchBusy, StorageFailure
-from bench_service.jobs.processes import Driving, ProcessIdentity
-from bench_service.jobs.supervisor import Supervisor
+from bench_service.model.errors import BenchBusy, StorageFailure
 from bench_service.wall_clock import monotonic_s, pause
 from procedures.bench.errors import DeviceFault
 from tests.service.test_safety import abandoned
@@ -93,7 +93,7 @@ def identity(worker: subprocess.Popen[bytes]) -> ProcessIdentity:
 
 
 def started(pid: int) -> str:
-    from bench_service.jobs import processes
+    from bench_service.bench import processes
 
     return processes._started(pid)
 

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from bench_service.bench import session
+from bench_service.bench.watchdog import Patience, Watchdog
+from bench_service.campaigns.stores import Stores
 from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver
-from bench_service.jobs import session
-from bench_service.jobs.job import Job, JobState
 from bench_service.jobs.runner import JobRunner
-from bench_service.jobs.store import Stores
-from bench_service.jobs.watchdog import Patience, Watchdog
+from bench_service.model.job import Job, JobState
 from bench_service.persistence import open_stores
 from bench_service.wall_clock import monotonic_s
 from procedures.bench import Bench, BenchNeeds
@@ -106,7 +106,7 @@ def test_a_table_that_does_not_answer_is_named_and_the_bench_made_safe(
     assert not safe(driver)
     assert runner.make_safe(job.id).good
     assert safe(driver)
-    assert stores.units.bench_stop("sim") is None
+    assert stores.benches.bench_stop("sim") is None
     notes = str(stores.jobs.events(job.id))
     assert ("made safe over a new link" in notes) == (how is lost)
     second = SimulatedDriver("sim", register=DeviceRegister(tmp_path, "sim"))
@@ -145,7 +145,7 @@ def test_a_bench_that_cannot_be_made_safe_is_not_free_until_a_person_releases_it
     assert outcome.failure is not None
     assert outcome.failure.kind == "NotSafe"
     assert "nothing answers on the table's line" in outcome.failure.message
-    stop = stores.units.bench_stop("sim")
+    stop = stores.benches.bench_stop("sim")
     assert stop is not None
     assert stop.reason.startswith("could not be made safe: the turntable has not answered")
     runner.end_early(job.id, outcome)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from procedures import steps
-from procedures.analysis.thermal.cycle_series import read_cycle
-from procedures.analysis.whole_turns_plan import UPRIGHT
+from procedures.analysis.thermal.cycle.series import read_cycle
+from procedures.analysis.turns.plan import UPRIGHT
 from procedures.bench.errors import BenchError, DeviceFault, Disconnected, SoakNotReached
 from procedures.bench.imu import Stream
 from procedures.core.recording import MemoryRecording, RecordingInfo, Station

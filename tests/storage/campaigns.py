@@ -5,15 +5,15 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
-from bench_service.jobs.analyses import AnalysisDesk
-from bench_service.jobs.campaigns.campaign import Campaign
-from bench_service.jobs.campaigns.conductor import Conductor
-from bench_service.jobs.campaigns.run import CampaignRun, StepRun
-from bench_service.jobs.job import Failure, Job, JobState
-from bench_service.jobs.planning import Planner
-from bench_service.jobs.request import JobRequest, fingerprint
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import Idempotency, StoredResult
+from bench_service.campaigns.campaign import Campaign
+from bench_service.campaigns.conductor import Conductor
+from bench_service.campaigns.run import CampaignRun, StepRun
+from bench_service.campaigns.stores import Stores
+from bench_service.evidence.analyses import AnalysisService
+from bench_service.evidence.catalogue import Catalogue
+from bench_service.model.job import Failure, Job, JobState
+from bench_service.model.records import Idempotency, StoredResult
+from bench_service.model.request import JobRequest, fingerprint
 from bench_service.wall_clock import new_id
 from procedures.core.limits import Verdict
 
@@ -43,8 +43,8 @@ class Laboratory:
 
     def conductor(self, fire: Callable[[], None] = lambda: None) -> Conductor:
         """One of any number."""
-        planner = Planner(self.stores, None)  # pyright: ignore[reportArgumentType]  no bench is asked
-        return Conductor(self.stores, self.submit, self.cancel, AnalysisDesk(self.stores, planner, "abc"), fire)
+        analyses = AnalysisService(self.stores, Catalogue(), self.stores.jobs.get, "abc")
+        return Conductor(self.stores, self.submit, self.cancel, analyses, fire)
 
     def submit(self, request: JobRequest, key: str) -> Job:
         self.requests.append(request)

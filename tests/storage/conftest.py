@@ -6,9 +6,9 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from bench_service.jobs.job import Job, JobState
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import NewRecording, StoredResult
+from bench_service.campaigns.stores import Stores
+from bench_service.model.job import Job, JobState
+from bench_service.model.records import NewRecording, StoredResult
 from bench_service.persistence import Database, open_stores
 from bench_service.wall_clock import new_id
 from procedures.core.limits import Verdict

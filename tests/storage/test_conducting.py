@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from bench_service.jobs.campaigns.run import CampaignRun, StepState
-from bench_service.jobs.errors import NotDriving
-from bench_service.jobs.job import Job, JobState
-from bench_service.jobs.request import JobRequest
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import BenchStop
+from bench_service.campaigns.run import CampaignRun, StepState
+from bench_service.campaigns.stores import Stores
+from bench_service.model.errors import NotDriving
+from bench_service.model.job import Job, JobState
+from bench_service.model.records import BenchStop
+from bench_service.model.request import JobRequest
 from bench_service.wall_clock import now
 from procedures.core.limits import Verdict
 from tests.storage.campaigns import NOW, Laboratory, campaign, new_run, value_check
@@ -83,7 +83,7 @@ def test_a_job_that_a_person_cancels_is_not_tried_again_one_of_a_stopped_bench_i
     (job,) = laboratory.jobs()
     laboratory.stores.jobs.transition(job.id, JobState.RUNNING, at=NOW)
     if stopped:
-        laboratory.stores.units.stop_bench(BenchStop("sim", NOW, "smoke"))
+        laboratory.stores.benches.stop_bench(BenchStop("sim", NOW, "smoke"))
     laboratory.stores.jobs.request_cancel(job.id, NOW)
     laboratory.stores.jobs.transition(job.id, JobState.CANCELLED, at=NOW)
     laboratory.conductor().advance(run.id)
@@ -93,13 +93,13 @@ def test_a_job_that_a_person_cancels_is_not_tried_again_one_of_a_stopped_bench_i
         assert run.steps[0].reason == f"job {job.id} was cancelled"
     else:
         assert (run.state, states(run), len(laboratory.jobs())) == (JobState.RUNNING, ["queued"], 1)
-        laboratory.stores.units.release_bench("sim")
+        laboratory.stores.benches.release_bench("sim")
         laboratory.conductor().advance(run.id)
         assert [j.state for j in laboratory.jobs()] == [JobState.CANCELLED, JobState.QUEUED]
 
 
 def test_the_log_tells_what_became_of_steps_and_run(laboratory: Laboratory, caplog: pytest.LogCaptureFixture) -> None:
-    caplog.set_level("INFO", logger="bench_service.jobs.campaigns.told")
+    caplog.set_level("INFO", logger="bench_service.campaigns.run_log")
     run = laboratory.done(new_run(campaign({"retries": 1}, {})), "DeviceFault", PASS, FAIL)
     said = [record.getMessage() for record in caplog.records]
     assert said[0] == f"campaign run {run.id} of trial on U-1 is running"
@@ -163,15 +163,15 @@ def test_a_value_out_of_the_units_history(laboratory: Laboratory, outcome: str) 
 
 
 def test_a_stopped_bench_is_waited_for_and_said(laboratory: Laboratory) -> None:
-    units, campaigns = laboratory.stores.units, laboratory.stores.campaigns
-    units.stop_bench(BenchStop("sim", NOW, "smoke"))
+    benches, campaigns = laboratory.stores.benches, laboratory.stores.campaigns
+    benches.stop_bench(BenchStop("sim", NOW, "smoke"))
     run = laboratory.done(new_run(campaign({})))
     assert (run.state, laboratory.jobs()) == (JobState.RUNNING, [])
     assert "smoke" in run.waiting
     revision = run.revision
     laboratory.conductor().advance(run.id)
     assert campaigns.run(run.id).revision == revision  # it does not say so again and again
-    units.release_bench("sim")
+    benches.release_bench("sim")
     laboratory.conductor().advance(run.id)
     assert (len(laboratory.jobs()), campaigns.run(run.id).waiting) == (1, "")
 

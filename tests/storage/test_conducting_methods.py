@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
-from bench_service.jobs.analyses import AnalysisDesk, AnalysisRequest
-from bench_service.jobs.campaigns import conductor as conducting
-from bench_service.jobs.campaigns.conductor import Conductor
-from bench_service.jobs.campaigns.run import CampaignRun, StepState
-from bench_service.jobs.errors import StorageFailure
-from bench_service.jobs.job import Job, JobState
-from bench_service.jobs.request import fingerprint
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import Idempotency, StoredResult
+from bench_service.campaigns import conductor as conducting
+from bench_service.campaigns.conductor import Conductor
+from bench_service.campaigns.run import CampaignRun, StepState
+from bench_service.campaigns.stores import Stores
+from bench_service.evidence.analyses import AnalysisRequest, AnalysisService
+from bench_service.model.errors import StorageFailure
+from bench_service.model.job import Job, JobState
+from bench_service.model.records import Idempotency, StoredResult
+from bench_service.model.request import fingerprint
 from bench_service.persistence import Database
 from bench_service.wall_clock import monotonic_s, now, pause
 from procedures.core.errors import UnfitRecording
@@ -42,7 +42,7 @@ class SlowMethod:
         self.touch: Callable[[], None] = lambda: None
         """Called before and after the result is stored."""
 
-        def run(_: AnalysisDesk, request: AnalysisRequest, key: str) -> StoredResult:
+        def run(_: AnalysisService, request: AnalysisRequest, key: str) -> StoredResult:
             self.asked += 1
             try:
                 return work_out(request, key)
@@ -60,7 +60,7 @@ class SlowMethod:
             self.touch()
             return stored
 
-        patch.setattr(AnalysisDesk, "run_method", run)
+        patch.setattr(AnalysisService, "run_method", run)
 
 
 @pytest.fixture

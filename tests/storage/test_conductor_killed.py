@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from bench_service.jobs.campaigns.conductor import Conductor
-from bench_service.jobs.job import Job, JobState
-from bench_service.jobs.request import JobRequest
-from bench_service.jobs.store import Stores
+from bench_service.campaigns.conductor import Conductor
+from bench_service.campaigns.stores import Stores
+from bench_service.model.job import Job, JobState
+from bench_service.model.request import JobRequest
 from bench_service.persistence import Database
 from procedures.core.errors import BadParameter
 from procedures.core.limits import Verdict

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from bench_service.jobs.errors import IdempotencyConflict, NotFound
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import Idempotency, StoredResult
+from bench_service.campaigns.stores import Stores
+from bench_service.model.errors import IdempotencyConflict, NotFound
+from bench_service.model.records import Idempotency, StoredResult
 from procedures.core.errors import BadParameter
 from procedures.core.thermal_correction import Form
 from procedures.core.unit import Unit

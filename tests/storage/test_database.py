@@ -17,14 +17,15 @@ import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
-from bench_service.jobs.errors import StorageFailure, StorageFull
-from bench_service.jobs.job import Job
-from bench_service.jobs.store import RecordingWriter, Stores
-from bench_service.jobs.stored import NewRecording, RecordingState
+from bench_service.campaigns.stores import Stores
+from bench_service.evidence.recordings import RecordingWriter
+from bench_service.model.errors import StorageFailure, StorageFull
+from bench_service.model.job import Job
+from bench_service.model.records import NewRecording, RecordingState
 from bench_service.persistence import Database, open_stores
 from bench_service.persistence.database import connect
-from bench_service.persistence.tables import ChunkRow, RecordingRow
-from bench_service.persistence.tables_around_jobs import Table
+from bench_service.persistence.tables.every import METADATA
+from bench_service.persistence.tables.evidence import ChunkRow, RecordingRow
 from bench_service.wall_clock import now, pause
 from procedures.core.recording import RawArray
 
@@ -41,7 +42,7 @@ def test_the_migrations_end_where_the_tables_are(empty_database_url: str) -> Non
     _, database = open_stores(empty_database_url)
     with database.engine.connect() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
-        assert compare_metadata(context, Table.metadata) == []
+        assert compare_metadata(context, METADATA) == []
         for table in ("recordings", "calibrations"):
             partial = [i for i in sa.inspect(connection).get_indexes(table) if i["unique"]]
             assert len(partial) == 1
@@ -105,7 +106,7 @@ def test_sqlite_survives_a_power_cut_by_its_settings(sqlite_url: str) -> None:
 CRASH = """
 import os, signal, sys
 import numpy as np
-from bench_service.jobs.stored import NewRecording
+from bench_service.model.records import NewRecording
 from bench_service.persistence import open_stores
 from procedures.core.recording import Channel, Quantity
 stores, _ = open_stores(sys.argv[1])

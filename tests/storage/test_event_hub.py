@@ -5,12 +5,12 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from bench_service.api.event_stream import FRAMES
-from bench_service.jobs.errors import NotFound
-from bench_service.jobs.event_hub import WATCH_S, EventHub
-from bench_service.jobs.job import Job, JobState
-from bench_service.jobs.live import LiveBoard
-from bench_service.jobs.store import Stores
+from bench_service.api.jobs.event_stream import FRAMES
+from bench_service.bench.live.values import LiveBoard
+from bench_service.campaigns.stores import Stores
+from bench_service.jobs.events.hub import WATCH_S, EventHub
+from bench_service.model.errors import NotFound
+from bench_service.model.job import Job, JobState
 from bench_service.persistence import open_stores
 from bench_service.wall_clock import monotonic_s, now
 

@@ -14,7 +14,7 @@ from bench_service.formats.content_hash import content_hash
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.export import ExportFormat, export, extract
 from bench_service.formats.import_file import ImportFile, read_import
-from bench_service.jobs.stored import NewRecording
+from bench_service.model.records import NewRecording
 from procedures.core.errors import BadParameter, MissingChannel
 from procedures.core.recording import RawArray, RecordingInfo, Station
 

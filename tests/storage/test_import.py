@@ -11,11 +11,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from bench_service.campaigns.stores import Stores
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.import_file import ImportedRecording, ImportFile, read_import
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import NewRecording
+from bench_service.model.records import NewRecording
 from procedures.core.errors import BadParameter, UnfitRecording
 
 GYRO_X = {"name": "gyro_x", "column": "x", "quantity": "angular_rate", "unit": "rad/s"}

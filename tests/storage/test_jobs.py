@@ -9,10 +9,10 @@ from threading import Barrier
 
 import pytest
 
-from bench_service.jobs.errors import IdempotencyConflict, IllegalTransition, NotFound, StorageFailure
-from bench_service.jobs.job import FINAL, LEGAL, Failure, Job, JobState
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import BenchStop, Idempotency
+from bench_service.campaigns.stores import Stores
+from bench_service.model.errors import IdempotencyConflict, IllegalTransition, NotFound, StorageFailure
+from bench_service.model.job import FINAL, LEGAL, Failure, Job, JobState
+from bench_service.model.records import BenchStop, Idempotency
 from bench_service.persistence import Database
 from bench_service.persistence.stores import stores_of
 from bench_service.wall_clock import new_id, now
@@ -190,24 +190,24 @@ def test_people_who_stop_a_bench_at_once_all_stop_it(stores: Stores, new_job: Ne
 
             def press(who: int, together: Barrier = at_once) -> None:
                 together.wait(20)
-                stores.units.stop_bench(BenchStop("sim", now(), f"person {who}"))
+                stores.benches.stop_bench(BenchStop("sim", now(), f"person {who}"))
 
             list(people.map(press, range(8)))
-            stop = stores.units.bench_stop("sim")
+            stop = stores.benches.bench_stop("sim")
             assert stop is not None
             assert stop.reason.startswith("person")
-            stores.units.release_bench("sim")
+            stores.benches.release_bench("sim")
 
 
 def test_a_bench_stays_stopped_until_it_is_released(stores: Stores) -> None:
     stop = BenchStop("b-1", NOW, "smoke")
-    stores.units.stop_bench(stop)
-    stores.units.stop_bench(BenchStop("b-1", NOW + LATER, "more smoke"))
-    assert stores.units.bench_stop("b-1") == stop
-    assert stores.units.bench_stop("b-2") is None
+    stores.benches.stop_bench(stop)
+    stores.benches.stop_bench(BenchStop("b-1", NOW + LATER, "more smoke"))
+    assert stores.benches.bench_stop("b-1") == stop
+    assert stores.benches.bench_stop("b-2") is None
     for _ in range(2):
-        stores.units.release_bench("b-1")
-    assert stores.units.bench_stop("b-1") is None
+        stores.benches.release_bench("b-1")
+    assert stores.benches.bench_stop("b-1") is None
 
 
 def test_what_does_not_exist_is_not_found(stores: Stores) -> None:

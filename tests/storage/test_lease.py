@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from bench_service.jobs.errors import BenchBusy, StorageFailure
+from bench_service.model.errors import BenchBusy, StorageFailure
 from bench_service.persistence import BenchLease, acquire_lease
 from bench_service.wall_clock import monotonic_s, pause
 
 ROOT = Path(__file__).resolve().parents[2]
 HOLDER = """
 import sys
-from bench_service.jobs.errors import BenchBusy
+from bench_service.model.errors import BenchBusy
 from bench_service.persistence import acquire_lease
 print("ready", flush=True)
 sys.stdin.readline()

@@ -2,7 +2,7 @@
 
 from datetime import timedelta
 
-from bench_service.jobs.live import (
+from bench_service.bench.live.values import (
     SEEN_S,
     BenchLive,
     Heartbeat,
@@ -12,7 +12,7 @@ from bench_service.jobs.live import (
     LiveJob,
     LiveSamples,
 )
-from bench_service.jobs.store import Stores
+from bench_service.campaigns.stores import Stores
 from bench_service.wall_clock import monotonic_s, now, pause
 from procedures.bench.chamber import ChamberReading
 from tests.storage.conftest import NOW

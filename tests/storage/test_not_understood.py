@@ -6,16 +6,16 @@ from collections.abc import Callable
 import pytest
 import sqlalchemy as sa
 
+from bench_service.campaigns.stores import Stores
 from bench_service.cli.client import connect
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs.dispatcher import Dispatcher, Unfinished
-from bench_service.jobs.errors import IllegalTransition, NotUnderstood
-from bench_service.jobs.job import Failure, Job, JobState
 from bench_service.jobs.queue import QueueEntry, RunningJob
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import Page
+from bench_service.model.errors import IllegalTransition, NotUnderstood
+from bench_service.model.job import Failure, Job, JobState
+from bench_service.model.records import Page
 from bench_service.persistence import Database
-from bench_service.persistence.tables import JobRow
+from bench_service.persistence.tables.jobs import JobRow
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from tests.storage.conftest import NOW
@@ -182,7 +182,7 @@ def test_a_bench_that_runs_it_is_seen_and_stopped_all_the_same(
 ) -> None:
     """As by an API beside a worker of another version."""
     job = spoil(stores.jobs.add(new_job(state=JobState.RUNNING)))
-    stores.units.put_bench(SimulatedDriver("sim").description, [])
+    stores.benches.put_bench(SimulatedDriver("sim").description, [])
     assert stores.queue.running("sim") == RunningJob(job.id, 1, job.procedure, job.unit)
     with connect(Settings(database_url=database_url), None, drive=False) as http:
         (bench,) = http.get("/api/v1/benches").json()
@@ -190,5 +190,5 @@ def test_a_bench_that_runs_it_is_seen_and_stopped_all_the_same(
         assert job.id in http.get("/").text
         stopping = http.post("/api/v1/benches/sim/stop", json={"reason": "smoke"})
         assert (stopping.status_code, stopping.json()["job"]) == (202, job.id)
-    assert stores.units.bench_stop("sim") is not None
+    assert stores.benches.bench_stop("sim") is not None
     assert stores.jobs.cancel_requested(job.id)

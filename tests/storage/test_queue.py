@@ -7,11 +7,11 @@ from datetime import timedelta
 
 import pytest
 
-from bench_service.jobs.errors import AlreadyReserved, IdempotencyConflict, IllegalTransition, NotFound
-from bench_service.jobs.job import Failure, Job, JobState
+from bench_service.campaigns.stores import Stores
 from bench_service.jobs.reservation import Reservation, Reserved
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import BenchStop, Idempotency
+from bench_service.model.errors import AlreadyReserved, IdempotencyConflict, IllegalTransition, NotFound
+from bench_service.model.job import Failure, Job, JobState
+from bench_service.model.records import BenchStop, Idempotency
 from bench_service.persistence import Database
 from bench_service.persistence.stores import stores_of
 from bench_service.wall_clock import new_id
@@ -94,13 +94,13 @@ def test_a_stopped_bench_gives_no_job(stores: Stores, new_job: NewJob) -> None:
     job = stores.jobs.add(new_job())
     entry = stores.queue.look("sim", NOW).next()
     assert entry is not None
-    stores.units.stop_bench(BenchStop("sim", NOW, "smoke"))  # after it was chosen, before it was claimed
+    stores.benches.stop_bench(BenchStop("sim", NOW, "smoke"))  # after it was chosen, before it was claimed
     assert stores.queue.claim(entry, {}, NOW) is None
     place = stores.queue.look("sim", NOW).place(job.id, True)
     assert place is not None
     assert place.waiting == "bench sim is stopped: smoke"
     assert claim_next(stores) is None
-    stores.units.release_bench("sim")
+    stores.benches.release_bench("sim")
     assert claim_next(stores) is not None
 
 

@@ -7,13 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sqlalchemy import event
 
-from bench_service.jobs.job import Job, JobState
+from bench_service.campaigns.stores import Stores
 from bench_service.jobs.queue import BenchQueue, Place, QueueEntry
 from bench_service.jobs.reservation import Reservation, Reserved
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import BenchStop
+from bench_service.model.job import Job, JobState
+from bench_service.model.records import BenchStop
 from bench_service.persistence import Database
-from bench_service.persistence.queue_store import FIRST_PAGE, LONGER
+from bench_service.persistence.jobs.queue_store import FIRST_PAGE, LONGER
 from bench_service.wall_clock import new_id
 from tests.storage.conftest import NOW
 
@@ -132,11 +132,11 @@ def test_the_front_is_read_only_as_far_as_it_must_be(stores: Stores, new_job: Ca
     jobs = queued(stores, new_job, FIRST_PAGE + 5)
     front = stores.queue.front("sim", NOW)
     assert [entry.job for entry in front.entries] == [job.id for job in jobs[:FIRST_PAGE]]
-    stores.units.stop_bench(BenchStop("sim", NOW, "smoke"))
+    stores.benches.stop_bench(BenchStop("sim", NOW, "smoke"))
     stopped = stores.queue.front("sim", NOW)
     assert (len(stopped.entries), stopped.next()) == (FIRST_PAGE, None)
     assert stopped.stop == stores.queue.look("sim", NOW).stop
-    stores.units.release_bench("sim")
+    stores.benches.release_bench("sim")
     assert stores.queue.claim(front.entries[0], {}, NOW) is not None
     assert stores.queue.front("sim", NOW) == BenchQueue("sim", NOW, (), running=jobs[0].id)
 

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
+from bench_service.campaigns.stores import Stores
 from bench_service.formats import chunk
 from bench_service.formats.content_hash import content_hash
-from bench_service.jobs.errors import IdempotencyConflict, NotFound, StorageFailure
-from bench_service.jobs.job import Job
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import Idempotency, NewRecording, RecordingState
+from bench_service.model.errors import IdempotencyConflict, NotFound, StorageFailure
+from bench_service.model.job import Job
+from bench_service.model.records import Idempotency, NewRecording, RecordingState
 from bench_service.persistence import Database
-from bench_service.persistence.recording_store import SqlRecordingStore
-from bench_service.persistence.tables import ChunkRow, RecordingRow
+from bench_service.persistence.evidence.recording_store import SqlRecordingStore
+from bench_service.persistence.tables.evidence import ChunkRow, RecordingRow
 from bench_service.wall_clock import now
 from procedures.core.errors import BadParameter, MissingChannel, UnfitRecording
 from procedures.core.recording import RawArray, RecordingInfo, Station

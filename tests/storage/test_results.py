@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench_service.jobs.errors import IdempotencyConflict, NotFound
-from bench_service.jobs.job import Job
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import Idempotency, NewRecording, StoredResult
+from bench_service.campaigns.stores import Stores
+from bench_service.model.errors import IdempotencyConflict, NotFound
+from bench_service.model.job import Job
+from bench_service.model.records import Idempotency, NewRecording, StoredResult
 from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
 from procedures.core.imu_model import TriadCalibration, triad_calibration
 from procedures.core.noise import NoiseCoefficients
@@ -161,8 +161,8 @@ def test_a_bench_comes_back_as_it_was(stores: Stores) -> None:
     axis = AxisLimits(-180.0, 180.0, 200.0, 500.0)
     bench = BenchDescription("sim", Site(55.0, 9.81, 37.0), axis, axis, axis, TableAccuracy(1.0, 2.0, 3.0), True)
     with pytest.raises(NotFound, match="bench 'sim'"):
-        stores.units.bench("sim")
-    stores.units.put_bench(bench)
-    stores.units.put_bench(replace(bench, title="B"))
-    assert stores.units.bench("sim") == replace(bench, title="B")
-    assert stores.units.benches() == (replace(bench, title="B"),)
+        stores.benches.bench("sim")
+    stores.benches.put_bench(bench)
+    stores.benches.put_bench(replace(bench, title="B"))
+    assert stores.benches.bench("sim") == replace(bench, title="B")
+    assert stores.benches.benches() == (replace(bench, title="B"),)

@@ -2,10 +2,10 @@
 
 import sqlalchemy as sa
 
-from bench_service.jobs.store import Stores
+from bench_service.campaigns.stores import Stores
 from bench_service.persistence import Database
-from bench_service.persistence.safety_books import SqlSafetyBooks
-from bench_service.persistence.tables_around_jobs import AuditRow
+from bench_service.persistence.bench.safety_books import SqlSafetyBooks
+from bench_service.persistence.tables.telemetry import AuditRow
 
 
 def test_a_stop_its_confirmation_and_what_was_done(
@@ -23,7 +23,7 @@ def test_a_stop_its_confirmation_and_what_was_done(
     other.close()
     books.confirm_safe("the supervisor")
     books.confirm_safe("somebody later")
-    stop = stores.units.bench_stop("sim")
+    stop = stores.benches.bench_stop("sim")
     assert stop is not None
     assert (stop.reason, stop.safe_by) == ("could not be made safe: a test", "the supervisor")
     assert stop.safe_at is not None
@@ -33,6 +33,6 @@ def test_a_stop_its_confirmation_and_what_was_done(
     assert (said["text"], said["by"]) == ("made safe", "the supervisor")
     with database.read() as session:
         assert session.scalar(sa.select(sa.func.count()).select_from(AuditRow)) == 2
-    stores.units.release_bench("sim")
+    stores.benches.release_bench("sim")
     assert not books.stopped()
     books.close()

@@ -6,7 +6,7 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
-from bench_service.jobs.campaigns.schedule import Schedule, latest_due, next_start, starts_after
+from bench_service.campaigns.schedule import Schedule, latest_due, next_start, starts_after
 from procedures.core.errors import BadParameter
 
 

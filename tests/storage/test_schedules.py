@@ -6,12 +6,12 @@ from threading import Thread
 
 import pytest
 
-from bench_service.jobs.campaigns.run import CampaignRun, RunRequest
-from bench_service.jobs.campaigns.schedule import Missed, Overlap, Schedule
-from bench_service.jobs.campaigns.scheduler import Scheduler, ScheduleRequest
-from bench_service.jobs.errors import NotFound, NotMounted
-from bench_service.jobs.job import JobState
-from bench_service.jobs.store import Stores
+from bench_service.campaigns.run import CampaignRun, RunRequest
+from bench_service.campaigns.schedule import Missed, Overlap, Schedule
+from bench_service.campaigns.scheduler import Scheduler, ScheduleRequest
+from bench_service.campaigns.stores import Stores
+from bench_service.model.errors import NotFound, NotMounted
+from bench_service.model.job import JobState
 from procedures.core.limits import Verdict
 from tests.storage.campaigns import campaign, new_run
 

@@ -9,11 +9,11 @@ import sqlalchemy as sa
 from alembic import command
 from alembic.config import Config
 
-from bench_service.jobs.campaigns.quantities import Quantity
-from bench_service.jobs.campaigns.trend import trend_of
-from bench_service.jobs.job import Job, JobState
-from bench_service.jobs.store import Stores
-from bench_service.jobs.stored import StoredResult
+from bench_service.campaigns.stores import Stores
+from bench_service.evidence.trend import trend_of
+from bench_service.model.job import Job, JobState
+from bench_service.model.quantities import Quantity
+from bench_service.model.records import StoredResult
 from bench_service.persistence import Database, open_stores
 from bench_service.persistence.database import connect
 from bench_service.persistence.migration import SCRIPTS

@@ -21,8 +21,8 @@ from rich.console import Console
 from rich.table import Table as ScreenTable
 from scipy.stats import chi2, kstest, norm
 
-from procedures.analysis.calibration_analysis import analyse_triad
-from procedures.analysis.reference import TRIAD_NAMES
+from procedures.analysis.calibration.reference import TRIAD_NAMES
+from procedures.analysis.calibration.triad_analysis import analyse_triad
 from procedures.catalog import discover
 from procedures.core.recording import Recording
 from procedures.core.unit import Unit

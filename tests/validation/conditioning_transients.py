@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from procedures.analysis.allan.deviation import deviation
-from procedures.analysis.self_heating import SelfHeating, fit_self_heating
 from procedures.analysis.warm_up.end import WarmUp, find_warm_up
+from procedures.analysis.warm_up.self_heating import SelfHeating, fit_self_heating
 from simulators.truth import Array
 from tests.validation.conditioning_curves import Curve, level_of
 from tests.validation.conditioning_noise import ACCELEROMETER, HOURS_6, Channel, noise_cells

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binom, chi2, kstest, norm
 
-from procedures.analysis.reference import TRIAD_NAMES
+from procedures.analysis.calibration.reference import TRIAD_NAMES
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from simulators.truth import Array
 from tests.validation.population import Outcome

@@ -8,14 +8,14 @@ from functools import cache, partial
 
 import numpy as np
 
-from procedures.analysis.calibration_analysis import analyse_triad
-from procedures.analysis.calibration_plan import TriadPlan, triad_plan
-from procedures.analysis.estimator import Weighting
-from procedures.analysis.reference import TRIAD_NAMES
-from procedures.analysis.station_means import BATCHES
-from procedures.analysis.table_errors import TableUncertainty
-from procedures.analysis.verification import predicted_sd
-from procedures.analysis.verification_analysis import planned_covariance, verify_triad
+from procedures.analysis.calibration.estimator import Weighting
+from procedures.analysis.calibration.plan import TriadPlan, triad_plan
+from procedures.analysis.calibration.reference import TRIAD_NAMES
+from procedures.analysis.calibration.station_means import BATCHES
+from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.calibration.triad_analysis import analyse_triad
+from procedures.analysis.calibration.triad_verification import planned_covariance, verify_triad
+from procedures.analysis.calibration.verification import predicted_sd
 from procedures.bench.description import BenchDescription, TableAccuracy
 from procedures.catalog import discover
 from procedures.core.imu_model import TriadCalibration

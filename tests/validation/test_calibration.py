@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from procedures.analysis.bounds import bayesian_bound, cramer_rao_bound
-from procedures.analysis.reference import TRIAD_NAMES, reference_vectors
-from procedures.analysis.station_noise import triad_covariance
-from procedures.analysis.table_errors import table_errors
+from procedures.analysis.calibration.reference import TRIAD_NAMES, reference_vectors
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.table_errors import table_errors
 from procedures.procedure import Context
 from simulators.truth import declared_unit, random_unit_truth
 from simulators.world import WorldConfig
+from tests.validation.bounds import bayesian_bound, cramer_rao_bound
 from tests.validation.judgement import (
     COVERAGE,
     NAMES,

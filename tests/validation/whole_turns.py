@@ -20,8 +20,8 @@ from rich.progress import track
 from rich.table import Table
 from scipy.stats import chi2, kstest, norm
 
-from procedures.analysis.whole_turns_plan import coefficient_names
-from procedures.analysis.whole_turns_summary import WholeTurns
+from procedures.analysis.turns.plan import coefficient_names
+from procedures.analysis.turns.summary import WholeTurns
 from procedures.bench.description import TableAccuracy
 from procedures.catalog.scale_factor_whole_turns import PROCEDURE
 from procedures.core import units

@@ -17,17 +17,17 @@ from rich.table import Table as ScreenTable
 from scipy.spatial.transform import Rotation
 from scipy.stats import binom
 
+from procedures.analysis.calibration.multiposition import fit_triad
+from procedures.analysis.calibration.reference import reference_vectors
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.station_plan import windows
+from procedures.analysis.calibration.table_errors import TableUncertainty, table_errors
 from procedures.analysis.field.fit import FieldModel, FieldUncertainty, fit_field
-from procedures.analysis.multiposition import fit_triad
 from procedures.analysis.navigation.error_growth import Alignment, error_growth
 from procedures.analysis.navigation.error_model import Place
 from procedures.analysis.navigation.growth_summary import radius_95
 from procedures.analysis.navigation.instrument_errors import TriadErrors
 from procedures.analysis.orientation_plan import comparison
-from procedures.analysis.reference import reference_vectors
-from procedures.analysis.station_noise import triad_covariance
-from procedures.analysis.station_plan import windows
-from procedures.analysis.table_errors import TableUncertainty, table_errors
 from procedures.core import units as u
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.table_angles import TableAngles

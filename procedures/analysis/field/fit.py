@@ -12,9 +12,9 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
-from procedures.analysis.determination import require_full_rank
 from procedures.analysis.field.positions import Tilt, field_vectors, of_azimuth, of_settings, of_tilt
-from procedures.analysis.whitening import whitener
+from procedures.analysis.least_squares.determination import require_full_rank
+from procedures.analysis.least_squares.whitening import whitener
 from procedures.core.arrays import Array
 from procedures.core.errors import Undetermined
 from procedures.core.imu_model import TriadCalibration, triad_calibration

@@ -7,9 +7,9 @@ import numpy as np
 
 from procedures.analysis.launch.results import Exponential, SelfHeating, Transient, Trend
 from procedures.analysis.launch.settings import LaunchSettings
-from procedures.analysis.self_heating import SelfHeating as Fitted
-from procedures.analysis.self_heating import fit_self_heating
 from procedures.analysis.warm_up.end import find_warm_up
+from procedures.analysis.warm_up.self_heating import SelfHeating as Fitted
+from procedures.analysis.warm_up.self_heating import fit_self_heating
 from procedures.core.arrays import Array
 from procedures.core.recording import ACCELEROMETER
 

@@ -13,9 +13,9 @@ from scipy.linalg import block_diag
 from scipy.optimize import brentq
 from scipy.special import erf
 
+from procedures.analysis.calibration.station_noise import mean_covariance
 from procedures.analysis.navigation.error_model import Place, Responses, responses, self_alignment
 from procedures.analysis.navigation.instrument_errors import TriadErrors
-from procedures.analysis.station_noise import mean_covariance
 from procedures.core.arrays import Array
 from procedures.core.noise import NoiseCoefficients
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from procedures.analysis.calibration_plan import TriadPlan, predicted_parts, triad_plan
+from procedures.analysis.calibration.plan import TriadPlan, predicted_parts, triad_plan
+from procedures.analysis.calibration.reference import reference_magnitude, reference_vectors
+from procedures.analysis.calibration.scalar import fit_scalar, scalar_parameters
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.station_plan import move_time_s, windows
+from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.orientation_plan.information import Model, TriadDesign
-from procedures.analysis.reference import reference_magnitude, reference_vectors
-from procedures.analysis.scalar import fit_scalar, scalar_parameters
-from procedures.analysis.station_noise import triad_covariance
-from procedures.analysis.station_plan import move_time_s, windows
-from procedures.analysis.table_errors import TableUncertainty
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 from procedures.core.recording import Station

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from procedures.analysis.table_errors import TableUncertainty
+from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.core import units
 from procedures.core.arrays import Array
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
+from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.orientation_plan.information import Objective, information, prior
-from procedures.analysis.table_errors import TableUncertainty
 from procedures.core.arrays import Array
 
 Indices = NDArray[np.int64]

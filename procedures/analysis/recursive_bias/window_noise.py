@@ -10,10 +10,10 @@ import numpy as np
 from scipy.linalg import toeplitz
 from scipy.special import chdtrc
 
+from procedures.analysis.calibration.station_noise import mean_covariance
+from procedures.analysis.calibration.station_plan import dwell_for
+from procedures.analysis.least_squares.whitening import whitener
 from procedures.analysis.recursive_bias.kalman import RecursiveBias
-from procedures.analysis.station_noise import mean_covariance
-from procedures.analysis.station_plan import dwell_for
-from procedures.analysis.whitening import whitener
 from procedures.core.arrays import Array
 from procedures.core.errors import MissingChannel, UnfitRecording
 from procedures.core.noise import NoiseCoefficients

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from procedures.analysis.calibration.reference import reference_vectors
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.station_plan import windows
+from procedures.analysis.calibration.table_errors import TableUncertainty, table_errors
 from procedures.analysis.navigation.alignment import InitialAttitude, initial_attitude, require_alignable
-from procedures.analysis.reference import reference_vectors
-from procedures.analysis.station_noise import triad_covariance
-from procedures.analysis.station_plan import windows
-from procedures.analysis.table_errors import TableUncertainty, table_errors
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, DomainError, Undetermined

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from procedures.analysis.calibration.station_means import station_means
+from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.calibration.verification import chi_square_p, predicted_sd
 from procedures.analysis.navigation.alignment import azimuth_error, initial_attitude
 from procedures.analysis.repeated_alignment.expected import (
     ANGLES,
@@ -15,9 +18,6 @@ from procedures.analysis.repeated_alignment.expected import (
     reference_attitudes,
     rms_deg,
 )
-from procedures.analysis.station_means import station_means
-from procedures.analysis.table_errors import TableUncertainty
-from procedures.analysis.verification import chi_square_p, predicted_sd
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import Undetermined, UnfitRecording

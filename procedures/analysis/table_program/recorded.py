@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from procedures.analysis.calibration.station_means import BATCHES
+from procedures.analysis.calibration.station_noise import mean_covariance
 from procedures.analysis.cells import CellStream, channel_rows
-from procedures.analysis.station_means import BATCHES
-from procedures.analysis.station_noise import mean_covariance
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.noise import NoiseCoefficients

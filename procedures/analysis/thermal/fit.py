@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from procedures.analysis.determination import require_full_rank
+from procedures.analysis.least_squares.determination import require_full_rank
 from procedures.analysis.thermal.correlated import LinearFit, fit_linear, whiten
 from procedures.analysis.thermal.runs import AXES, ThermalRun
 from procedures.core.arrays import Array

@@ -7,7 +7,7 @@ departure from it. C writes the zero's change as its largest in the range times 
 
 import numpy as np
 
-from procedures.analysis.determination import require_full_rank
+from procedures.analysis.least_squares.determination import require_full_rank
 from procedures.core.arrays import Array
 from procedures.core.converter import Normalised
 from procedures.core.errors import BadParameter, UnfitRecording

@@ -1,0 +1,1 @@
+"""Campaigns, their runs and schedules over HTTP."""

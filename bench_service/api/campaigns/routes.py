@@ -1,0 +1,156 @@
+"""Campaigns and their runs: define, preview, start, watch, cancel, report."""
+
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Path, Query, Response
+from pydantic import Field
+
+from bench_service.api.campaigns.schemas import (
+    CampaignMade,
+    CampaignPage,
+    CampaignPreview,
+    CampaignReport,
+    CampaignRunPage,
+    CampaignRunView,
+    CampaignView,
+)
+from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
+from bench_service.api.http.errors import made, problems
+from bench_service.api.http.fields import NAME, Labels, Request
+from bench_service.campaigns import junit
+from bench_service.campaigns.campaign import NAME as CAMPAIGN_NAME
+from bench_service.campaigns.campaign import Campaign
+from bench_service.campaigns.lineage import lineage_of
+from bench_service.campaigns.run import RunRequest
+from bench_service.model.job import JobState
+from procedures.core.errors import BadParameter
+
+router = APIRouter(prefix="/api/v1", tags=["campaigns"])
+CampaignName = Annotated[str, Path(pattern=CAMPAIGN_NAME)]
+OF_A_RUN = ("read_campaign_run", "cancel_campaign_run", "report_campaign_run")
+
+
+class CampaignOn(Request):
+    """A unit, and a bench where there are several."""
+
+    unit: str = NAME
+    bench: Annotated[str, NAME] | None = None
+
+
+class RunSubmission(CampaignOn):
+    """A campaign to be done."""
+
+    seed: int | None = Field(None, ge=0, lt=2**47, description="Base of the steps' seeds on a simulated bench")
+    labels: Labels = Field(default_factory=Labels, max_length=20)
+    parameters: dict[str, dict[str, Any]] = Field(
+        default_factory=dict[str, dict[str, Any]],
+        max_length=100,
+        description="Step -> parameters of its procedure that are other than the campaign's",
+    )
+
+
+@router.get("/campaigns", responses=problems())
+def list_campaigns(service: Service, after: After = None, limit: Limit = 50) -> CampaignPage:
+    """Campaigns by name, those that come with the service among them."""
+    page = service.campaigns.campaigns(after, limit)
+    return CampaignPage(items=[CampaignView.of(campaign) for campaign in page.items], next=page.next)
+
+
+@router.post("/campaigns", status_code=201, responses=problems(404, 409, 413, 507))
+def add_campaign(body: Campaign, service: Service, response: Response, key: IdempotencyKey = None) -> CampaignMade:
+    """Store a campaign. Every step is looked at first: what can never work is refused, what may not is warned of."""
+    campaign = service.campaigns.add(body, key)
+    response.headers["Location"] = f"/api/v1/campaigns/{campaign.name}"
+    return CampaignMade.of(campaign, service.campaigns.examine(campaign))
+
+
+@router.get("/campaigns/{name}", responses=problems(404))
+def read_campaign(name: CampaignName, service: Service) -> CampaignView:
+    """One campaign."""
+    return CampaignView.of(service.campaigns.campaign(name))
+
+
+@router.put("/campaigns/{name}", responses=problems(404, 409, 413, 507))
+def replace_campaign(name: CampaignName, body: Campaign, service: Service) -> CampaignMade:
+    """Change a campaign; runs that were asked for before keep the one that they have."""
+    if body.name != name:
+        raise BadParameter("name", body.name, f"the name in the address, {name}")
+    campaign = service.campaigns.replace(body)
+    return CampaignMade.of(campaign, service.campaigns.examine(campaign))
+
+
+@router.post("/campaigns/{name}/preview", responses=problems(404, 413))
+def preview_campaign(name: CampaignName, body: CampaignOn, service: Service) -> CampaignPreview:
+    """What the campaign would do on a unit: steps left out, times, limits out of reach. Nothing moves."""
+    campaign = service.campaigns.campaign(name)
+    found = service.campaigns.examine(campaign, body.unit, body.bench)
+    return CampaignPreview(
+        campaign=name,
+        unit=body.unit,
+        steps=list(found.steps),
+        duration_s=found.duration_s,
+        data_bytes=found.data_bytes,
+        warnings=list(found.warnings),
+    )
+
+
+@router.post(
+    "/campaigns/{name}/runs",
+    status_code=202,
+    responses={**problems(404, 409, 413, 507), **made(202, "run_id", *OF_A_RUN)},
+)
+def start_campaign(
+    name: CampaignName, body: RunSubmission, service: Service, response: Response, key: IdempotencyKey = None
+) -> CampaignRunView:
+    """Queue a run of the campaign. A bench does one campaign run at a time, in the order of asking."""
+    request = RunRequest(name, body.unit, body.bench, body.seed, body.labels, body.parameters)
+    run = service.campaigns.start(request, key)
+    response.headers["Location"] = f"/api/v1/campaign-runs/{run.id}"
+    return CampaignRunView.of(run)
+
+
+@router.get("/campaign-runs", responses=problems())
+def list_campaign_runs(
+    service: Service,
+    campaign: Annotated[str | None, Query(max_length=100)] = None,
+    unit: Annotated[str | None, Query(max_length=100)] = None,
+    state: JobState | None = None,
+    after: After = None,
+    limit: Limit = 50,
+) -> CampaignRunPage:
+    """Runs, newest first."""
+    page = service.stores.campaigns.runs(campaign=campaign, unit=unit, state=state, after=after, limit=limit)
+    return CampaignRunPage(items=[CampaignRunView.of(run) for run in page.items], next=page.next)
+
+
+@router.get("/campaign-runs/{run_id}", responses=problems(404))
+def read_campaign_run(run_id: str, service: Service) -> CampaignRunView:
+    """One run: each step's state, job, checks, verdict and reasons."""
+    return CampaignRunView.of(service.stores.campaigns.run(run_id))
+
+
+@router.post("/campaign-runs/{run_id}/cancel", status_code=202, responses=problems(404, 409, 507))
+def cancel_campaign_run(run_id: str, service: Service) -> CampaignRunView:
+    """End a run: its job as soon as the bench is safe; steps that did not begin are left out."""
+    return CampaignRunView.of(service.campaigns.cancel_run(run_id))
+
+
+@router.get(
+    "/campaign-runs/{run_id}/report",
+    responses={
+        **problems(404),
+        200: {"description": "The outcome", "content": {"application/xml": {"schema": {"type": "string"}}}},
+    },
+)
+def report_campaign_run(
+    run_id: str, service: Service, form: Annotated[Literal["json", "junit"], Query(alias="format")] = "json"
+) -> CampaignReport:
+    """The outcome for another machine to read.
+
+    `json` with its lineage: for each step job, result, recordings' hashes, code version and seed. `junit` as JUnit XML:
+    a suite a step, a case a check.
+    """
+    run = service.stores.campaigns.run(run_id)
+    if form == "junit":
+        return Response(junit.document(run), media_type="application/xml")  # pyright: ignore[reportReturnType]
+    return CampaignReport.of(run, lineage_of(run, service.stores))

@@ -1,0 +1,87 @@
+"""Schedules: campaigns that start by themselves."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Response
+from pydantic import Field
+
+from bench_service.api.campaigns.schemas import SchedulePage, ScheduleView
+from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
+from bench_service.api.http.errors import made, problems
+from bench_service.api.http.fields import NAME, Labels, Request
+from bench_service.campaigns.schedule import Missed, Overlap
+from bench_service.campaigns.scheduler import ScheduleRequest
+
+router = APIRouter(prefix="/api/v1/schedules", tags=["campaigns"])
+OF_A_SCHEDULE = ("read_schedule", "change_schedule", "remove_schedule")
+
+
+class ScheduleSubmission(Request):
+    """A campaign on a unit, again and again."""
+
+    cron: str = Field(
+        min_length=1,
+        max_length=200,
+        pattern=r"^[^\x00-\x1f]+$",
+        description="minute, hour, day of month, month, day of week",
+    )
+    time_zone: str = Field(
+        min_length=1, max_length=100, pattern=r"^[^\x00-\x1f]+$", description="IANA name, such as Europe/Kyiv"
+    )
+    campaign: str = NAME
+    unit: str = NAME
+    bench: Annotated[str, NAME] | None = None
+    missed: Missed = Field(
+        Missed.RUN_ONCE,
+        description="What becomes of a start that nothing was running to see: one run makes up for all, or skipped",
+    )
+    start_within_s: float = Field(
+        300.0, ge=1.0, le=604_800.0, allow_inf_nan=False, description="A start that is later than this was missed"
+    )
+    overlap: Overlap = Field(Overlap.SKIP, description="What becomes of a start while its previous run is open")
+    enabled: bool = True
+    labels: Labels = Field(default_factory=Labels, max_length=20)
+
+
+class ScheduleChange(Request):
+    """Whether a schedule is in force."""
+
+    enabled: bool
+
+
+@router.get("", responses=problems())
+def list_schedules(service: Service, after: After = None, limit: Limit = 50) -> SchedulePage:
+    """Schedules, newest first."""
+    page = service.campaigns.schedules.list(after, limit)
+    return SchedulePage(items=[ScheduleView.of(schedule) for schedule in page.items], next=page.next)
+
+
+@router.post(
+    "", status_code=201, responses={**problems(404, 409, 413, 507), **made(201, "schedule_id", *OF_A_SCHEDULE)}
+)
+def add_schedule(
+    body: ScheduleSubmission, service: Service, response: Response, key: IdempotencyKey = None
+) -> ScheduleView:
+    """Start a campaign at given times. A time that never comes is refused, and a run that could not begin now."""
+    request = ScheduleRequest(**{name: getattr(body, name) for name in ScheduleSubmission.model_fields})
+    schedule = service.campaigns.schedules.add(request, key)
+    response.headers["Location"] = f"/api/v1/schedules/{schedule.id}"
+    return ScheduleView.of(schedule)
+
+
+@router.get("/{schedule_id}", responses=problems(404))
+def read_schedule(schedule_id: str, service: Service) -> ScheduleView:
+    """One schedule: when it starts next, and what became of the last start."""
+    return ScheduleView.of(service.campaigns.schedules.get(schedule_id))
+
+
+@router.patch("/{schedule_id}", responses=problems(404, 413, 507))
+def change_schedule(schedule_id: str, body: ScheduleChange, service: Service) -> ScheduleView:
+    """Switch a schedule off or on; starts that pass while it is off are not made up."""
+    return ScheduleView.of(service.campaigns.schedules.enable(schedule_id, body.enabled))
+
+
+@router.delete("/{schedule_id}", status_code=204, response_model=None, responses=problems(404, 507))
+def remove_schedule(schedule_id: str, service: Service) -> None:
+    """Forget a schedule; its runs stay."""
+    service.campaigns.schedules.remove(schedule_id)

@@ -1,0 +1,207 @@
+"""What a client is told of campaigns, their runs and schedules."""
+
+from datetime import datetime
+
+from pydantic import BaseModel, Field
+
+from bench_service.api.http.fields import Labels
+from bench_service.campaigns.campaign import Campaign
+from bench_service.campaigns.examination import Examination, StepPlan
+from bench_service.campaigns.lineage import StepLineage
+from bench_service.campaigns.run import CampaignRun, StepState
+from bench_service.campaigns.schedule import Missed, Overlap, Schedule
+from bench_service.campaigns.shipped import shipped
+from bench_service.evidence.trend import Trend, TrendPoint
+from bench_service.model.job import JobState
+from procedures.analysis.control_chart import ControlLimits, Signal
+from procedures.core.limits import Check, Verdict
+
+
+class CampaignView(BaseModel):
+    """A campaign."""
+
+    name: str
+    campaign: Campaign
+    shipped: bool = Field(description="It comes with the service and cannot be changed")
+
+    @classmethod
+    def of(cls, campaign: Campaign) -> "CampaignView":
+        return cls(name=campaign.name, campaign=campaign, shipped=campaign.name in shipped())
+
+
+class CampaignPage(BaseModel):
+    """Campaigns by name."""
+
+    items: list[CampaignView]
+    next: str | None = Field(description="Cursor: pass it as `after` for the next page")
+
+
+class CampaignMade(BaseModel):
+    """A campaign that was stored, and what to know before it runs."""
+
+    name: str
+    campaign: Campaign
+    shipped: bool = False
+    duration_s: float = Field(description="Bench time by the plans")
+    warnings: list[str] = Field(description="Steps left out, limits out of reach")
+
+    @classmethod
+    def of(cls, campaign: Campaign, examination: Examination) -> "CampaignMade":
+        return cls(
+            name=campaign.name,
+            campaign=campaign,
+            duration_s=examination.duration_s,
+            warnings=list(examination.warnings),
+        )
+
+
+class CampaignPreview(BaseModel):
+    """What a campaign would do on a unit."""
+
+    campaign: str
+    unit: str
+    steps: list[StepPlan]
+    duration_s: float = Field(description="Bench time by the plans")
+    data_bytes: int
+    warnings: list[str]
+
+
+class StepRunView(BaseModel):
+    """One step of a run."""
+
+    name: str
+    does: str = Field(description="Its procedure or method")
+    state: StepState
+    attempt: int = Field(description="0 before the first")
+    job: str | None
+    result: str | None
+    earlier_jobs: list[str] = Field(description="Of attempts that ended in error")
+    seed: int | None
+    verdict: Verdict | None
+    checks: list[Check] = Field(description="The procedure's own, the campaign's limits, its trends")
+    warnings: list[str]
+    reason: str = Field(description="Why it failed, was cancelled or skipped")
+    started_at: datetime | None
+    finished_at: datetime | None
+
+
+class CampaignRunView(BaseModel):
+    """One execution of a campaign."""
+
+    id: str
+    campaign: str
+    unit: str
+    bench: str
+    state: JobState
+    verdict: Verdict | None
+    steps: list[StepRunView]
+    cancel_requested: bool
+    waiting: str = Field(description="What it waits for, where that is not its own job's work")
+    reason: str = Field(description="Why it ended as it did, where no step says it")
+    warnings: list[str]
+    simulated: bool
+    seed: int | None = Field(description="Base: a step's seed is the base + its number + 1000 a retry")
+    labels: Labels
+    duration_s: float = Field(description="Bench time by the plans")
+    deadline_at: datetime | None = Field(description="When its window closes")
+    schedule: str | None
+    planned_at: datetime | None
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+    page: str = Field(description="Path of the page for an eye")
+
+    @classmethod
+    def of(cls, run: CampaignRun) -> "CampaignRunView":
+        steps = [
+            StepRunView(
+                **{name: getattr(step, name) for name in _SAME_IN_STEP},
+                job=step.job_id,
+                result=step.result_id,
+            )
+            for step in run.steps
+        ]
+        return cls(
+            **{name: getattr(run, name) for name in _SAME_IN_RUN},
+            campaign=run.campaign.name,
+            steps=steps,
+            schedule=run.schedule_id,
+            page=f"/campaign-runs/{run.id}",
+        )
+
+
+_SAME_IN_STEP = tuple(name for name in StepRunView.model_fields if name not in ("job", "result"))
+_SAME_IN_RUN = tuple(
+    name for name in CampaignRunView.model_fields if name not in ("campaign", "steps", "schedule", "page")
+)
+
+
+class CampaignRunPage(BaseModel):
+    """Runs, newest first."""
+
+    items: list[CampaignRunView]
+    next: str | None = Field(description="Cursor: pass it as `after` for the next page")
+
+
+class CampaignReport(BaseModel):
+    """The outcome of a run with everything that made it."""
+
+    run: CampaignRunView
+    campaign: Campaign = Field(description="As it was when the run was asked for")
+    lineage: list[StepLineage] = Field(description="Of every attempt of a step that had a job or a result")
+    code_versions: list[str]
+
+    @classmethod
+    def of(cls, run: CampaignRun, lineage: tuple[StepLineage, ...]) -> "CampaignReport":
+        versions = list(dict.fromkeys(one.code_version for one in lineage))
+        return cls(run=CampaignRunView.of(run), campaign=run.campaign, lineage=list(lineage), code_versions=versions)
+
+
+class ScheduleView(BaseModel):
+    """When a campaign starts by itself."""
+
+    id: str
+    cron: str
+    time_zone: str
+    campaign: str
+    unit: str
+    bench: str | None
+    enabled: bool
+    missed: Missed
+    start_within_s: float
+    overlap: Overlap
+    labels: Labels
+    created_at: datetime
+    next_at: datetime | None = Field(description="UTC; null while disabled")
+    last_at: datetime | None = Field(description="The last planned start that was seen")
+    last_run: str | None
+    last_outcome: str = Field(description="What became of it")
+
+    @classmethod
+    def of(cls, schedule: Schedule) -> "ScheduleView":
+        return cls(**{name: getattr(schedule, name) for name in cls.model_fields})
+
+
+class SchedulePage(BaseModel):
+    """Schedules, newest first."""
+
+    items: list[ScheduleView]
+    next: str | None = Field(description="Cursor: pass it as `after` for the next page")
+
+
+class TrendView(BaseModel):
+    """A quantity over a unit's results, on an individuals control chart."""
+
+    serial: str
+    procedure: str
+    quantity: str
+    unit: str = Field(description="Of the values; empty where the result does not say")
+    points: list[TrendPoint] = Field(description="Oldest first")
+    limits: ControlLimits | None = Field(description="Null with fewer than two points")
+    signals: list[Signal] = Field(description="Points at which a Western Electric rule is broken")
+    without: int = Field(description="Results that lack the quantity")
+
+    @classmethod
+    def of(cls, trend: Trend) -> "TrendView":
+        same = {name: getattr(trend, name) for name in cls.model_fields if name != "serial"}
+        return cls(serial=trend.unit_serial, **same)

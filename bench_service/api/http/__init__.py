@@ -1,0 +1,1 @@
+"""What all routes share: dependencies, bodies, errors, request ids."""

@@ -1,0 +1,46 @@
+"""What every route is given, and what several of them say in the same words."""
+
+import re
+from typing import Annotated
+
+from fastapi import Depends, Header, Query, Request
+
+from bench_service.jobs.events.hub import EventHub
+from bench_service.service import BenchService
+
+
+async def _service(request: Request) -> BenchService:  # async: else it is looked up in a thread, for each request
+    return request.app.state.service
+
+
+async def _hub(request: Request) -> EventHub:
+    return request.app.state.hub
+
+
+Hub = Annotated[EventHub, Depends(_hub)]
+Service = Annotated[BenchService, Depends(_service)]
+NO_CONTROL_CHARACTERS = re.compile(r"^[^\x00-\x1f\x7f]+$")
+IdempotencyKey = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=200,
+        pattern=NO_CONTROL_CHARACTERS.pattern,
+        description="A create that is repeated with the same key and body gives what the first one made",
+    ),
+]
+REQUESTED_BY = "X-Requested-By"
+WHO_LENGTH = 200
+RequestedBy = Annotated[
+    str | None,
+    Header(
+        alias=REQUESTED_BY,
+        min_length=1,
+        max_length=WHO_LENGTH,
+        pattern=NO_CONTROL_CHARACTERS.pattern,
+        description="Who asks, for the job and the audit trail; without it, the trail has the client's address",
+    ),
+]
+After = Annotated[str | None, Query(max_length=100, description="Cursor: `next` of the page before")]
+Limit = Annotated[int, Query(ge=1, le=500)]

@@ -1,0 +1,253 @@
+"""One table from errors to status codes, and problem+json (RFC 9457) for all of them."""
+
+from asyncio import CancelledError
+from collections.abc import Sequence
+from http import HTTPStatus
+from typing import Annotated, Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from bench_service.api.http.bodies import BODY_BYTES
+from bench_service.formats.plain_json import A_NUMBER, NOT_SO_DEEP, is_finite, shown
+from bench_service.model.errors import (
+    AlreadyReserved,
+    BenchBusy,
+    IdempotencyConflict,
+    IllegalTransition,
+    NameTaken,
+    NotDriving,
+    NotFound,
+    NotMounted,
+    NotReady,
+    NotSafe,
+    NotUnderstood,
+    ServiceError,
+    StorageFailure,
+    StorageFull,
+)
+from procedures.bench.errors import BenchError
+from procedures.core.errors import BadParameter, DomainError, Undetermined
+
+STATUS: dict[type[Exception], int] = {
+    NotFound: 404,
+    IllegalTransition: 409,
+    IdempotencyConflict: 409,
+    BenchBusy: 409,
+    AlreadyReserved: 409,
+    NameTaken: 409,
+    NotDriving: 503,
+    NotReady: 503,
+    NotMounted: 422,
+    NotSafe: 409,
+    NotUnderstood: 409,
+    DomainError: 422,
+    BenchError: 502,
+    StorageFull: 507,
+    StorageFailure: 503,
+    ServiceError: 500,
+}
+"""An error's status is that of its nearest ancestor here."""
+
+
+Shown = Annotated[str, BeforeValidator(shown)]
+"""Whatever a message quotes, it can be sent."""
+
+
+class FieldError(BaseModel):
+    """One field that is not as it must be."""
+
+    field: Shown = Field(description="Path of the field, for example parameters.dwell_s")
+    message: Shown = Field(description="What is wrong, with the allowed range")
+    value: Any = Field(default=None, description="What was given; text where JSON has no such number")
+
+
+class Problem(BaseModel):
+    """An error as RFC 9457 has it, with the fields that caused it."""
+
+    type: str = Field("about:blank", description="Kind of error, a relative reference")
+    title: str
+    status: int
+    detail: Shown
+    instance: Shown = ""
+    errors: list[FieldError] = Field(default_factory=list[FieldError])
+    lost: list[Shown] = Field(default_factory=list[Shown], description="Combinations that a plan cannot determine")
+
+
+MOST_FIELDS = 100
+"""Of a megabyte of wrong fields so many are told."""
+_NO_BODY = FieldError(field="body", message="UTF-8 text of one JSON document is expected")
+_TOO_LONG = FieldError(field="body", message=f"at most {BODY_BYTES} bytes are taken")
+_UNREAD: dict[type, str] = {RecursionError: NOT_SO_DEEP, ValueError: A_NUMBER}
+"""What is allowed instead where `json.loads` itself gave up, at a thousand brackets or at an integer of 4300 digits."""
+
+
+def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """The `responses` of a route: these statuses answer with a problem document; 400, 422 and 503 always can."""
+    wanted = sorted({*statuses, 400, 422, 503})
+    return {
+        status: {
+            "description": HTTPStatus(status).phrase,
+            "content": {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}},
+        }
+        for status in wanted
+    }
+
+
+def made(status: int, parameter: str, *operations: str) -> dict[int | str, dict[str, Any]]:
+    """The good answer of a create, with OpenAPI links from the new thing's id to the operations that take it."""
+    link = {
+        operation: {"operationId": operation, "parameters": {parameter: "$response.body#/id"}}
+        for operation in operations
+    }
+    return {status: {"description": HTTPStatus(status).phrase, "links": link}}
+
+
+def install(app: FastAPI) -> None:
+    """Answer every error of the table, of validation and of routing with a problem document."""
+    app.add_exception_handler(RequestValidationError, _on_request_validation)
+    app.add_exception_handler(ValidationError, _on_parameter_validation)
+    app.add_exception_handler(HTTPException, _on_http)
+    for error in (DomainError, ServiceError, BenchError):
+        app.add_exception_handler(error, _on_known)
+    app.add_exception_handler(Exception, _on_unknown)
+    app.add_middleware(RefuseNul)
+    app.add_middleware(AnswerAtTheEnd)
+
+
+class AnswerAtTheEnd:
+    """A request that is still at work when the server has waited long enough for its end is told so, and may be
+    repeated: what it asked for may be done or not, which its `Idempotency-Key` sorts out. A stream ends, unfinished.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        begun = False
+
+        async def sent(message: Message) -> None:
+            nonlocal begun
+            begun = True
+            await send(message)
+
+        try:
+            await self._app(scope, receive, sent)
+        except CancelledError:
+            if scope["type"] != "http":
+                raise
+            if begun:  # a stream, cut here: the server closes its connection, and the client sees that it is not whole
+                return
+            text = "the service is ending, and this request had not ended: ask again, with the same Idempotency-Key"
+            await respond(Request(scope), 503, text, "Ending")(scope, receive, send)
+
+
+class RefuseNul:
+    """No database can hold the character NUL in a text, so no address may contain it."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http" and ("\x00" in scope["path"] or b"%00" in scope["query_string"]):
+            refusal = respond(Request(scope), 400, "an address may not contain the character NUL", "BadRequest")
+            await refusal(scope, receive, send)
+            return
+        await self._app(scope, receive, send)
+
+
+def status_of(error: Exception) -> int:
+    """The status code of a known error."""
+    return next(STATUS[cls] for cls in type(error).__mro__ if cls in STATUS)
+
+
+def _on_known(request: Request, error: Exception) -> Response:
+    fields: list[FieldError] = []
+    if isinstance(error, BadParameter):
+        fields = [FieldError(field=error.field, message=error.allowed, value=_jsonable(error.value))]
+    if isinstance(error, NotReady):
+        fields = [FieldError(field="service", message=reason) for reason in error.reasons]
+    lost = list(error.lost) if isinstance(error, Undetermined) else []
+    return respond(request, status_of(error), str(error), type(error).__name__, fields, lost)
+
+
+def _on_request_validation(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    if first["type"] == "json_invalid" and first["loc"][0] == "body":
+        message = f"no JSON: {first['ctx']['error']} at character {first['loc'][-1]}"
+        return respond(request, 400, message, "BadRequest", [FieldError(field="body", message=message)])
+    return _invalid(request, error.errors(), prefix="")
+
+
+def _on_parameter_validation(request: Request, error: Exception) -> Response:
+    assert isinstance(error, ValidationError)
+    return _invalid(request, error.errors(include_url=False), prefix="parameters")
+
+
+def _invalid(request: Request, errors: Sequence[Any], prefix: str) -> Response:
+    fields = [
+        FieldError(field=_path(e["loc"], prefix), message=str(e["msg"]), value=_jsonable(e.get("input")))
+        for e in errors[:MOST_FIELDS]
+        if not _follows(e, errors)
+    ]
+    detail = "; ".join(f"{f.field}: {f.message}" for f in fields[:5])
+    return respond(request, 422, detail, "Invalid", fields)
+
+
+def _follows(error: Any, errors: Sequence[Any]) -> bool:
+    """A list whose bad element was left out is told to be too short as well: that is no second fault."""
+    place = tuple(error["loc"])
+    return error["type"] == "too_short" and any(
+        len(other["loc"]) > len(place) and tuple(other["loc"][: len(place)]) == place for other in errors
+    )
+
+
+def _on_http(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    status = error.status_code
+    if status == 400 and (allowed := _UNREAD.get(type(error.__cause__))) is not None:
+        return respond(request, 422, f"body: {allowed}", "Invalid", [FieldError(field="body", message=allowed)])
+    kind = HTTPStatus(status).phrase.replace(" ", "")
+    fields = {400: [_NO_BODY], 413: [_TOO_LONG]}.get(status, [])
+    response = respond(request, status, str(error.detail), kind, fields)
+    response.headers.update(error.headers or {})
+    return response
+
+
+def _on_unknown(request: Request, error: Exception) -> Response:
+    return respond(request, 500, "a defect of the service; its log has the details", "InternalError")
+
+
+def respond(
+    request: Request, status: int, detail: str, kind: str, errors: Sequence[FieldError] = (), lost: Sequence[str] = ()
+) -> JSONResponse:
+    """A problem document as a response."""
+    problem = Problem(
+        type=f"/problems/{kind}" if kind else "about:blank",
+        title=HTTPStatus(status).phrase,
+        status=status,
+        detail=detail,
+        instance=request.scope["path"],
+        errors=list(errors),
+        lost=list(lost),
+    )
+    return JSONResponse(problem.model_dump(), status, media_type="application/problem+json")
+
+
+def _path(location: Sequence[str | int], prefix: str) -> str:
+    inside = location[1:] if location and location[0] in ("body", "query", "path", "header") else location
+    parts = [str(part) for part in inside]
+    return ".".join(([prefix] if prefix else []) + parts) or "body"
+
+
+def _jsonable(value: Any) -> Any:
+    """The offending value where JSON can say it, else its text, cut to a readable length."""
+    if value is None or isinstance(value, bool) or (isinstance(value, int | float) and is_finite(value)):
+        return value
+    text = shown(value if isinstance(value, str) else repr(value))
+    return text if len(text) <= 200 else text[:200] + "…"

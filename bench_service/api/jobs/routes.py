@@ -1,0 +1,215 @@
+"""Jobs: submit, read, watch, cancel, and what came out."""
+
+from collections.abc import AsyncIterator
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Query, Response
+from fastapi.responses import JSONResponse, StreamingResponse
+
+from bench_service.api.http.dependencies import After, Hub, IdempotencyKey, Limit, RequestedBy, Service
+from bench_service.api.http.errors import made, problems
+from bench_service.api.jobs import event_stream
+from bench_service.api.jobs.schemas import (
+    ForeignJob,
+    JobChange,
+    JobPage,
+    JobSubmission,
+    JobView,
+    PromptAnswer,
+    Reanalysis,
+    Truth,
+)
+from bench_service.api.results import ResultPage, ResultView
+from bench_service.bench.prompts import Answer
+from bench_service.jobs.events.hub import EventHub
+from bench_service.model.errors import NotUnderstood
+from bench_service.model.job import Job, JobState
+from bench_service.model.request import JobRequest
+from bench_service.service import BenchService
+from bench_service.wall_clock import now
+
+router = APIRouter(prefix="/api/v1/jobs", tags=["jobs"])
+
+OF_A_JOB = (
+    "read_job",
+    "change_job",
+    "cancel",
+    "answer",
+    "pause",
+    "resume",
+    "events",
+    "read_result",
+    "read_truth",
+    "analyse_again",
+)
+"""What can be asked of a job once there is one."""
+
+
+@router.post(
+    "",
+    status_code=202,
+    responses={
+        **problems(404, 409, 413, 507),
+        **made(202, "job_id", *OF_A_JOB),
+    },
+)
+def submit(
+    body: JobSubmission,
+    service: Service,
+    response: Response,
+    key: IdempotencyKey = None,
+    requested_by: RequestedBy = None,
+) -> JobView:
+    """Queue a job. The same `Idempotency-Key` with the same body gives the job that the first one made."""
+    job = service.jobs.submit(
+        JobRequest(
+            body.procedure,
+            body.unit,
+            body.bench,
+            body.parameters,
+            body.priority,
+            body.labels,
+            body.seed,
+            body.deadline_at,
+            body.retries,
+            body.reservation,
+        ),
+        key,
+        requested_by or "",
+    )
+    response.headers["Location"] = f"/api/v1/jobs/{job.id}"
+    return _view(service, job)
+
+
+def _view(service: BenchService, job: Job) -> JobView:
+    return JobView.of(job, service.queues.standing([job])[job.id], service.live.of_job(job))
+
+
+@router.get("", responses=problems())
+def list_jobs(
+    service: Service,
+    state: JobState | None = None,
+    procedure: Annotated[str | None, Query(max_length=100)] = None,
+    unit: Annotated[str | None, Query(max_length=100)] = None,
+    after: After = None,
+    limit: Limit = 50,
+) -> JobPage:
+    """Jobs, newest first."""
+    page = service.stores.jobs.list(state=state, procedure=procedure, unit=unit, after=after, limit=limit)
+    standing = service.queues.standing(page.items)
+    items = [JobView.of(job, standing[job.id], service.live.of_job(job)) for job in page.items]
+    return JobPage(items=items, next=page.next)
+
+
+@router.get("/{job_id}", responses=problems(404, 409))
+def read_job(job_id: str, service: Service) -> JobView:
+    """One job: everything that is known of it, its place in the queue and why it waits."""
+    return _view(service, service.stores.jobs.get(job_id))
+
+
+@router.patch("/{job_id}", responses=problems(404, 409, 413, 507))
+def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
+    """Change the priority of a queued job, and with it its place in the queue."""
+    return _view(service, service.jobs.set_priority(job_id, body.priority))
+
+
+@router.post(
+    "/{job_id}/cancel",
+    status_code=202,
+    response_model=JobView,
+    responses={
+        **problems(404, 409, 507),
+        200: {"model": ForeignJob, "description": "Noted; the job is not understood here"},
+    },
+)
+def cancel(job_id: str, service: Service) -> JobView | JSONResponse:
+    """End a job: a queued one at once, a running one as soon as its bench is safe. Its recordings are kept.
+
+    One that this version does not understand is ended too; of it, only its state is told.
+    """
+    try:
+        return _view(service, service.jobs.cancel(job_id))
+    except NotUnderstood as error:
+        _, state = service.stores.jobs.last_event(job_id)
+        return JSONResponse(ForeignJob(id=job_id, state=state, waiting=str(error)).model_dump(mode="json"), 200)
+
+
+@router.post("/{job_id}/pause", status_code=202, responses=problems(404, 409, 507))
+def pause(job_id: str, service: Service) -> JobView:
+    """Put a job aside: a queued one at once, a running one before its next station. The bench is then safe and free."""
+    return _view(service, service.jobs.pause(job_id))
+
+
+@router.post("/{job_id}/answer", status_code=202, responses=problems(404, 409, 413, 507))
+def answer(job_id: str, body: PromptAnswer, service: Service, requested_by: RequestedBy = None) -> JobView:
+    """Say that what the job asks of the person at the bench (`prompt`) is done, or refuse it."""
+    said = Answer(body.done, body.remark, requested_by or "")
+    return _view(service, service.stores.prompts.answer(job_id, said, now()))
+
+
+@router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409, 507))
+def resume(job_id: str, service: Service) -> JobView:
+    """Queue a paused, interrupted or resumable failed job again; it goes on with the stations that remain."""
+    return _view(service, service.jobs.resume(job_id))
+
+
+@router.get(
+    "/{job_id}/events",
+    response_class=StreamingResponse,
+    responses={**problems(404, 409), **event_stream.DOCUMENTED},
+)
+async def events(
+    job_id: str,
+    hub: Hub,
+    last_event_id: Annotated[int, Header(alias="Last-Event-ID", ge=0, le=2**31)] = 0,
+) -> StreamingResponse:
+    """Everything that happens to the job as server-sent events, from after `Last-Event-ID`, until it has ended."""
+    await hub.require(job_id)
+    told = _told(hub, job_id, last_event_id)
+    return StreamingResponse(told, media_type="text/event-stream", headers=event_stream.HEADERS)
+
+
+async def _told(hub: EventHub, job_id: str, after: int) -> AsyncIterator[bytes]:
+    yield event_stream.HEAD
+    async for frame in hub.follow(job_id, after):
+        yield frame
+
+
+@router.get("/{job_id}/result", responses={**problems(404, 409), 304: {"description": "Not modified"}})
+def read_result(
+    job_id: str,
+    service: Service,
+    response: Response,
+    if_none_match: Annotated[str | None, Header(max_length=200)] = None,
+) -> ResultView:
+    """The result that gave the job its verdict. It never changes, so an ETag saves reading it twice."""
+    result = service.jobs.result_of(job_id)
+    etag = f'"{result.id}"'
+    if if_none_match == etag:
+        return Response(status_code=304, headers={"ETag": etag})  # pyright: ignore[reportReturnType]
+    response.headers["ETag"] = etag
+    return ResultView.of(result)
+
+
+@router.get("/{job_id}/truth", responses=problems(404, 409))
+def read_truth(job_id: str, service: Service) -> Truth:
+    """What the simulated unit really was in this job; 404 on a real bench."""
+    return Truth(job=job_id, triads=list(service.jobs.truth(job_id)))
+
+
+@router.post("/{job_id}/analyses", status_code=201, responses=problems(404, 409, 413, 507))
+def analyse_again(
+    job_id: str, body: Reanalysis, service: Service, response: Response, key: IdempotencyKey = None
+) -> ResultView:
+    """Analyse the job's recordings with other parameters. No bench is needed; the first result stays."""
+    result = service.analyses.analyse_again(job_id, body.parameters, key)
+    response.headers["Location"] = f"/api/v1/results/{result.id}"
+    return ResultView.of(result)
+
+
+@router.get("/{job_id}/analyses", responses=problems(404, 409))
+def list_analyses(job_id: str, service: Service, after: After = None, limit: Limit = 50) -> ResultPage:
+    """Every result of the job's recordings taken as a whole, newest first."""
+    service.stores.jobs.get(job_id)
+    page = service.stores.results.list(job_id=job_id, after=after, limit=limit)
+    return ResultPage(items=[ResultView.of(result) for result in page.items], next=page.next)

@@ -1,0 +1,181 @@
+"""What a client is told of a job: its state, its progress, what happened to it."""
+
+from datetime import datetime
+from typing import Any
+
+from pydantic import AwareDatetime, BaseModel, Field
+
+from bench_service.api.http.fields import NAME, Labels, Request
+from bench_service.api.procedures import PreviewRequest
+from bench_service.bench.driver import TrueTriad
+from bench_service.bench.live.values import LiveJob
+from bench_service.jobs.queue_service import Standing
+from bench_service.model.job import Event, Failure, Job, JobState
+from procedures.core.limits import Verdict
+
+
+class JobSubmission(PreviewRequest):
+    """A job to be done."""
+
+    procedure: str = NAME
+    priority: int = Field(10, ge=1, le=1000, description="Smaller runs first")
+    labels: Labels = Field(default_factory=Labels, max_length=50)
+    seed: int | None = Field(None, ge=0, lt=2**48, description="Of a simulated bench: same seed, same bytes")
+    retries: int = Field(0, ge=0, le=5, description="How often a fault of the bench is answered by trying again")
+    reservation: str | None = Field(None, max_length=100, description="The reservation under which it runs")
+    deadline_at: AwareDatetime | None = Field(None, description="No station begins later; the job then fails")
+
+
+class JobChange(Request):
+    """What can be changed of a job while it is queued."""
+
+    priority: int = Field(ge=1, le=1000, description="Smaller runs first")
+
+
+class PromptAnswer(Request):
+    """What the person at the bench says to what a job asks."""
+
+    done: bool = Field(description="It is done; false: it will not be, and the job ends cancelled")
+    remark: str = Field("", max_length=500, pattern=r"^[^\x00]*$")
+
+
+class Reanalysis(Request):
+    """Other parameters for a job's recordings; those left out stay as they were requested."""
+
+    parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+
+
+class Truth(BaseModel):
+    """What a simulated unit really was in a job."""
+
+    job: str
+    triads: list[TrueTriad]
+
+
+class Progress(BaseModel):
+    """How far a job is."""
+
+    station: int = Field(description="Stations finished")
+    stations: int
+    fraction: float
+    eta_s: float | None = Field(description="Bench time left, by the plan")
+    eta_wall_s: float | None = Field(
+        description="Real time left at the rate so far, without the analysis; null where it does not run, or its "
+        "driver is silent"
+    )
+    bench_time_s: float | None = Field(description="The bench's clock while the job runs, else null")
+    label: str | None = Field(description="The station that it works on while it runs, else null")
+
+
+class PlaceView(BaseModel):
+    """A queued job's place."""
+
+    position: int = Field(description="From 1, in the order of its bench's queue")
+    ahead: int = Field(description="Jobs that go before it as things stand, the running one included")
+
+
+class PromptView(BaseModel):
+    """What a person at the bench is asked to do; the job waits for the answer."""
+
+    text: str
+    asked_at: datetime
+
+
+class JobView(BaseModel):
+    """A job."""
+
+    id: str
+    procedure: str
+    procedure_version: str
+    unit: str
+    bench: str
+    state: JobState
+    verdict: Verdict | None
+    progress: Progress
+    priority: int
+    attempt: int = Field(description="How often it was queued: once, and again at each resume")
+    prompt: PromptView | None = Field(description="What a person at the bench is asked; see `answer`")
+    pause_requested: bool = Field(description="It pauses before its next station")
+    queue: PlaceView | None = Field(description="Its place while it is queued")
+    waiting: str | None = Field(description="Why it does not run now, as a sentence")
+    resumable: bool = Field(description="Whether it can be queued again to go on where it ended")
+    retries: int = Field(description="How often a fault of the bench is answered by trying again")
+    retries_left: int
+    not_before: datetime | None = Field(description="It is not tried before this moment")
+    reservation: str | None = Field(description="The reservation under which it runs")
+    queued_at: datetime | None = Field(description="When it came into its bench's queue")
+    deadline_at: datetime | None = Field(description="No station begins later")
+    labels: Labels
+    requested_by: str = Field(description="Who asked for it, as far as the client said")
+    requested_parameters: dict[str, Any]
+    parameters: dict[str, Any]
+    simulated: bool
+    seed: int | None
+    code_version: str
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+    duration_s: float = Field(description="Predicted bench time")
+    error: Failure | None
+    result: str | None = Field(description="Id of the result that gave the verdict")
+    page: str = Field(description="Path of the page for an eye")
+
+    @classmethod
+    def of(cls, job: Job, standing: Standing | None = None, live: LiveJob | None = None) -> "JobView":
+        """As HTTP says it; `standing` where it was asked for, `live` what its bench says of it while it runs."""
+        place = None if standing is None else standing.place
+        stations = len(job.stations)
+        open_state = job.state in (JobState.QUEUED, JobState.RUNNING, JobState.PAUSED)
+        fraction = 1.0 if job.state is JobState.SUCCEEDED else job.stations_done / stations if stations else 0.0
+        eta_s = job.duration_s * (1 - fraction) if open_state else None
+        if live is not None:
+            fraction, eta_s = max(fraction, live.fraction), live.eta_s
+        return cls(
+            **{name: getattr(job, name) for name in _SAME_IN_JOB},
+            progress=Progress(
+                station=job.stations_done,
+                stations=stations,
+                fraction=fraction,
+                eta_s=eta_s,
+                eta_wall_s=None if live is None else live.eta_wall_s,
+                bench_time_s=None if live is None else live.bench_time_s,
+                label=None if live is None else live.label,
+            ),
+            queue=None if place is None else PlaceView(position=place.position, ahead=place.ahead),
+            waiting=None if standing is None else standing.waiting,
+            resumable=job.resumable,
+            error=job.failure,
+            result=job.result_id,
+            page=f"/jobs/{job.id}",
+        )
+
+
+_SAME_IN_JOB = tuple(name for name in JobView.model_fields if name in Job.__dataclass_fields__)
+
+
+class JobPage(BaseModel):
+    """Jobs, newest first. Those that this version does not understand are left out, and named in its log."""
+
+    items: list[JobView]
+    next: str | None = Field(description="Cursor: pass it as `after` for the next page")
+
+
+class ForeignJob(BaseModel):
+    """A job that was stored by a version whose words this one does not understand."""
+
+    id: str
+    state: JobState
+    waiting: str = Field(description="What is not understood, as a sentence")
+
+
+class EventView(BaseModel):
+    """Something that happened to a job: the `data` of a server-sent event."""
+
+    sequence: int
+    at: datetime
+    kind: str
+    data: dict[str, Any]
+
+    @classmethod
+    def of(cls, event: Event) -> "EventView":
+        return cls(sequence=event.sequence, at=event.at, kind=event.kind, data=event.data)

@@ -1,0 +1,114 @@
+"""Results: methods run on stored evidence, and every result by its id."""
+
+from datetime import datetime
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel, Field
+
+from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
+from bench_service.api.http.errors import made, problems
+from bench_service.api.http.fields import NAME, Request
+from bench_service.evidence.analyses import AnalysisRequest
+from bench_service.model.records import StoredResult
+from procedures.core.limits import Verdict
+
+router = APIRouter(prefix="/api/v1", tags=["analyses"])
+
+
+class AnalysisSubmission(Request):
+    """A method and what it is to work on."""
+
+    method: str = NAME
+    recordings: list[str] = Field(default_factory=list[str], max_length=1000)
+    calibrations: list[str] = Field(default_factory=list[str], max_length=1000)
+    parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+
+
+class Lineage(BaseModel):
+    """What made a number."""
+
+    recordings: list[dict[str, str]] = Field(description="id and content hash of each recording, in order")
+    calibrations: list[str]
+    corrections: list[str] = Field(description="Ids of the correction sets that were applied")
+    parameters: dict[str, Any]
+    code_version: str
+    simulated: bool
+    seed: int | None
+    job: str | None
+
+
+class ResultView(BaseModel):
+    """A result: the document of its procedure or method, and its lineage."""
+
+    id: str
+    kind: str
+    name: str
+    version: str
+    unit: str | None
+    verdict: Verdict
+    created_at: datetime
+    document: dict[str, Any]
+    lineage: Lineage
+    page: str
+
+    @classmethod
+    def of(cls, result: StoredResult) -> "ResultView":
+        return cls(
+            id=result.id,
+            kind=result.kind,
+            name=result.name,
+            version=result.version,
+            unit=result.unit,
+            verdict=result.verdict,
+            created_at=result.created_at,
+            document=result.document,
+            lineage=Lineage(
+                recordings=[{"id": i, "content_hash": h} for i, h in result.recordings],
+                calibrations=list(result.calibrations),
+                corrections=list(result.corrections),
+                parameters=result.parameters,
+                code_version=result.code_version,
+                simulated=result.simulated,
+                seed=result.seed,
+                job=result.job_id,
+            ),
+            page=f"/results/{result.id}",
+        )
+
+
+class ResultPage(BaseModel):
+    """Results, newest first."""
+
+    items: list[ResultView]
+    next: str | None
+
+
+@router.post(
+    "/analyses",
+    status_code=201,
+    responses={**problems(404, 409, 413, 507), **made(201, "result_id", "read_result_by_id")},
+)
+def run_method(
+    body: AnalysisSubmission, service: Service, response: Response, key: IdempotencyKey = None
+) -> ResultView:
+    """Run a method on given recordings or calibrations of one unit."""
+    request = AnalysisRequest(body.method, tuple(body.recordings), tuple(body.calibrations), body.parameters)
+    result = service.analyses.run_method(request, key)
+    response.headers["Location"] = f"/api/v1/results/{result.id}"
+    return ResultView.of(result)
+
+
+@router.get("/results", responses=problems())
+def list_results(
+    service: Service, unit: Annotated[str | None, Query(max_length=100)] = None, after: After = None, limit: Limit = 50
+) -> ResultPage:
+    """Results, newest first."""
+    page = service.stores.results.list(unit=unit, after=after, limit=limit)
+    return ResultPage(items=[ResultView.of(result) for result in page.items], next=page.next)
+
+
+@router.get("/results/{result_id}", responses=problems(404))
+def read_result_by_id(result_id: str, service: Service) -> ResultView:
+    """One result with its lineage."""
+    return ResultView.of(service.stores.results.get(result_id))

@@ -1,0 +1,83 @@
+"""Units under test: what is declared of them, their calibrations and their corrections."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path
+
+from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
+from bench_service.api.http.errors import problems
+from bench_service.api.units.schemas import (
+    CalibrationPage,
+    CalibrationView,
+    CorrectionPage,
+    CorrectionView,
+    UnitDeclaration,
+    UnitView,
+)
+from bench_service.model.records import Idempotency
+from bench_service.model.request import fingerprint
+from procedures.core.unit import SERIAL, Unit
+from procedures.core.unit_correction import CorrectionKind
+
+router = APIRouter(prefix="/api/v1/units", tags=["units"])
+Serial = Annotated[str, Path(pattern=SERIAL)]
+
+
+@router.get("", responses=problems())
+def list_units(service: Service) -> list[UnitView]:
+    """Every unit that is known."""
+    return [UnitView.of(unit) for unit in service.stores.units.units()]
+
+
+@router.get("/{serial}", responses=problems(404))
+def read_unit(serial: str, service: Service) -> UnitView:
+    """One unit."""
+    return UnitView.of(service.stores.units.unit(serial))
+
+
+@router.put("/{serial}", responses=problems(413, 507))
+def declare_unit(serial: Serial, body: UnitDeclaration, service: Service) -> UnitView:
+    """Declare a unit or change what is declared. Its recordings, results and calibrations stay."""
+    service.stores.units.put_unit(
+        Unit(
+            serial,
+            body.sample_rate_hz,
+            tuple(body.channels),
+            body.gyro,
+            body.accelerometer,
+            body.averaging_time_s,
+        )
+    )
+    return UnitView.of(service.stores.units.unit(serial))
+
+
+@router.get("/{serial}/calibrations", responses=problems(404))
+def list_calibrations(serial: str, service: Service, after: After = None, limit: Limit = 50) -> CalibrationPage:
+    """The unit's calibrations, newest first; one is current."""
+    service.stores.units.unit(serial)
+    page = service.stores.results.calibrations(serial, after=after, limit=limit)
+    return CalibrationPage(items=[CalibrationView.of(c) for c in page.items], next=page.next)
+
+
+@router.get("/{serial}/corrections", responses=problems(404))
+def list_corrections(
+    serial: str, service: Service, kind: CorrectionKind | None = None, after: After = None, limit: Limit = 50
+) -> CorrectionPage:
+    """The unit's correction sets, newest first; one of each kind is current."""
+    service.stores.units.unit(serial)
+    page = service.stores.corrections.list(serial, kind=kind, after=after, limit=limit)
+    return CorrectionPage(items=[CorrectionView.of(c) for c in page.items], next=page.next)
+
+
+@router.get("/{serial}/corrections/{correction_id}", responses=problems(404))
+def read_correction(serial: str, correction_id: str, service: Service) -> CorrectionView:
+    """One correction set, and the results that rest on it."""
+    stored = service.stores.corrections.get(serial, correction_id)
+    return CorrectionView.of(stored, service.stores.corrections.used_by(correction_id))
+
+
+@router.post("/{serial}/corrections/{correction_id}/current", responses=problems(404, 409, 507))
+def choose_correction(serial: str, correction_id: str, service: Service, key: IdempotencyKey = None) -> CorrectionView:
+    """Make a correction set the one that new jobs use; jobs that began before keep theirs."""
+    asked = None if key is None else Idempotency(f"corrections:{key}", fingerprint([serial, correction_id]))
+    return CorrectionView.of(service.stores.corrections.make_current(serial, correction_id, asked))

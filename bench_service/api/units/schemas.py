@@ -1,0 +1,121 @@
+"""Schemas of units, their calibrations and their corrections. Units of measurement are in the field names."""
+
+from datetime import datetime
+
+from pydantic import BaseModel, Field
+
+from bench_service.api.http.fields import Request
+from bench_service.evidence.corrections import StoredCorrection
+from bench_service.model.records import StoredCalibration
+from procedures.core.converter import ConverterTriad
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.recording import Channel
+from procedures.core.thermal_correction import ThermalCorrection
+from procedures.core.unit import TriadRecord, Unit
+from procedures.core.unit_correction import CorrectionKind
+
+
+class UnitDeclaration(Request):
+    """What is declared of a unit (its data sheet), without its serial, which the address has."""
+
+    sample_rate_hz: float = Field(gt=0, le=1e6, allow_inf_nan=False)
+    channels: list[Channel] = Field(default_factory=list[Channel], max_length=64)
+    gyro: TriadRecord | None = None
+    accelerometer: TriadRecord | None = None
+    averaging_time_s: float = Field(70.0, gt=0, le=1e6, allow_inf_nan=False)
+
+
+class UnitView(BaseModel):
+    """A unit as it is declared."""
+
+    serial: str
+    sample_rate_hz: float
+    channels: list[Channel]
+    gyro: TriadRecord | None
+    accelerometer: TriadRecord | None
+    averaging_time_s: float
+    calibration: str | None = Field(description="Id of the current calibration")
+    thermal_correction: str | None = Field(description="Id of the current correction of the kind `thermal`")
+    converter: str | None = Field(description="Id of the current correction of the kind `converter`")
+
+    @classmethod
+    def of(cls, unit: Unit) -> "UnitView":
+        return cls(
+            serial=unit.serial,
+            sample_rate_hz=unit.sample_rate_hz,
+            channels=list(unit.channels),
+            gyro=unit.gyro,
+            accelerometer=unit.accelerometer,
+            averaging_time_s=unit.averaging_time_s,
+            calibration=unit.calibration_id,
+            thermal_correction=unit.thermal_correction_id,
+            converter=unit.converter_id,
+        )
+
+
+class CalibrationView(BaseModel):
+    """A calibration in a unit's history."""
+
+    id: str
+    unit: str
+    result: str
+    made_at: datetime
+    current: bool
+    simulated: bool
+    triads: list[TriadCalibration]
+
+    @classmethod
+    def of(cls, stored: StoredCalibration) -> "CalibrationView":
+        return cls(
+            id=stored.id,
+            unit=stored.unit,
+            result=stored.result_id,
+            made_at=stored.made_at,
+            current=stored.current,
+            simulated=stored.simulated,
+            triads=list(stored.triads),
+        )
+
+
+class CalibrationPage(BaseModel):
+    """Calibrations of a unit, newest first."""
+
+    items: list[CalibrationView]
+    next: str | None
+
+
+class CorrectionView(BaseModel):
+    """A correction set in a unit's history."""
+
+    id: str
+    unit: str
+    kind: CorrectionKind
+    result: str
+    made_at: datetime
+    current: bool
+    simulated: bool
+    thermal: ThermalCorrection | None = Field(description="Thesis 4.1, of the kind `thermal`; else null")
+    converter: ConverterTriad | None = Field(description="Models of x, y, z, of the kind `converter`; else null")
+    results: list[str] | None = Field(None, description="Results that rest on it; only where one is asked for")
+
+    @classmethod
+    def of(cls, stored: StoredCorrection, results: tuple[str, ...] | None = None) -> "CorrectionView":
+        return cls(
+            id=stored.id,
+            unit=stored.unit,
+            kind=stored.correction.kind,
+            result=stored.result_id,
+            made_at=stored.made_at,
+            current=stored.current,
+            simulated=stored.simulated,
+            thermal=stored.correction.thermal,
+            converter=stored.correction.converter,
+            results=None if results is None else list(results),
+        )
+
+
+class CorrectionPage(BaseModel):
+    """Correction sets of a unit, newest first."""
+
+    items: list[CorrectionView]
+    next: str | None

@@ -1,0 +1,1 @@
+"""One bench and its safety: the driver of its devices, the session of a job on them, watchdog and supervisor."""

@@ -1,0 +1,84 @@
+"""The benches that there are: the one that this process drives, and all that workers have registered."""
+
+from collections.abc import Callable
+
+from bench_service.bench.driver import BenchDriver
+from bench_service.bench.registry import BenchRegistry
+from bench_service.evidence.units import UnitStore
+from bench_service.model.errors import NotFound
+from procedures.bench import BenchDescription
+from procedures.core.unit import Unit
+
+
+class BenchDirectory:
+    """What can be known of a bench by its name, in any process of the database."""
+
+    def __init__(
+        self,
+        registry: BenchRegistry,
+        units: UnitStore,
+        driver: BenchDriver | None,
+        preferred: str,
+        drawn: Callable[[str], Unit | None],
+        holder: Callable[[str], str | None],
+    ) -> None:
+        """`driver`: of this process's own bench, if it drives one. `preferred`: the bench of jobs that name none.
+
+        `drawn`: the unit that every simulated bench has by drawing it from its serial; None for another serial.
+        `holder`: who drives a bench now, in a person's words; None: nobody.
+        """
+        self._registry = registry
+        self._units = units
+        self._driver = driver
+        self._preferred = preferred
+        self._drawn = drawn
+        self._holder = holder
+
+    def ids(self) -> tuple[str, ...]:
+        """Every bench that is registered."""
+        return tuple(bench.id for bench in self._registry.benches())
+
+    def description(self, bench_id: str) -> BenchDescription:
+        """Raises `NotFound`, naming those that there are."""
+        if self._driver is not None and self._driver.description.id == bench_id:
+            return self._driver.description
+        try:
+            return self._registry.bench(bench_id)
+        except NotFound:
+            there = ", ".join(self.ids())
+            raise NotFound("bench", bench_id, f"there is {there}" if there else "no bench is registered") from None
+
+    def default(self) -> str:
+        """The bench of a job that names none: this process's, or the only one. Raises `NotFound`."""
+        if self._driver is not None:
+            return self._driver.description.id
+        ids = self.ids()
+        return ids[0] if len(ids) == 1 else self._preferred
+
+    def one(self) -> str:
+        """A bench to look at where none is named and nothing will move: the default, or else the first registered one.
+
+        Raises `NotFound` where there is none at all.
+        """
+        default, ids = self.default(), self.ids()
+        return default if default in ids or not ids else ids[0]
+
+    def mounted(self, bench_id: str, serial: str | None = None) -> tuple[Unit, ...]:
+        """The units that a bench can test, as declared; a simulated bench has drawn ones when they are asked for.
+
+        Raises `NotFound` for an unknown bench.
+        """
+        description = self.description(bench_id)
+        if self._driver is not None and self._driver.description.id == bench_id:
+            return self._driver.mounted(serial)
+        units = [self._units.unit(name) for name in self._registry.mounted(bench_id)]
+        drawn = self._drawn(serial) if serial is not None and description.simulated else None
+        return tuple(units) if drawn is None else (*units, drawn)
+
+    def driven(self, bench_id: str) -> bool:
+        """Whether a worker drives a bench now: whether somebody holds its lease."""
+        return self.holder(bench_id) is not None
+
+    def holder(self, bench_id: str) -> str | None:
+        """Who drives a bench now."""
+        return self._holder(bench_id)

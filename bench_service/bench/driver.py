@@ -1,0 +1,63 @@
+"""PORT to the machine: what turns a bench's name into devices."""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from bench_service.bench.devices import BenchDevices
+from procedures.bench import Bench, BenchDescription, BenchNeeds
+from procedures.core.unit import Unit
+
+
+@dataclass(frozen=True)
+class TrueTriad:
+    """What a simulated triad really was in one launch: ``U = bias + matrix·v`` in the nominal output's unit."""
+
+    triad: str
+    output_unit: str
+    bias: tuple[float, ...]
+    matrix: tuple[tuple[float, ...], ...]
+
+
+class Lease(Protocol):
+    """The right to drive a bench, held for a process's life unless it is lost."""
+
+    def held(self) -> bool:
+        """Whether it is still ours."""
+        ...
+
+    def regain(self) -> bool:
+        """Take it again after it was lost; False where somebody else has it, or the database does not answer."""
+        ...
+
+    def release(self) -> None:
+        """Give the bench back; a second time does nothing."""
+        ...
+
+
+class BenchDriver(BenchDevices, Protocol):
+    """One bench's devices. `open` is called once per job, and again after a restart."""
+
+    @property
+    def description(self) -> BenchDescription: ...
+
+    def mounted(self, serial: str | None = None) -> tuple[Unit, ...]:
+        """The units that this bench can test, as declared; a simulated bench mounts some when they are asked for."""
+        ...
+
+    def open(
+        self,
+        unit: str,
+        seed: int | None,
+        checkpoint: dict[str, Any] | None,
+        needs: BenchNeeds,
+        job: str | None = None,
+    ) -> Bench:
+        """The bench with a unit on it, for a job; from a checkpoint, a simulated world goes on where it was.
+
+        It has the devices' links until `Bench.close`. Raises `NotMounted`, `DeviceBusy`, `BenchError`.
+        """
+        ...
+
+    def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
+        """What a simulated unit really is in a job with this seed; empty on a real bench."""
+        ...

@@ -1,0 +1,1 @@
+"""The live state of benches: published by the process that drives one, read by all."""

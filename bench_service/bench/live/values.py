@@ -1,0 +1,209 @@
+"""What a bench is doing at this moment: said by who drives it, read by everybody, kept nowhere but in one row a bench.
+
+In the process that drives a bench the newest word is in memory; other processes read the row. It is at the same time
+the sign that the driver lives: an idle one says so every `BEAT_S`.
+"""
+
+import logging
+import os
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import datetime
+from threading import Event, Thread
+from typing import Protocol
+
+from bench_service.model.errors import ServiceError
+from bench_service.model.job import Job, JobState
+from bench_service.wall_clock import now
+from procedures.bench.chamber import ChamberReading
+
+PUBLISH_S = 0.5
+"""A running job is told of at most so often [s, real time]."""
+BEAT_S = 5.0
+"""An idle driver says so often that it is there [s, real time]."""
+SEEN_S = 15.0
+"""Who has said nothing for so long is not there, or cannot write [s, real time]."""
+HOST = socket.gethostname()
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class LiveDevices:
+    """What the devices say of themselves; angles are those of the encoders."""
+
+    outer_deg: float
+    middle_deg: float
+    inner_deg: float
+    moving: bool
+    """Whether the table follows a demand, or settles after it."""
+    unit_on: bool
+    chamber: ChamberReading | None = None
+    """None: the bench has none."""
+
+
+@dataclass(frozen=True)
+class LiveChannel:
+    """A channel in nominal rate units, one number for each stretch of `LiveSamples`."""
+
+    name: str
+    unit: str
+    minimum: tuple[float, ...]
+    mean: tuple[float, ...]
+    maximum: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class LiveSamples:
+    """A few of the last stretches of the recording: enough for an eye, never the data."""
+
+    start_s: tuple[float, ...]
+    """Bench time of each stretch's beginning."""
+    stop_s: tuple[float, ...]
+    channels: tuple[LiveChannel, ...]
+
+
+@dataclass(frozen=True)
+class LiveJob:
+    """How far the job is that drives the bench."""
+
+    id: str
+    station: int
+    """Index of the station that it works on."""
+    stations: int
+    label: str
+    bench_time_s: float
+    """The bench's clock."""
+    fraction: float
+    """Part of the planned bench time that is over, 0 … 1."""
+    eta_s: float
+    """Bench time left, by the plan."""
+    eta_wall_s: float | None
+    """Real time left at the rate so far, without the analysis; None: nothing has passed yet."""
+    bench_s_per_s: float | None
+    """Seconds of bench time in a second of real time, since this process opened the bench."""
+
+
+@dataclass(frozen=True)
+class BenchLive:
+    """The last that a bench's driver said."""
+
+    bench: str
+    at: datetime
+    host: str = HOST
+    process: int = 0
+    driving: bool = True
+    """False: the driver has ended in order."""
+    job: LiveJob | None = None
+    devices: LiveDevices | None = None
+    """None: nobody has opened the bench, or its devices do not answer."""
+    samples: LiveSamples | None = None
+
+    def seen_s(self, at: datetime) -> float:
+        """How long ago that was [s]."""
+        return max(0.0, (at - self.at).total_seconds())
+
+    def there(self, at: datetime) -> bool:
+        """Whether somebody drives the bench, as far as can be known from here.
+
+        A word from later than `SEEN_S` from now is as old as the clock's being set back: who lives says it anew.
+        """
+        return self.driving and abs((at - self.at).total_seconds()) <= SEEN_S
+
+
+class LiveStore(Protocol):
+    """PORT of memory: one row a bench."""
+
+    def put(self, live: BenchLive) -> None:
+        """Replace what was said before. Raises `StorageFull`, `StorageFailure`."""
+        ...
+
+    def get(self, bench_id: str) -> BenchLive | None: ...
+
+    def all(self) -> tuple[BenchLive, ...]:
+        """Of every bench that ever had a driver, by name."""
+        ...
+
+
+class LiveBoard:
+    """The newest word of every bench: of the one that this process drives from memory, of others from their rows."""
+
+    def __init__(self, store: LiveStore, own: str | None = None, clock: Callable[[], datetime] = now) -> None:
+        """`own`: the bench that this process drives."""
+        self.own = own
+        self._store = store
+        self._clock = clock
+        self._said: BenchLive | None = None if own is None else BenchLive(own, clock(), process=os.getpid())
+        self.news = Event()
+
+    def publish(self, live: BenchLive) -> None:
+        """Say what the own bench does now; called by who drives it, never waits."""
+        self._said = replace(live, process=os.getpid())
+        self.news.set()
+
+    def said(self) -> BenchLive | None:
+        """The last word of the own bench."""
+        return self._said
+
+    def of_bench(self, bench_id: str) -> BenchLive | None:
+        """The last word of a bench; None: nobody ever drove it. Raises `StorageFailure`."""
+        if bench_id == self.own and self._said is not None:
+            return self._said if self._said.job else replace(self._said, at=self._clock())
+        return self._store.get(bench_id)
+
+    def all(self) -> tuple[BenchLive, ...]:
+        """The last word of every bench."""
+        others = (live for live in self._store.all() if live.bench != self.own)
+        mine = () if self.own is None else (self.of_bench(self.own),)
+        return tuple(live for live in (*mine, *others) if live is not None)
+
+    def of_job(self, job: Job) -> LiveJob | None:
+        """How far a running job is; None where it does not run, or its driver is silent. Raises `StorageFailure`."""
+        if job.state is not JobState.RUNNING:
+            return None
+        live = self.of_bench(job.bench)
+        if live is None or live.job is None or live.job.id != job.id or not live.there(self._clock()):
+            return None
+        return live.job
+
+
+class Heartbeat:
+    """Writes the own bench's word into its row, in a thread of its own: a slow disk never holds the bench up."""
+
+    def __init__(self, board: LiveBoard, store: LiveStore) -> None:
+        self._board = board
+        self._store = store
+        self._ending = Event()
+        self._silent = False
+        self._thread = Thread(target=self._run, name="heartbeat", daemon=True)
+
+    def begin(self) -> None:
+        """The bench's lease must be held."""
+        self._thread.start()
+
+    def end(self) -> None:
+        """Say for the last time that nobody drives the bench any more."""
+        self._ending.set()
+        self._board.news.set()
+        self._thread.join()
+        if (said := self._board.said()) is not None:
+            self._write(replace(said, at=now(), driving=False, job=None, devices=None, samples=None))
+
+    def _run(self) -> None:
+        while not self._ending.is_set():
+            self._board.news.clear()
+            said = self._board.said()
+            if said is not None:
+                self._write(said if said.job else replace(said, at=now()))
+            self._board.news.wait(BEAT_S)
+            self._ending.wait(PUBLISH_S)
+
+    def _write(self, live: BenchLive) -> None:
+        try:
+            self._store.put(live)
+            self._silent = False
+        except ServiceError as error:
+            if not self._silent:  # once: a full disk lasts
+                log.warning("what bench %s does cannot be told to other processes: %s", live.bench, error)
+            self._silent = True

@@ -1,0 +1,168 @@
+"""What is known of a bench's safety, and who sees to it: asked by HTTP, pages, and a service that starts."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from bench_service.bench.devices import BenchDevices, DeviceState
+from bench_service.bench.processes import ProcessIdentity, Watch
+from bench_service.bench.registry import BenchRegistry
+from bench_service.model.errors import NotFound, NotSafe
+from bench_service.model.records import BenchStop
+from bench_service.wall_clock import monotonic_s, now, pause
+from procedures.bench.errors import BenchError, DeviceBusy
+
+STOPPING_S = 1.0
+"""How long the answer to a stop waits for the devices to be safe [s, real time]."""
+START_S = 3.0
+"""How long a service that starts waits for a supervisor that has the devices' link at this moment [s]."""
+LOOK_S = 0.02
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Safety:
+    """What is known of a bench's safety at one moment."""
+
+    safe: bool | None
+    """None: not known on this host, and nobody on the bench's own has said."""
+    explanation: str
+    """For a person, in whole sentences."""
+    devices: DeviceState | None
+    worker: ProcessIdentity | None
+    """The process of this host that drives the bench, if one lives."""
+    supervisor: ProcessIdentity | None
+    """The process of this host that supervises it, if one lives."""
+
+
+class SafetyService:
+    """Asks a bench's devices, and the processes around them, on this host; of other hosts, the database."""
+
+    def __init__(
+        self,
+        benches: BenchRegistry,
+        devices: Callable[[str], BenchDevices],
+        watch: Callable[[str], Watch],
+        note: Callable[[str, str, datetime, dict[str, Any]], None],
+    ) -> None:
+        """`devices` and `watch`: those of a bench, by its id. `note`: appends an event to a job (`JobStore.note`)."""
+        self._benches = benches
+        self._append = note
+        self._devices = devices
+        self._watch = watch
+        self._by = f"the service, {ProcessIdentity.own()}"
+
+    def known(self, bench_id: str) -> Safety:
+        """What is known now. Raises `StorageFailure`."""
+        state = self._devices(bench_id).device_state()
+        watch = self._watch(bench_id)
+        driving = watch.driving()
+        worker = driving.process if driving is not None and driving.alive else None
+        supervisor = watch.supervisor()
+        if state is None:
+            safe, explanation = _elsewhere(bench_id, self._benches.bench_stop(bench_id))
+        else:
+            safe, explanation = state.safe, _here(bench_id, state, worker, supervisor)
+        return Safety(safe, explanation, state, worker, supervisor)
+
+    def stopping(self, bench_id: str) -> Safety:
+        """What is known shortly after a stop was noted. Where nobody else can, the devices are made safe here."""
+        found = self.known(bench_id)
+        if found.safe is False and found.worker is None and found.supervisor is None:
+            alone = found.explanation
+            failure = self._try(bench_id)
+            found = self.known(bench_id)
+            done = "This service made it safe itself." if failure is None else f"This service tried itself: {failure}."
+            return Safety(found.safe, f"{alone} {done}", found.devices, found.worker, found.supervisor)
+        deadline = monotonic_s() + STOPPING_S
+        while found.safe is not True and monotonic_s() < deadline:
+            pause(LOOK_S)
+            found = self.known(bench_id)
+        return found
+
+    def require(self, bench_id: str) -> None:
+        """Raises `NotSafe` with the reason where the devices are not known to be safe, after trying to make them so."""
+        found = self.known(bench_id)
+        failure = self._try(bench_id) if found.safe is False else None
+        if failure is not None:
+            raise NotSafe(f"bench {bench_id!r} is not released: {failure}")
+        if found.safe is None:
+            raise NotSafe(f"bench {bench_id!r} is not released: {found.explanation}")
+
+    def at_start(self, bench_id: str) -> None:
+        """What a dead process left is made safe before anything else is done; the bench's lease must be held.
+
+        Where that fails the bench is stopped: the service answers, but nothing moves until a person has looked.
+        """
+        state = self._devices(bench_id).device_state()
+        if state is None:  # the first start on this host: from now on the devices are known here
+            failure = self._try(bench_id)
+            if failure is not None:
+                log.warning("bench %s: %s", bench_id, failure)
+            return
+        if state.safe:
+            return
+        deadline = monotonic_s() + START_S
+        failure = self._try(bench_id)
+        while failure is not None and monotonic_s() < deadline:
+            pause(LOOK_S * 5)
+            failure = self._try(bench_id)
+        text = f"when the service started, {' and '.join(state.unsafe)}: "
+        if failure is None:
+            self._note(state.job, text + "made safe first")
+        else:
+            self.stop_unsafe(bench_id, failure)
+            self._note(state.job, text + failure)
+
+    def stop_unsafe(self, bench_id: str, why: str) -> None:
+        """Nothing may run on a bench that could not be made safe, until a person releases it."""
+        log.error("bench %s: %s", bench_id, why)
+        self._benches.stop_bench(BenchStop(bench_id, now(), why))
+
+    def _try(self, bench_id: str) -> str | None:
+        """Make the devices safe over their own link; why not, in a sentence."""
+        try:
+            self._devices(bench_id).make_safe(self._by)
+        except DeviceBusy as busy:
+            return str(busy)
+        except BenchError as error:
+            return f"could not be made safe: {error}"
+        except ExceptionGroup as group:
+            return f"could not be made safe: {'; '.join(map(str, group.exceptions))}"
+        return None
+
+    def _note(self, job: str | None, text: str) -> None:
+        log.warning("%s", text)
+        if job is not None:
+            try:
+                self._append(job, "note", now(), {"text": text, "by": self._by})
+            except NotFound:  # another database's job: the register was moved, or the database was
+                return
+
+
+def _here(bench_id: str, state: DeviceState, worker: ProcessIdentity | None, supervisor: ProcessIdentity | None) -> str:
+    if state.safe:
+        return "The devices are safe: the table is at rest, the unit is off."
+    unsafe = f"The devices are not safe: {', '.join(state.unsafe)}."
+    if worker is not None and state.linked:
+        return f"{unsafe} The worker, {worker}, drives them."
+    if supervisor is not None:
+        return f"{unsafe} Nobody drives them; the supervisor, {supervisor}, makes them safe."
+    if worker is not None:
+        return f"{unsafe} The worker, {worker}, has given them up; a release tries again."
+    return (
+        f"{unsafe} On this host neither a worker nor a supervisor of bench {bench_id!r} is alive: start one, or use "
+        "the hardware emergency stop."
+    )
+
+
+def _elsewhere(bench_id: str, stop: BenchStop | None) -> tuple[bool | None, str]:
+    if stop is not None and stop.safe_at is not None:
+        return True, f"Seen safe on the bench's host at {stop.safe_at.isoformat()}, last commanded by {stop.safe_by}."
+    return None, (
+        f"The devices of bench {bench_id!r} are not on this host, and nobody on theirs has said that they are safe: "
+        "whether a worker or a supervisor is alive there is not known here."
+    )

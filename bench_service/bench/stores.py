@@ -1,0 +1,17 @@
+"""Stores of the bench room: the registry of benches, their live state, and prompts to the person at the bench."""
+
+from dataclasses import dataclass
+
+from bench_service.bench.live.values import LiveStore
+from bench_service.bench.prompts import PromptStore
+from bench_service.bench.registry import BenchRegistry
+from bench_service.evidence.stores import EvidenceStores
+
+
+@dataclass(frozen=True)
+class BenchStores(EvidenceStores):
+    """The stores of this room and of those below it."""
+
+    benches: BenchRegistry
+    live: LiveStore
+    prompts: PromptStore

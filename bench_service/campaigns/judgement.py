@@ -1,0 +1,101 @@
+"""What a step's result says beside its own checks: the campaign's limits, and the unit's history."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from bench_service.campaigns.campaign import Campaign, Step, StepLimit, TrendRule
+from bench_service.campaigns.stores import Stores
+from bench_service.evidence.trend import trend_of, value_of
+from bench_service.model.errors import NotFound
+from bench_service.model.quantities import quantity
+from bench_service.model.records import StoredResult
+from procedures.core.errors import BadParameter
+from procedures.core.limits import Check, Limit, Verdict, check
+from procedures.core.units import converted
+
+CHECKS = TypeAdapter(tuple[Check, ...])
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A step's verdict, and everything that it rests on."""
+
+    verdict: Verdict
+    checks: tuple[Check, ...]
+    warnings: tuple[str, ...]
+    reason: str = ""
+
+
+def judge(step: Step, campaign: Campaign, result: StoredResult, stores: Stores) -> Judgement:
+    """The result's own verdict, worse where the campaign asks for more.
+
+    A limit on something that the result does not have, or has in another kind of unit, is an error of the step.
+    """
+    own = checks_of(result.document)
+    warnings = list(result.document.get("warnings", []))
+    added: list[Check] = []
+    failures: list[str] = []
+    for limit in step.limits:
+        try:
+            added.append(_limited(limit, campaign, result.document))
+        except (NotFound, BadParameter) as error:
+            failures.append(str(error))
+    for rule in step.trends:
+        try:
+            judged, said = _trend(rule, result, stores)
+        except NotFound as error:
+            failures.append(str(error))
+            continue
+        added += judged
+        warnings += said
+    return Judgement(_worst(result.verdict, added, failures), (*own, *added), tuple(warnings), "; ".join(failures))
+
+
+def checks_of(document: dict[str, Any]) -> tuple[Check, ...]:
+    """The procedure's own checks."""
+    return CHECKS.validate_python(document.get("checks", []))
+
+
+def _worst(own: Verdict, added: Sequence[Check], failures: Sequence[str]) -> Verdict:
+    if own is Verdict.ERROR or failures:
+        return Verdict.ERROR
+    return Verdict.PASS if own is Verdict.PASS and all(c.passed for c in added) else Verdict.FAIL
+
+
+def _limited(limit: StepLimit, campaign: Campaign, document: dict[str, Any]) -> Check:
+    found = quantity(document, limit.quantity)
+    try:
+        size = converted(1.0, found.unit or limit.unit, limit.unit)
+    except ValueError as error:
+        raise BadParameter("limits.unit", limit.unit, f"{limit.quantity}: {error}") from error
+    wanted = Limit(limit.unit, limit.maximum, limit.minimum, f"campaign {campaign.name}")
+    uncertainty = None if found.standard_uncertainty is None else found.standard_uncertainty * size
+    return check(f"{limit.quantity}, campaign's limit", found.value * size, wanted, uncertainty)
+
+
+def _trend(rule: TrendRule, result: StoredResult, stores: Stores) -> tuple[list[Check], list[str]]:
+    """The newest value against limits from the results of the same plan before it."""
+    unit, now = result.unit or "", quantity(result.document, rule.quantity)
+    earlier = stores.results.values(
+        unit,
+        result.name,
+        rule.quantity,
+        simulated=result.simulated,
+        limit=rule.last,
+        before=result.id,
+        parameters=result.parameters,
+    )
+    chart = trend_of([*earlier[::-1], value_of(result, rule.quantity)], unit, result.name, rule.quantity, judged=1)
+    known = len(chart.points) - 1
+    if known < rule.at_least or chart.limits is None:
+        return [], [f"trend of {rule.quantity}: {known} earlier results, {rule.at_least} are needed to judge it"]
+    broken = [s.rule for s in chart.signals if s.index == known]
+    text = f"trend of {rule.quantity} over {known} results: {'; '.join(broken) or 'no signal'}"
+    if rule.outcome == "warning":
+        return [], [text] if broken else []
+    limit = Limit(now.unit, chart.limits.upper, chart.limits.lower, f"control limits of {known} earlier results")
+    name = f"{rule.quantity}, trend"
+    return [Check(name, now.value, limit, not broken, now.standard_uncertainty, text)], []

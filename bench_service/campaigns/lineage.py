@@ -1,0 +1,83 @@
+"""What a run's numbers were made of: jobs, results, recordings with their hashes, versions, seeds."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from bench_service.campaigns.run import CampaignRun, StepRun
+from bench_service.campaigns.stores import Stores
+from bench_service.model.job import Job
+from bench_service.model.records import StoredResult
+
+
+@dataclass(frozen=True)
+class StepLineage:
+    """One attempt of a step."""
+
+    step: str
+    does: str
+    version: str
+    """Of the procedure or method."""
+    job: str | None
+    state: str
+    """Of the job, or of the step of a method."""
+    result: str | None
+    recordings: tuple[tuple[str, str], ...]
+    """(id, content hash) of each recording that the result rests on, or that the job made before it broke off."""
+    calibrations: tuple[str, ...]
+    """Ids of the calibrations that were used."""
+    parameters: dict[str, Any]
+    code_version: str
+    simulated: bool
+    seed: int | None
+
+
+def lineage_of(run: CampaignRun, stores: Stores) -> tuple[StepLineage, ...]:
+    """Of every attempt of every step, in order; steps that never began have none."""
+    found: list[StepLineage] = []
+    for step in run.steps:
+        for job_id in (*step.earlier_jobs, *((step.job_id,) if step.job_id else ())):
+            job = stores.jobs.get(job_id)
+            result = stores.results.get(job.result_id) if job.result_id else None
+            found.append(_of_job(step, job, result, stores))
+        if step.job_id is None and step.result_id is not None:
+            found.append(_of_method(step, stores.results.get(step.result_id)))
+    return tuple(found)
+
+
+def _of_job(step: StepRun, job: Job, result: StoredResult | None, stores: Stores) -> StepLineage:
+    recordings = (
+        tuple((r.info.id, r.info.content_hash) for r in stores.recordings.of_job(job.id))
+        if result is None
+        else result.recordings
+    )
+    return StepLineage(
+        step=step.name,
+        does=job.procedure,
+        version=job.procedure_version,
+        job=job.id,
+        state=job.state.value,
+        result=job.result_id,
+        recordings=recordings,
+        calibrations=() if result is None else result.calibrations,
+        parameters=job.parameters,
+        code_version=job.code_version if result is None else result.code_version,
+        simulated=job.simulated,
+        seed=job.seed,
+    )
+
+
+def _of_method(step: StepRun, result: StoredResult) -> StepLineage:
+    return StepLineage(
+        step=step.name,
+        does=result.name,
+        version=result.version,
+        job=None,
+        state=step.state.value,
+        result=result.id,
+        recordings=result.recordings,
+        calibrations=result.calibrations,
+        parameters=result.parameters,
+        code_version=result.code_version,
+        simulated=result.simulated,
+        seed=None,
+    )

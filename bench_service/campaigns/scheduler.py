@@ -1,0 +1,158 @@
+"""Schedules: what may be asked of them, and the starts that are due.
+
+At most one run starts however many starts were due, for the latest of them. It is on time until `start_within_s` after
+it was planned; later than that it was missed, and the schedule says whether one run makes up for it. While the
+schedule's previous run is open, it says whether the new one waits or is left out. The next start moves on in the
+transaction that stores the run, so of several processes one starts it. A clock that is set back repeats nothing: a
+start that was seen is in the schedule's past.
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta
+
+from bench_service.campaigns import transitions
+from bench_service.campaigns.campaign import Campaign
+from bench_service.campaigns.run import CampaignRun, RunRequest
+from bench_service.campaigns.schedule import Missed, Overlap, Schedule, latest_due, next_start
+from bench_service.campaigns.stores import Stores
+from bench_service.model.errors import IdempotencyConflict, NotFound, ServiceError, StorageFailure, StorageFull
+from bench_service.model.records import Idempotency, Page
+from bench_service.model.request import fingerprint
+from bench_service.wall_clock import new_id, now
+from procedures.core.errors import DomainError
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class ScheduleRequest:
+    """A schedule as a client asks for it."""
+
+    cron: str
+    time_zone: str
+    campaign: str
+    unit: str
+    bench: str | None = None
+    missed: Missed = Missed.RUN_ONCE
+    start_within_s: float = 300.0
+    overlap: Overlap = Overlap.SKIP
+    enabled: bool = True
+    labels: dict[str, str] = field(default_factory=dict[str, str])
+
+
+class Scheduler:
+    """Schedules of one service; `prepared` makes a run of a request, examined but not stored."""
+
+    def __init__(
+        self,
+        stores: Stores,
+        campaign_of: Callable[[str], Campaign],
+        prepared: Callable[[RunRequest], CampaignRun],
+    ) -> None:
+        self._stores = stores
+        self._campaign_of = campaign_of
+        self._prepared = prepared
+
+    def add(self, request: ScheduleRequest, key: str | None = None) -> Schedule:
+        """Raises `BadParameter` for a time that never comes, and what the run itself would be refused for.
+
+        A key of a schedule that was removed since is used up: `IdempotencyConflict`.
+        """
+        idempotency = None if key is None else Idempotency(f"schedules:{key}", fingerprint(request))
+        known = self._stores.keys.made(idempotency, "schedule")
+        if known is not None:
+            return self._kept(known)
+        at = now()
+        next_at = next_start(request.cron, request.time_zone, at)
+        run = self._prepared(RunRequest(request.campaign, request.unit, request.bench, labels=request.labels))
+        schedule = Schedule(
+            id=new_id(),
+            cron=request.cron,
+            time_zone=request.time_zone,
+            campaign=request.campaign,
+            unit=request.unit,
+            created_at=at,
+            bench=run.bench,
+            enabled=request.enabled,
+            missed=request.missed,
+            start_within_s=request.start_within_s,
+            overlap=request.overlap,
+            labels=request.labels,
+            next_at=next_at if request.enabled else None,
+        )
+        return self._stores.campaigns.add_schedule(schedule, idempotency)
+
+    def _kept(self, schedule_id: str) -> Schedule:
+        try:
+            return self.get(schedule_id)
+        except NotFound as error:
+            raise IdempotencyConflict(f"this key made schedule {schedule_id}, which was removed since") from error
+
+    def enable(self, schedule_id: str, enabled: bool) -> Schedule:
+        """Switch a schedule on or off; starts that passed while it was off are not made up. Raises `NotFound`."""
+        campaigns = self._stores.campaigns
+        while True:
+            schedule = campaigns.schedule(schedule_id)
+            if schedule.enabled == enabled:
+                return schedule
+            next_at = next_start(schedule.cron, schedule.time_zone, now()) if enabled else None
+            changed = replace(schedule, enabled=enabled, next_at=next_at)
+            if campaigns.save_schedule(changed, schedule.next_at, None):
+                return changed
+
+    def get(self, schedule_id: str) -> Schedule:
+        """Raises `NotFound`."""
+        return self._stores.campaigns.schedule(schedule_id)
+
+    def list(self, after: str | None = None, limit: int = 50) -> Page[Schedule]:
+        """Newest first."""
+        return self._stores.campaigns.schedules(after, limit)
+
+    def remove(self, schedule_id: str) -> None:
+        """Its runs stay. Raises `NotFound`."""
+        self._stores.campaigns.remove_schedule(schedule_id)
+
+    def fire_due(self) -> None:
+        """Start what is due now. One schedule that cannot be read does not keep the others from starting."""
+        at = now()
+        for schedule in self._stores.campaigns.due_schedules(at):
+            try:
+                self.fire(schedule, at)
+            except DomainError as error:
+                log.error("schedule %s cannot be kept: %s", schedule.id, error)
+
+    def fire(self, schedule: Schedule, at: datetime) -> bool:
+        """Do what a due schedule's rules say; False where another process was faster. Raises `StorageFailure`."""
+        planned = latest_due(schedule, at)
+        run, outcome = self._started(schedule, planned, at)
+        changed = replace(
+            schedule,
+            next_at=next_start(schedule.cron, schedule.time_zone, at),
+            last_at=planned,
+            last_run=schedule.last_run if run is None else run.id,
+            last_outcome=outcome,
+        )
+        log.info("schedule %s, planned for %s: %s", schedule.id, planned.isoformat(), outcome)
+        return self._stores.campaigns.save_schedule(changed, schedule.next_at, run)
+
+    def _started(self, schedule: Schedule, planned: datetime, at: datetime) -> tuple[CampaignRun | None, str]:
+        """The run that begins, if one does, and what became of the start in words."""
+        missed = at - planned > timedelta(seconds=schedule.start_within_s)
+        late = f"missed by {at - planned}" if missed else ""
+        if missed and schedule.missed is Missed.SKIP:
+            return None, f"skipped: {late}"
+        open_run = self._stores.campaigns.open_run_of(schedule.id)
+        if open_run is not None and schedule.overlap is Overlap.SKIP:
+            return None, f"skipped: its run {open_run} is still open"
+        request = RunRequest(schedule.campaign, schedule.unit, schedule.bench, labels=schedule.labels)
+        try:
+            run = self._prepared(request)
+        except (StorageFailure, StorageFull):
+            raise
+        except (DomainError, ServiceError) as error:
+            campaign = self._campaign_of(schedule.campaign)
+            run = transitions.not_begun(new_id(), request, campaign, schedule.bench or "", str(error), at)
+        outcome = f"could not begin: {run.reason}" if not run.open else "made up: " + late if missed else "started"
+        return replace(run, schedule_id=schedule.id, planned_at=planned), outcome

@@ -1,0 +1,17 @@
+"""Campaigns that come with the service. They cannot be changed, only taken as a model for others."""
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+from bench_service.campaigns.campaign import Campaign
+
+FOLDER = Path(__file__).parent
+DEFAULT = "thesis_acceptance"
+
+
+@cache
+def shipped() -> Mapping[str, Campaign]:
+    """By name."""
+    found = (Campaign.model_validate_json(file.read_bytes()) for file in sorted(FOLDER.glob("*.json")))
+    return {campaign.name: campaign for campaign in found}

@@ -1,0 +1,100 @@
+"""PORT of memory for campaigns, their runs and schedules; as in `bench_service.jobs.stores` each method is one
+transaction.
+"""
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Protocol
+
+from bench_service.campaigns.campaign import Campaign
+from bench_service.campaigns.run import CampaignRun
+from bench_service.campaigns.schedule import Schedule
+from bench_service.jobs.stores import JobStores
+from bench_service.model.job import JobState
+from bench_service.model.records import Idempotency, Page
+
+
+class CampaignStore(Protocol):
+    """Campaigns, runs, schedules."""
+
+    def add(self, campaign: Campaign, at: datetime, idempotency: Idempotency | None = None) -> Campaign:
+        """Store a new campaign. Raises `NameTaken`, `IdempotencyConflict`."""
+        ...
+
+    def replace(self, campaign: Campaign, at: datetime) -> None:
+        """Change a campaign; runs keep the one that they began with. Raises `NotFound`."""
+        ...
+
+    def get(self, name: str) -> Campaign:
+        """Raises `NotFound`."""
+        ...
+
+    def list(self, after: str | None = None, limit: int = 50) -> tuple[Campaign, ...]:
+        """Campaigns by name, from behind a name on."""
+        ...
+
+    def add_run(self, run: CampaignRun, idempotency: Idempotency | None = None) -> CampaignRun:
+        """Store a new run; where the key is known, give the run that it made. Raises `IdempotencyConflict`."""
+        ...
+
+    def run(self, run_id: str) -> CampaignRun:
+        """Raises `NotFound`."""
+        ...
+
+    def save_run(self, run: CampaignRun, revision: int) -> bool:
+        """Replace a run, unless it was changed since that revision was read. Whether it was replaced."""
+        ...
+
+    def runs(
+        self,
+        *,
+        campaign: str | None = None,
+        unit: str | None = None,
+        state: JobState | None = None,
+        after: str | None = None,
+        limit: int = 50,
+    ) -> Page[CampaignRun]: ...
+
+    def counts(self) -> dict[tuple[str, str, str], int]:
+        """How many runs there are, by campaign, state and verdict ("" where there is none)."""
+        ...
+
+    def open_runs(self) -> tuple[CampaignRun, ...]:
+        """Runs that have not ended, oldest first."""
+        ...
+
+    def open_run_of(self, schedule_id: str) -> str | None:
+        """Id of the oldest open run that a schedule started."""
+        ...
+
+    def add_schedule(self, schedule: Schedule, idempotency: Idempotency | None = None) -> Schedule:
+        """Raises `IdempotencyConflict`."""
+        ...
+
+    def schedule(self, schedule_id: str) -> Schedule:
+        """Raises `NotFound`."""
+        ...
+
+    def schedules(self, after: str | None = None, limit: int = 50) -> Page[Schedule]: ...
+
+    def due_schedules(self, at: datetime) -> tuple[Schedule, ...]:
+        """Enabled schedules whose next start is not after `at`."""
+        ...
+
+    def save_schedule(self, schedule: Schedule, expected_next_at: datetime | None, run: CampaignRun | None) -> bool:
+        """Replace a schedule and add the run that it starts, in one transaction.
+
+        False, and nothing changed, where its next start is another than expected, or it is gone: somebody was faster.
+        """
+        ...
+
+    def remove_schedule(self, schedule_id: str) -> None:
+        """Its runs stay. Raises `NotFound`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Stores(JobStores):
+    """All memory of one service."""
+
+    campaigns: CampaignStore

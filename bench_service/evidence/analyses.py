@@ -1,0 +1,107 @@
+"""Analyses of stored evidence: methods on recordings and calibrations, and second analyses of jobs.
+
+They need no bench and no worker.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.job_analysis import analysed, recordings_of
+from bench_service.evidence.stores import EvidenceStores
+from bench_service.model.job import Job
+from bench_service.model.records import Idempotency, RecordingState, StoredResult
+from bench_service.model.request import fingerprint
+from bench_service.wall_clock import new_id, now
+from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.recording import Recording
+from procedures.procedure import DatedCalibration, Evidence
+
+
+@dataclass(frozen=True)
+class AnalysisRequest:
+    """A method and what it is to work on."""
+
+    method: str
+    recordings: tuple[str, ...] = ()
+    calibrations: tuple[str, ...] = ()
+    parameters: dict[str, Any] = field(default_factory=dict[str, Any])
+
+
+class AnalysisService:
+    """Runs methods and analyses on stored evidence; each call returns with its result stored."""
+
+    def __init__(
+        self, stores: EvidenceStores, catalogue: Catalogue, read_job: Callable[[str], Job], code_version: str
+    ) -> None:
+        """`read_job`: gives a job by its id, and raises `NotFound`."""
+        self._stores = stores
+        self._catalogue = catalogue
+        self._read_job = read_job
+        self._code_version = code_version
+
+    def analyse_again(self, job_id: str, parameters: dict[str, Any], key: str | None = None) -> StoredResult:
+        """Analyse a job's recordings with other parameters; the first result stays as it is."""
+        idempotency = None if key is None else Idempotency(f"again:{key}", fingerprint([job_id, parameters]))
+        known = self._stores.keys.made(idempotency, "result")
+        if known is not None:
+            return self._stores.results.get(known)
+        job = self._read_job(job_id)
+        recordings = recordings_of(self._stores, job_id)
+        if len(recordings) < len(job.stations):
+            raise UnfitRecording(f"job {job_id} has {len(recordings)} of its {len(job.stations)} recordings")
+        merged = {**job.requested_parameters, **parameters}
+        result = analysed(job, self._catalogue.procedure(job.procedure), merged, recordings, self._code_version)
+        return self._stores.results.add(result.stored, result.calibrations, False, idempotency, result.corrections)
+
+    def run_method(self, request: AnalysisRequest, key: str | None = None) -> StoredResult:
+        """Run a method on stored recordings or calibrations. Raises `NotFound`, `DomainError`, `ValidationError`."""
+        idempotency = None if key is None else Idempotency(f"analyses:{key}", fingerprint(request))
+        known = self._stores.keys.made(idempotency, "result")
+        if known is not None:
+            return self._stores.results.get(known)
+        _require_each_once("recordings", request.recordings)
+        _require_each_once("calibrations", request.calibrations)
+        method = self._catalogue.method(request.method)
+        params = method.params.model_validate(request.parameters)
+        used = [self._stores.results.calibration(c) for c in request.calibrations]
+        dated = tuple(DatedCalibration(c.id, c.made_at.isoformat(), c.triads) for c in used)
+        evidence = Evidence(self._complete(request.recordings), dated)
+        units = {r.info.unit for r in evidence.recordings} | {c.unit for c in used}
+        if len(units) > 1:
+            raise UnfitRecording(f"the evidence is of several units: {', '.join(sorted(units))}")
+        serial = next(iter(units), None)
+        outcome = method.analyse(evidence, params, None if serial is None else self._stores.units.unit(serial))
+        stored = StoredResult(
+            id=new_id(),
+            kind="method",
+            name=method.name,
+            version=method.version,
+            parameters=params.model_dump(mode="json"),
+            document=outcome.model_dump(mode="json"),
+            verdict=outcome.verdict,
+            recordings=tuple((r.info.id, r.info.content_hash) for r in evidence.recordings),
+            calibrations=request.calibrations,
+            code_version=self._code_version,
+            simulated=any(r.info.simulated for r in evidence.recordings) or any(c.simulated for c in used),
+            created_at=now(),
+            unit=serial,
+        )
+        gives = method.calibrations(outcome), method.corrections(outcome)
+        return self._stores.results.add(stored, gives[0], False, idempotency, gives[1])
+
+    def _complete(self, ids: Sequence[str]) -> tuple[Recording, ...]:
+        """Recordings by id. Raises `NotFound`, and `UnfitRecording` for one that was interrupted."""
+        for recording_id in ids:
+            stored = self._stores.recordings.get(recording_id)
+            if stored.state is not RecordingState.COMPLETE:
+                raise UnfitRecording(f"recording {recording_id} is {stored.state.value}: kept, but not for analysis")
+        return tuple(self._stores.recordings.load(recording_id) for recording_id in ids)
+
+
+def _require_each_once(field: str, ids: Sequence[str]) -> None:
+    """The same evidence given twice would count as two. Raises `BadParameter`."""
+    for position, known in enumerate(ids):
+        if known in ids[:position]:
+            raise BadParameter(f"{field}.{position}", known, "each is given once")

@@ -1,0 +1,62 @@
+"""Imports: recorded files that come in as recordings of a unit."""
+
+from collections.abc import Sequence
+from datetime import timedelta
+
+from bench_service.evidence.stores import EvidenceStores
+from bench_service.evidence.units import register
+from bench_service.formats.description import ImportDescription
+from bench_service.formats.import_file import ImportFile, read_import
+from bench_service.model.records import Idempotency, NewRecording
+from bench_service.model.request import fingerprint
+from bench_service.wall_clock import now
+from procedures.core.recording import RecordingInfo
+from procedures.core.unit import Unit
+
+CRASHED_IMPORT = timedelta(hours=1)
+"""An import that is not sealed after this long will never be: its process is gone."""
+
+
+class ImportService:
+    """Stores recorded files as recordings."""
+
+    def __init__(self, stores: EvidenceStores) -> None:
+        self._stores = stores
+
+    def discard_crashed(self) -> int:
+        """Remove imports that a crash left unsealed; the number removed."""
+        return self._stores.recordings.discard_open_imports(now() - CRASHED_IMPORT)
+
+    def import_recording(
+        self, files: Sequence[ImportFile], description: ImportDescription, key: str | None = None
+    ) -> RecordingInfo:
+        """Store recorded files as one recording of a unit, which is registered where it is new.
+
+        Raises `DomainError` naming file and row, `StorageFull`; then nothing of the recording remains.
+        """
+        imported = read_import(files, description)
+        idempotency = None if key is None else Idempotency(f"recordings:{key}", fingerprint(imported.source))
+        recordings = self._stores.recordings
+        known = self._stores.keys.made(idempotency, "recording")
+        if known is not None:
+            return recordings.get(known).info
+        register(self._stores.units, Unit(description.unit, imported.rate_hz, imported.channels))
+        writer = recordings.open(
+            NewRecording(
+                unit=description.unit,
+                channels=imported.channels,
+                rate_hz=imported.rate_hz,
+                start_s=description.start_s,
+                simulated=description.simulated,
+                dtype=imported.dtype,
+                source=imported.source,
+                idempotency=idempotency,
+            )
+        )
+        try:
+            for block in imported.blocks():
+                writer.write(block)
+            return writer.seal()
+        except BaseException:
+            writer.abandon()
+            raise

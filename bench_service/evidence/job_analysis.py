@@ -1,0 +1,66 @@
+"""The analysis of a job: its procedure's numbers from its complete recordings, ready to be stored."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from bench_service.evidence.catalogue import AnyProcedure
+from bench_service.evidence.stores import EvidenceStores
+from bench_service.model.context import context_of
+from bench_service.model.job import Job
+from bench_service.model.records import StoredResult
+from bench_service.wall_clock import new_id, now
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.recording import Recording
+from procedures.core.unit_correction import UnitCorrection
+from procedures.procedure import Outcome
+
+
+@dataclass(frozen=True)
+class Analysed:
+    """A result ready to be stored, with the calibrations and corrections that it gives."""
+
+    outcome: Outcome
+    stored: StoredResult
+    calibrations: tuple[TriadCalibration, ...]
+    corrections: tuple[UnitCorrection, ...]
+
+
+def recordings_of(stores: EvidenceStores, job_id: str) -> list[Recording]:
+    """A job's complete recordings for an analysis, in the order of their stations."""
+    return [stores.recordings.load(stored.info.id) for stored in stores.recordings.of_job(job_id)]
+
+
+def analysed(
+    job: Job,
+    procedure: AnyProcedure,
+    parameters: dict[str, Any],
+    recordings: Sequence[Recording],
+    code_version: str,
+) -> Analysed:
+    """Run a procedure's analysis on a job's recordings. Raises `DomainError`, `ValidationError` for the parameters."""
+    context = context_of(job)
+    params = procedure.resolve(procedure.params.model_validate(parameters), context)
+    outcome = procedure.analyse(recordings, params, context)
+    used = context.unit.calibration_id if procedure.uses_calibration else None
+    corrections = (context.unit.correction_id(kind) for kind in procedure.uses_corrections(params))
+    stored = StoredResult(
+        id=new_id(),
+        kind="procedure",
+        name=procedure.name,
+        version=procedure.version,
+        parameters=params.model_dump(mode="json"),
+        document=outcome.model_dump(mode="json"),
+        verdict=outcome.verdict,
+        recordings=tuple((r.info.id, r.info.content_hash) for r in recordings),
+        calibrations=(used,) if used else (),
+        code_version=code_version,
+        simulated=job.simulated,
+        created_at=now(),
+        unit=job.unit,
+        job_id=job.id,
+        seed=job.seed,
+        context=job.context,
+        corrections=tuple(c for c in corrections if c is not None),
+    )
+    return Analysed(outcome, stored, procedure.calibrations(outcome), procedure.corrections(outcome))

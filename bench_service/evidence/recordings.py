@@ -1,0 +1,71 @@
+"""PORT of memory: recordings, raw samples and all, while they are made and afterwards.
+
+Every method is one transaction: it commits, or it raises and nothing of it remains.
+"""
+
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench_service.model.records import NewRecording, Page, StoredRecording
+from procedures.core.recording import RawArray, Recording, RecordingInfo
+
+
+class RecordingWriter(Protocol):
+    """A recording while it is made. Chunks are committed as they fill; nothing is listed before `seal`."""
+
+    def write(self, block: RawArray) -> None:
+        """Append samples, shape (n, channels), in the order of the channels. Raises `StorageFull`."""
+        ...
+
+    def seal(self, checkpoint: dict[str, Any] | None = None) -> RecordingInfo:
+        """Write the rest, the count and the content hash; with the world's checkpoint. Raises `StorageFull`."""
+        ...
+
+    def abandon(self) -> None:
+        """End without sealing; never raises. Whole chunks of a job's recording are kept as interrupted; an import, or
+        a recording without a committed chunk, leaves nothing."""
+        ...
+
+
+class RecordingStore(Protocol):
+    """Raw samples."""
+
+    def open(self, new: NewRecording) -> RecordingWriter: ...
+
+    def get(self, recording_id: str) -> StoredRecording:
+        """Raises `NotFound`."""
+        ...
+
+    def list(
+        self, *, job_id: str | None = None, unit: str | None = None, after: str | None = None, limit: int = 50
+    ) -> Page[StoredRecording]: ...
+
+    def of_job(self, job_id: str) -> tuple[StoredRecording, ...]:
+        """The complete recordings of a job in the order of their stations."""
+        ...
+
+    def load(self, recording_id: str) -> Recording:
+        """The recording for an analysis: blocks are read chunk by chunk. Raises `NotFound`."""
+        ...
+
+    def read(
+        self, recording_id: str, channels: Sequence[str] | None, start: int, stop: int
+    ) -> Iterator[NDArray[np.int32] | NDArray[np.float64]]:
+        """Raw samples start…stop (half open) of some channels, chunk by chunk. Raises `NotFound`, `MissingChannel`."""
+        ...
+
+    def checkpoint(self, job_id: str) -> dict[str, Any] | None:
+        """What the world was after the job's last complete recording."""
+        ...
+
+    def discard_open_imports(self, before: datetime) -> int:
+        """After a crash: remove imports that were begun before a moment and never sealed. How many there were."""
+        ...
+
+    def interrupt_open(self, job_id: str) -> int:
+        """After a crash: close the job's open recordings (see `RecordingWriter.abandon`). How many there were."""
+        ...

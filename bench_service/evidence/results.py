@@ -1,0 +1,77 @@
+"""PORT of memory: results, the calibrations and corrections that come with them, and lineage.
+
+Every method is one transaction, as in `store`.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from bench_service.model.records import Idempotency, Page, ResultValue, StoredCalibration, StoredResult
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.unit_correction import UnitCorrection
+
+
+class ResultStore(Protocol):
+    """What analyses said."""
+
+    def add(
+        self,
+        result: StoredResult,
+        calibrations: Sequence[TriadCalibration] = (),
+        make_current: bool = True,
+        idempotency: Idempotency | None = None,
+        corrections: Sequence[UnitCorrection] = (),
+    ) -> StoredResult:
+        """Store a result with its lineage, and its calibrations as the unit's current ones, in one transaction.
+
+        Corrections, at most one of a kind, are stored in the same manner; see `CorrectionStore` for their history.
+        Raises `IdempotencyConflict`; a known key with the same fingerprint returns the first result.
+        """
+        ...
+
+    def get(self, result_id: str) -> StoredResult:
+        """Raises `NotFound`."""
+        ...
+
+    def list(
+        self, *, job_id: str | None = None, unit: str | None = None, after: str | None = None, limit: int = 50
+    ) -> Page[StoredResult]: ...
+
+    def newest_verdict(self, unit: str, procedure: str, *, simulated: bool) -> StoredResult | None:
+        """The newest of the procedure's results that gave a job of the unit its verdict; no second analysis."""
+        ...
+
+    def values(
+        self,
+        unit: str,
+        procedure: str,
+        quantity: str,
+        *,
+        simulated: bool,
+        limit: int,
+        before: str | None = None,
+        parameters: dict[str, Any] | None = None,
+    ) -> tuple[ResultValue, ...]:
+        """What the newest `limit` of such results say of a quantity, newest first.
+
+        Only results older than `before`, an id, and of a job with just these parameters, count, where these are given.
+        """
+        ...
+
+    def calibrations_of(self, results: Sequence[str]) -> tuple[str, ...]:
+        """Ids of the calibrations that results gave, in the order of the results."""
+        ...
+
+    def of_recording(self, recording_id: str) -> tuple[str, ...]:
+        """Ids of the results that used a recording."""
+        ...
+
+    def calibrations(self, unit: str, after: str | None = None, limit: int = 50) -> Page[StoredCalibration]:
+        """A unit's calibrations, newest first."""
+        ...
+
+    def calibration(self, calibration_id: str) -> StoredCalibration:
+        """Raises `NotFound`."""
+        ...
+
+    def current_calibration(self, unit: str) -> StoredCalibration | None: ...

@@ -1,0 +1,21 @@
+"""Stores of the evidence room: units, recordings, results, corrections, and clients' idempotency keys."""
+
+from dataclasses import dataclass
+
+from bench_service.evidence.corrections import CorrectionStore
+from bench_service.evidence.keys import KeyStore
+from bench_service.evidence.recordings import RecordingStore
+from bench_service.evidence.results import ResultStore
+from bench_service.evidence.units import UnitStore
+from bench_service.telemetry.stores import TelemetryStores
+
+
+@dataclass(frozen=True)
+class EvidenceStores(TelemetryStores):
+    """The stores of this room and of those below it."""
+
+    units: UnitStore
+    recordings: RecordingStore
+    results: ResultStore
+    corrections: CorrectionStore
+    keys: KeyStore

@@ -1,0 +1,64 @@
+"""How a quantity of a unit went over its results, and whether it is still what it was."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from bench_service.model.quantities import Quantity, quantity
+from bench_service.model.records import ResultValue, StoredResult
+from procedures.analysis.control_chart import LEAST_POINTS, ControlLimits, Signal, control_limits, signals
+
+
+@dataclass(frozen=True)
+class TrendPoint:
+    """One result's value."""
+
+    result: str
+    job: str | None
+    at: datetime
+    value: float
+    standard_uncertainty: float | None
+    simulated: bool
+    code_version: str
+
+
+@dataclass(frozen=True)
+class Trend:
+    """A quantity over a unit's results, oldest first, on an individuals control chart."""
+
+    unit_serial: str
+    procedure: str
+    quantity: str
+    unit: str
+    """Of the values; empty where the result does not say."""
+    points: tuple[TrendPoint, ...]
+    limits: ControlLimits | None
+    """None with fewer than two points."""
+    signals: tuple[Signal, ...]
+    without: int
+    """Results of that procedure that lack the quantity."""
+
+
+def trend_of(values: Sequence[ResultValue], unit: str, procedure: str, name: str, judged: int = 0) -> Trend:
+    """A chart of results, oldest first; its limits rest on all points but the last `judged`.
+
+    Points are of the newest one's unit: where another version of a procedure gave another, it began anew.
+    """
+    found = [(value, value.quantity) for value in values if value.quantity is not None]
+    unit_of = found[-1][1].unit if found else ""
+    points = tuple(_point(value, q) for value, q in found if q.unit == unit_of)
+    numbers = [p.value for p in points]
+    base = numbers[: len(numbers) - judged]
+    limits = control_limits(base) if len(base) >= LEAST_POINTS else None
+    broken = () if limits is None else signals(numbers, limits)
+    return Trend(unit, procedure, name, unit_of, points, limits, broken, len(values) - len(points))
+
+
+def value_of(result: StoredResult, name: str) -> ResultValue:
+    """A quantity of one result. Raises `NotFound`, naming what there is."""
+    found = quantity(result.document, name)
+    return ResultValue(result.id, result.job_id, result.created_at, result.simulated, result.code_version, found)
+
+
+def _point(of: ResultValue, q: Quantity) -> TrendPoint:
+    return TrendPoint(of.result, of.job, of.at, q.value, q.standard_uncertainty, of.simulated, of.code_version)

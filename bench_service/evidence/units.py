@@ -1,0 +1,28 @@
+"""PORT of memory: units under test, as they are declared."""
+
+from typing import Protocol
+
+from bench_service.model.errors import NotFound
+from procedures.core.unit import Unit
+
+
+class UnitStore(Protocol):
+    """Units under test by serial: the declared record of each."""
+
+    def put_unit(self, unit: Unit) -> None:
+        """Create or replace; calibrations and corrections of the record are not stored here: `ResultStore` has them."""
+        ...
+
+    def unit(self, serial: str) -> Unit:
+        """With its current calibration and corrections. Raises `NotFound`."""
+        ...
+
+    def units(self) -> tuple[Unit, ...]: ...
+
+
+def register(units: UnitStore, unit: Unit) -> None:
+    """Remember a unit that is met for the first time."""
+    try:
+        units.unit(unit.serial)
+    except NotFound:
+        units.put_unit(unit)

@@ -1,0 +1,1 @@
+"""The events of jobs, handed out to every listener of this process."""

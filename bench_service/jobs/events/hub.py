@@ -1,0 +1,236 @@
+"""One reader of a job's events for everybody of this process who listens to it.
+
+Lives on the server's event loop. While a job has a listener its events are read once, at once after a commit of this
+process and soon after one of another (`WATCH_S`, `OWN_WATCH_S`), and handed to each listener's own bounded queue. Who
+does not take what is his is dropped, and nobody else notices. What a listener has is in order, without gaps or doubles:
+sequences count from 1 within a job, history comes from memory or the database, and the queue goes on where it ends.
+"""
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import AsyncIterator
+from contextlib import suppress
+
+from bench_service.bench.live.values import PUBLISH_S, BenchLive, LiveBoard
+from bench_service.jobs.events.listener import Frames, Listener
+from bench_service.jobs.stores import JobStore
+from bench_service.model.errors import ServiceError
+from bench_service.model.job import FINAL, Event, Job, JobState
+from bench_service.wall_clock import monotonic_s
+
+WATCH_S = 0.1
+"""How often a watched job is looked at for events that other processes made [s]."""
+OWN_WATCH_S = 0.5
+"""The same for a job of the bench that this process drives: nearly all its events are made here."""
+AGAIN_S = 1.0
+"""How long to wait after the database failed [s]."""
+HEARTBEAT_S = 15.0
+"""A comment at least this often, so that proxies keep the connection [s]."""
+LAG = 256
+"""Events that a listener may be behind before it is dropped."""
+RECENT = 256
+"""The last events of a watched job, which are kept: many who come at once do not each read the database."""
+PAGE = 1000
+LIVE_PER_S = 100.0
+"""Live words sent in a second, over all listeners of a job: the more they are, the less often each one hears, but for
+the words that an event takes along.
+"""
+OVER = FINAL | {JobState.INTERRUPTED}
+
+log = logging.getLogger(__name__)
+
+
+class _Watch:
+    """A job that somebody listens to."""
+
+    def __init__(self, job: Job, sequence: int, state: JobState, recent: deque[tuple[int, bytes]]) -> None:
+        self.job_id, self.bench = job.id, job.bench
+        self.sequence = sequence
+        self.state = state
+        self.recent = recent
+        self.listeners: set[Listener] = set()
+        self.woken = asyncio.Event()
+        self.loop = asyncio.get_running_loop()
+        self.closed = False
+        self.live_told: BenchLive | None = None
+        self.live_at_s = 0.0
+        self.beat_at_s = monotonic_s()
+
+
+class EventHub:
+    """Everybody of this process who listens to a job."""
+
+    def __init__(self, jobs: JobStore, board: LiveBoard, frames: Frames, lag: int = LAG, recent: int = RECENT) -> None:
+        self.dropped = 0
+        """How many listeners were dropped so far."""
+        self._jobs = jobs
+        self._board = board
+        self._frames = frames
+        self._lag = lag
+        self._recent = recent
+        self._watches: dict[str, _Watch] = {}
+        self._opening: dict[str, asyncio.Task[_Watch]] = {}
+        self._running: set[asyncio.Task[None]] = set()
+        jobs.on_event(self.wake)
+
+    @property
+    def listeners(self) -> int:
+        """How many listen now."""
+        return sum(len(watch.listeners) for watch in tuple(self._watches.values()))
+
+    def wake(self, job_id: str) -> None:
+        """Look for new events of a job now; from any thread."""
+        watch = self._watches.get(job_id)
+        if watch is not None and not watch.loop.is_closed():
+            watch.loop.call_soon_threadsafe(watch.woken.set)
+
+    async def require(self, job_id: str) -> None:
+        """Raises `NotFound` for a job that there is not, `StorageFailure`."""
+        await self._watch(job_id)
+
+    async def follow(self, job_id: str, after: int) -> AsyncIterator[bytes]:
+        """Everything after an event's sequence until the job has ended, or the listener is dropped.
+
+        It also ends where the database does not answer: who comes back with the last id he saw misses nothing.
+        """
+        try:
+            watch = await self._watch(job_id)
+        except ServiceError as error:
+            log.warning("nobody can listen to job %s now: %s", job_id, error)
+            return
+        listener = Listener(after, watch.sequence, self._lag)
+        watch.listeners.add(listener)
+        if watch.closed:
+            listener.end()
+        try:
+            async for frame in self._history(watch, listener):
+                yield frame
+            while piece := await listener.next():
+                yield piece
+            if listener.dropped:
+                yield self._frames.dropped
+        except ServiceError as error:
+            log.warning("a listener to job %s is let go, the past cannot be read now: %s", job_id, error)
+        finally:
+            watch.listeners.discard(listener)
+
+    async def _watch(self, job_id: str) -> _Watch:
+        """The watch of a job; it waits `WATCH_S` for its first listener. Many who come at once share one look at the
+        database. Raises as `require`.
+        """
+        watch = self._watches.get(job_id)
+        while watch is None or (watch.closed and watch.state not in OVER):
+            if job_id not in self._opening:
+                self._opening[job_id] = asyncio.create_task(self._open(job_id), name=f"open the watch of {job_id}")
+            watch = await asyncio.shield(self._opening[job_id])  # one who goes away does not end it for the others
+        return watch
+
+    async def _open(self, job_id: str) -> _Watch:
+        try:
+            job, (sequence, state), page = await asyncio.to_thread(self._found, job_id)
+        finally:
+            del self._opening[job_id]
+        recent = ((event.sequence, self._frames.event(event)) for event in page if event.sequence <= sequence)
+        watch = self._watches[job_id] = _Watch(job, sequence, state, deque(recent, self._recent))
+        running = asyncio.create_task(self._run(watch), name=f"events of {job_id}")
+        self._running.add(running)
+        running.add_done_callback(self._running.discard)
+        return watch
+
+    def _found(self, job_id: str) -> tuple[Job, tuple[int, JobState], tuple[Event, ...]]:
+        job, last = self._jobs.get(job_id), self._jobs.last_event(job_id)
+        return job, last, self._jobs.events(job_id, max(0, last[0] - self._recent), self._recent)
+
+    async def _history(self, watch: _Watch, listener: Listener) -> AsyncIterator[bytes]:
+        """What had happened when the listener came: from what is kept, or from the database."""
+        kept = tuple(watch.recent)
+        if kept and kept[0][0] <= listener.after + 1:
+            for sequence, frame in kept:
+                if listener.after < sequence <= listener.joined_at:
+                    listener.after = sequence
+                    yield frame
+        while listener.after < listener.joined_at and not listener.dropped:
+            page = await asyncio.to_thread(self._jobs.events, watch.job_id, listener.after, PAGE)
+            for event in page:
+                if event.sequence <= listener.joined_at:
+                    listener.after = event.sequence
+                    yield self._frames.event(event)
+
+    async def _run(self, watch: _Watch) -> None:
+        """Read and hand out while somebody listens and the job goes on."""
+        look_s = OWN_WATCH_S if watch.bench == self._board.own else WATCH_S
+        wait_s = look_s
+        try:
+            while watch.state not in OVER:
+                await _comes(watch.woken, wait_s)
+                if not watch.listeners:
+                    return
+                watch.woken.clear()
+                self._beat(watch)
+                try:
+                    alone_s = len(watch.listeners) / LIVE_PER_S
+                    await self._tell_live(watch, 0.0 if await self._read(watch) else alone_s)
+                    wait_s = look_s
+                except ServiceError as error:
+                    log.warning("events of job %s cannot be read now: %s", watch.job_id, error)
+                    wait_s = AGAIN_S
+        finally:
+            watch.closed = True
+            if self._watches.get(watch.job_id) is watch:
+                del self._watches[watch.job_id]
+            for listener in tuple(watch.listeners):
+                listener.end()
+
+    async def _read(self, watch: _Watch) -> bool:
+        """Hand out what is new, and whether anything is; afterwards `state` is that of the newest event."""
+        before = watch.sequence
+        newest, state = await asyncio.to_thread(self._jobs.last_event, watch.job_id)
+        while watch.sequence < newest:
+            page = await asyncio.to_thread(self._jobs.events, watch.job_id, watch.sequence, PAGE)
+            for event in page:
+                self._hand_out(watch, event)
+            newest = max(newest, watch.sequence)
+        watch.state = state
+        return watch.sequence > before
+
+    def _hand_out(self, watch: _Watch, event: Event) -> None:
+        frame = self._frames.event(event)
+        watch.sequence = event.sequence
+        watch.recent.append((event.sequence, frame))
+        for listener in tuple(watch.listeners):
+            if not listener.put(event.sequence, frame):
+                watch.listeners.discard(listener)
+                self.dropped += 1
+                log.info("a listener to job %s was %d events behind and is dropped", watch.job_id, self._lag)
+
+    async def _tell_live(self, watch: _Watch, rest_s: float) -> None:
+        """Hand out what the bench does now, where it works on this job; `rest_s` at least after the last time."""
+        at_s = monotonic_s()
+        if watch.state in OVER or at_s - watch.live_at_s < max(PUBLISH_S, rest_s):
+            return
+        own = watch.bench == self._board.own
+        live = self._board.said() if own else await asyncio.to_thread(self._board.of_bench, watch.bench)
+        watch.live_at_s = at_s
+        if live is None or live.job is None or live.job.id != watch.job_id or live == watch.live_told:
+            return
+        watch.live_told = live
+        frame = self._frames.live(live)
+        for listener in watch.listeners:
+            listener.put_word(frame)
+
+    def _beat(self, watch: _Watch) -> None:
+        """Let nobody wait longer than `HEARTBEAT_S` for a word."""
+        at_s = monotonic_s()
+        if at_s - watch.beat_at_s < HEARTBEAT_S / 2:
+            return
+        watch.beat_at_s = at_s
+        for listener in watch.listeners:
+            listener.beat(self._frames.quiet)
+
+
+async def _comes(event: asyncio.Event, seconds: float) -> None:
+    """Wait for it, but only so long."""
+    with suppress(TimeoutError):
+        async with asyncio.timeout(seconds):
+            await event.wait()

@@ -1,0 +1,105 @@
+"""What a client asks of queues and reservations: where a job stands, and to keep a bench or a unit for a while."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from bench_service.bench.directory import BenchDirectory
+from bench_service.jobs.queue import BenchQueue, Place
+from bench_service.jobs.reservation import Reservation, Reserved
+from bench_service.jobs.stores import JobStores
+from bench_service.model.errors import NotFound
+from bench_service.model.job import Job, JobState
+from bench_service.model.records import Idempotency
+from bench_service.model.request import fingerprint
+from bench_service.wall_clock import new_id, now
+from procedures.core.errors import BadParameter
+
+LONGEST = timedelta(days=90)
+"""How far ahead a reservation may end."""
+
+
+@dataclass(frozen=True)
+class ReservationRequest:
+    """A reservation as a client asks for it."""
+
+    kind: Reserved
+    name: str
+    holder: str
+    until: datetime | None
+    minutes: float | None
+    """Where no moment is given: how long from now."""
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where a job stands: its place while it is queued, and why it does not run, as a sentence."""
+
+    place: Place | None = None
+    waiting: str | None = None
+
+
+class QueueService:
+    """Reads the queues of all benches, and keeps reservations."""
+
+    def __init__(self, stores: JobStores, benches: BenchDirectory, wake: Callable[[], None]) -> None:
+        """`wake`: called where a job may start that had to wait."""
+        self._stores = stores
+        self._wake = wake
+        self._benches = benches
+
+    def queue(self, bench_id: str) -> BenchQueue:
+        """A bench's queue now. Raises `NotFound`."""
+        return self._stores.queue.look(self._benches.description(bench_id).id, now())
+
+    def standing(self, jobs: Sequence[Job]) -> dict[str, Standing]:
+        """Where each of these jobs stands; a bench is looked at once for all of them."""
+        places: dict[str, Place] = {}
+        for bench in {job.bench for job in jobs if job.state is JobState.QUEUED}:
+            places |= self._stores.queue.look(bench, now()).places(self._benches.driven(bench))
+        return {job.id: _standing(job, places.get(job.id)) for job in jobs}
+
+    def reserve(self, request: ReservationRequest, idempotency_key: str | None = None) -> Reservation:
+        """Keep a bench or a unit. Raises `NotFound` for one that is unknown, `AlreadyReserved`, `BadParameter`."""
+        at = now()
+        until = request.until or at + timedelta(minutes=request.minutes or 0.0)
+        if not at < until <= at + LONGEST:
+            allowed = f"after now, {at.isoformat()}, and at most {LONGEST.days} days later"
+            raise BadParameter("until", until.isoformat(), allowed)
+        if request.kind is Reserved.BENCH:
+            self._benches.description(request.name)
+        else:
+            self._stores.units.unit(request.name)
+        made = Reservation(new_id(), request.kind, request.name, request.holder, at, until, request.note)
+        key = None if idempotency_key is None else Idempotency(f"reservations:{idempotency_key}", fingerprint(request))
+        return self._stores.reservations.add(made, key)
+
+    def give_back(self, reservation_id: str) -> Reservation:
+        """End a reservation before its time. Raises `NotFound`."""
+        kept = self._stores.reservations.end(reservation_id, now())
+        self._wake()
+        return kept
+
+    def usable(self, reservation_id: str, bench: str, unit: str) -> None:
+        """Refuse a job under a reservation that does not hold, or is of something else. Raises `BadParameter`."""
+        try:
+            found = self._stores.reservations.get(reservation_id)
+        except NotFound:
+            raise BadParameter("reservation", reservation_id, "the id of a reservation that holds now") from None
+        if not found.active(now()):
+            ended = f"one that holds now: this one ended at {found.over_at.isoformat()}"
+            raise BadParameter("reservation", reservation_id, ended)
+        if found.name != {Reserved.BENCH: bench, Reserved.UNIT: unit}[found.kind]:
+            allowed = f"one of bench {bench} or unit {unit}: this one is of {found.kind.value} {found.name}"
+            raise BadParameter("reservation", reservation_id, allowed)
+
+
+def _standing(job: Job, place: Place | None) -> Standing:
+    if job.state is JobState.PAUSED:
+        return Standing(waiting="put aside until somebody resumes it")
+    if job.state is JobState.INTERRUPTED:
+        return Standing(waiting="the service could not go on with it; it waits until somebody resumes it")
+    if job.state is JobState.RUNNING and job.prompt is not None:
+        return Standing(waiting=f"a person at the bench is asked: {job.prompt.get('text', '')}")
+    return Standing(place, None if place is None else place.waiting)

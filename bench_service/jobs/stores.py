@@ -1,0 +1,127 @@
+"""Stores of the jobs room: jobs with their events, the queues of benches, and reservations.
+
+Every method is one transaction: it commits, or it raises and nothing of it remains.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, Protocol
+
+from bench_service.bench.stores import BenchStores
+from bench_service.jobs.queue import QueueStore
+from bench_service.jobs.reservation import ReservationStore
+from bench_service.model.job import Event, Failure, Job, JobState
+from bench_service.model.records import Idempotency, Page
+from procedures.core.limits import Verdict
+
+
+class JobStore(Protocol):
+    """Jobs and their events. Every change of state appends an event in the same transaction.
+
+    A job that is not understood is left out of lists; every method that gives one raises `NotUnderstood`."""
+
+    def add(self, job: Job, idempotency: Idempotency | None = None) -> Job:
+        """Store a new job; or, where the key is known with the same fingerprint, return the job it made.
+
+        Raises `IdempotencyConflict`.
+        """
+        ...
+
+    def get(self, job_id: str) -> Job:
+        """Raises `NotFound`."""
+        ...
+
+    def list(
+        self,
+        *,
+        state: JobState | None = None,
+        procedure: str | None = None,
+        unit: str | None = None,
+        after: str | None = None,
+        limit: int = 50,
+    ) -> Page[Job]: ...
+
+    def counts(self) -> dict[JobState, int]:
+        """How many jobs there are in each state."""
+        ...
+
+    def transition(
+        self,
+        job_id: str,
+        to: JobState,
+        *,
+        at: datetime,
+        verdict: Verdict | None = None,
+        failure: Failure | None = None,
+        result_id: str | None = None,
+    ) -> Job:
+        """Change state; to the state it is already in, it is a no-op. Raises `IllegalTransition`, `NotFound`."""
+        ...
+
+    def interrupt(self, job_id: str, at: datetime, failure: Failure) -> None:
+        """The service cannot go on with a job, and says why; one that was to be cancelled is.
+
+        The job is not read, so it need not be understood.
+        """
+        ...
+
+    def station_done(self, job_id: str, station: int, at: datetime, data: dict[str, Any]) -> Job:
+        """Note that recordings up to and including `station` (index) are complete; idempotent."""
+        ...
+
+    def set_context(self, job_id: str, context: dict[str, Any]) -> Job:
+        """Replace what was known at submission by what is known at the start."""
+        ...
+
+    def request_cancel(self, job_id: str, at: datetime) -> Job:
+        """A queued job is cancelled at once, a running one soon; `NotUnderstood` is raised after that.
+
+        Raises `IllegalTransition` for one that has ended.
+        """
+        ...
+
+    def cancel_requested(self, job_id: str) -> bool: ...
+
+    def request_pause(self, job_id: str, at: datetime) -> Job:
+        """Ask a job to be put aside: a queued one is paused at once, a running one before its next station.
+
+        Raises `IllegalTransition` for a job that has ended or was interrupted; for a paused one it is a no-op.
+        """
+        ...
+
+    def put_aside(self, job_id: str, at: datetime) -> Job:
+        """A job whose bench was made safe for a pause becomes paused; queued again, where the wish was taken back."""
+        ...
+
+    def resume(self, job_id: str, at: datetime) -> Job:
+        """Queue a paused or interrupted job again, as its next attempt; from a running one a wish to pause is taken.
+
+        Raises `IllegalTransition` for a job in another state.
+        """
+        ...
+
+    def note(self, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
+        """Append an event that changes no state."""
+        ...
+
+    def events(self, job_id: str, after: int = 0, limit: int = 1000) -> tuple[Event, ...]:
+        """Events with a sequence greater than `after`, in order. Raises `NotFound`."""
+        ...
+
+    def last_event(self, job_id: str) -> tuple[int, JobState]:
+        """Sequence of the newest event, and the state that goes with it, read at one moment. Raises `NotFound`."""
+        ...
+
+    def on_event(self, tell: Callable[[str], None]) -> None:
+        """From now on call `tell(job_id)` after each commit of this process that appended an event."""
+        ...
+
+
+@dataclass(frozen=True)
+class JobStores(BenchStores):
+    """The stores of this room and of those below it."""
+
+    jobs: JobStore
+    queue: QueueStore
+    reservations: ReservationStore

@@ -1,0 +1,111 @@
+"""What the machine room can refuse. No status codes here: `bench_service.api.http.errors` has the table.
+
+ServiceError
+├── NotFound             no such job, recording, result, unit, bench, procedure, method
+├── IllegalTransition    the job's state does not allow it
+├── IdempotencyConflict  the key was used before with another request
+├── NameTaken            a campaign of that name is there already
+├── BenchBusy            another process drives this bench
+├── Misconfigured        a file that the settings name cannot be used
+├── NotDriving           this process drives no bench
+├── NotReady             a job could not start here now
+├── NotSafe              the bench's devices are not known to be safe
+├── AlreadyReserved      somebody keeps this bench or unit
+├── NotUnderstood        a job was stored by a version whose words this one does not know
+├── NotMounted           this bench does not have that unit
+├── StorageFull          the database cannot grow
+└── StorageFailure       the database failed in another way
+    └── DamagedRecording  what is stored of a recording is not what was written
+"""
+
+from collections.abc import Sequence
+
+from pydantic import ValidationError
+
+
+class ServiceError(Exception):
+    """Base of all refusals of the machine room; the message is fit for a person."""
+
+
+class NotFound(ServiceError):
+    """There is no such thing."""
+
+    def __init__(self, kind: str, name: str, why: str = "") -> None:
+        super().__init__(f"there is no {kind} {name!r}{': ' if why else ''}{why}")
+        self.kind = kind
+        self.name = name
+
+
+class IllegalTransition(ServiceError):
+    """The job's state does not allow it."""
+
+
+class IdempotencyConflict(ServiceError):
+    """The key was used before with another request."""
+
+
+class NameTaken(ServiceError):
+    """A campaign of that name is there already."""
+
+
+class BenchBusy(ServiceError):
+    """Another process drives this bench; `passing`: its supervisor, which gives it back in a moment."""
+
+    def __init__(self, message: str, passing: bool = False) -> None:
+        super().__init__(message)
+        self.passing = passing
+
+
+class Misconfigured(ServiceError):
+    """A file that the settings name cannot be used."""
+
+
+class NotDriving(ServiceError):
+    """This process drives no bench: it only reads."""
+
+
+class NotReady(ServiceError):
+    """A job could not start here now."""
+
+    def __init__(self, reasons: Sequence[str]) -> None:
+        super().__init__("; ".join(reasons))
+        self.reasons = tuple(reasons)
+
+
+class NotSafe(ServiceError):
+    """The bench's devices are not known to be safe."""
+
+
+class AlreadyReserved(ServiceError):
+    """Somebody keeps this bench or unit."""
+
+
+class NotMounted(ServiceError):
+    """This bench does not have that unit."""
+
+
+class NotUnderstood(ServiceError):
+    """A job was stored by another version of the service, in words that this one does not know."""
+
+    def __init__(self, job_id: str, version: str, why: Exception) -> None:
+        """`why`: what its reader said; of a document with many faults, the first is told."""
+        fault = str(why)
+        if isinstance(why, ValidationError):
+            first = why.errors(include_url=False, include_input=False)[0]
+            fault = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+        super().__init__(
+            f"job {job_id} was stored by version {version} of the service, and this version does not understand it: "
+            f"{fault}"
+        )
+
+
+class StorageFull(ServiceError):
+    """The database cannot grow: the disk is full."""
+
+
+class StorageFailure(ServiceError):
+    """The database failed."""
+
+
+class DamagedRecording(StorageFailure):
+    """What is stored of a recording is not what was written."""

@@ -1,0 +1,141 @@
+"""What is remembered, as values: recordings, results, calibrations, and the pages and keys around them."""
+
+from dataclasses import dataclass, field
+from datetime import datetime
+from enum import StrEnum
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from bench_service.model.quantities import Quantity
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.limits import Verdict
+from procedures.core.recording import Channel, RecordingInfo, Station
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Page(Generic[T]):
+    """A page of a list, newest first; `next` is the cursor of the following page or None."""
+
+    items: tuple[T, ...]
+    next: str | None = None
+
+
+@dataclass(frozen=True)
+class Idempotency:
+    """A client's key and the fingerprint of what it asked."""
+
+    key: str
+    fingerprint: str
+
+
+class RecordingState(StrEnum):
+    """`open` while samples arrive (never listed), `complete`, or `interrupted`: kept, but not for analysis."""
+
+    OPEN = "open"
+    COMPLETE = "complete"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True)
+class StoredRecording:
+    """A recording's row: what it is, where it came from, what it weighs."""
+
+    info: RecordingInfo
+    state: RecordingState
+    created_at: datetime
+    job_id: str | None = None
+    bench: str | None = None
+    stored_bytes: int = 0
+    chunks: int = 0
+    dtype: str = "int32"
+    """Of its samples: "int32" or "float64"."""
+    source: dict[str, Any] = field(default_factory=dict[str, Any])
+    """Of an imported recording: file name, its SHA-256, reader, declared reference values."""
+
+
+@dataclass(frozen=True)
+class NewRecording:
+    """What must be known before the first sample."""
+
+    unit: str
+    channels: tuple[Channel, ...]
+    rate_hz: float
+    start_s: float
+    simulated: bool
+    dtype: type[np.int32] | type[np.float64] = np.int32
+    job_id: str | None = None
+    bench: str | None = None
+    station: Station | None = None
+    source: dict[str, Any] = field(default_factory=dict[str, Any])
+    launched_s: float | None = None
+    idempotency: Idempotency | None = None
+    """A client's key, remembered when the recording is sealed."""
+
+
+@dataclass(frozen=True)
+class BenchStop:
+    """A software stop of a bench, until a person releases it."""
+
+    bench: str
+    at: datetime
+    reason: str
+    safe_at: datetime | None = None
+    """When somebody on the bench's host saw the devices safe, since; None: nobody has confirmed it."""
+    safe_by: str = ""
+    """By whom they were last commanded then."""
+
+
+@dataclass(frozen=True)
+class StoredResult:
+    """What an analysis said, and everything that made it."""
+
+    id: str
+    kind: str
+    """"procedure" or "method"."""
+    name: str
+    version: str
+    parameters: dict[str, Any]
+    document: dict[str, Any]
+    """The result model as JSON."""
+    verdict: Verdict
+    recordings: tuple[tuple[str, str], ...]
+    """(id, content hash) of each recording used, in order."""
+    calibrations: tuple[str, ...]
+    """Ids of calibrations used."""
+    code_version: str
+    simulated: bool
+    created_at: datetime
+    unit: str | None = None
+    job_id: str | None = None
+    seed: int | None = None
+    context: dict[str, Any] = field(default_factory=dict[str, Any])
+    corrections: tuple[str, ...] = ()
+    """Ids of correction sets used."""
+
+
+@dataclass(frozen=True)
+class ResultValue:
+    """What one result says of a quantity; None where it lacks it."""
+
+    result: str
+    job: str | None
+    at: datetime
+    simulated: bool
+    code_version: str
+    quantity: Quantity | None
+
+
+@dataclass(frozen=True)
+class StoredCalibration:
+    """A calibration in a unit's history."""
+
+    id: str
+    unit: str
+    result_id: str
+    made_at: datetime
+    current: bool
+    triads: tuple[TriadCalibration, ...]
+    simulated: bool

@@ -1,0 +1,82 @@
+"""What processes of one host tell one another about a bench: who drives it, and who supervises it.
+
+Two small files beside the devices' register. Must not know what is driven.
+"""
+
+import fcntl
+import json
+import os
+from dataclasses import asdict
+from pathlib import Path
+
+from bench_service.bench.processes import Driving, ProcessIdentity
+from bench_service.model.errors import BenchBusy
+
+
+class HostFiles:
+    """`bench_service.bench.processes.Watch`, and how a process says that it drives or supervises."""
+
+    def __init__(self, folder: Path, bench_id: str) -> None:
+        self._bench_id = bench_id
+        self._driver = folder / f"bench-{bench_id}.driver"
+        self._supervisor = folder / f"bench-{bench_id}.supervisor"
+
+    def driving(self) -> Driving | None:
+        """Which process drives, or last drove, the bench from this host."""
+        try:
+            document = json.loads(self._driver.read_text(encoding="utf-8"))
+            return Driving(ProcessIdentity(**document["process"]), document["ended"])
+        except (OSError, ValueError, TypeError, KeyError):
+            return None
+
+    def begin_driving(self) -> None:
+        """Say that this process drives the bench. Its lease must be held."""
+        self._driver.parent.mkdir(parents=True, exist_ok=True)
+        self._write(False)
+
+    def end_driving(self) -> None:
+        """Say that this process has ended in order. Its lease must still be held."""
+        self._write(True)
+
+    def supervisor(self) -> ProcessIdentity | None:
+        """The process that supervises the bench on this host, if one lives."""
+        try:
+            process = ProcessIdentity(**json.loads(self._supervisor.read_text(encoding="utf-8")))
+        except (OSError, ValueError, TypeError):
+            return None
+        return process if process.alive() else None
+
+    def supervise(self) -> "SupervisorLock":
+        """Become the bench's supervisor on this host. Raises `BenchBusy` where there is one."""
+        self._supervisor.parent.mkdir(parents=True, exist_ok=True)
+        file = os.open(self._supervisor, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(file)
+            other = self.supervisor() or "another process"
+            raise BenchBusy(f"bench {self._bench_id!r} is supervised by {other}") from None
+        os.ftruncate(file, 0)
+        os.pwrite(file, json.dumps(asdict(ProcessIdentity.own())).encode(), 0)
+        return SupervisorLock(file)
+
+    def _write(self, ended: bool) -> None:
+        """Replace the file whole: a reader finds the old one or the new one."""
+        document = {"process": asdict(ProcessIdentity.own()), "ended": ended}
+        partial = self._driver.with_name(f"{self._driver.name}.part")
+        partial.write_text(json.dumps(document), encoding="utf-8")
+        partial.replace(self._driver)
+
+
+class SupervisorLock:
+    """The right to be a bench's supervisor, for a process's life."""
+
+    def __init__(self, file: int) -> None:
+        self._file: int | None = file
+
+    def release(self) -> None:
+        """A second time does nothing."""
+        if self._file is not None:
+            os.ftruncate(self._file, 0)
+            os.close(self._file)
+            self._file = None

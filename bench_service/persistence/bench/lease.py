@@ -1,0 +1,259 @@
+"""The right to drive a bench: one process at a time, held for its life, and free again the moment it dies.
+
+On SQLite it is a lock on a file beside the database (the kernel drops it with the process); on Postgres an advisory
+lock of a connection that is used for nothing else (the server drops it with the connection). Must not know what is
+driven.
+"""
+
+import fcntl
+import hashlib
+import os
+import socket
+import threading
+from pathlib import Path
+from typing import Protocol
+
+from sqlalchemy import URL, Connection, create_engine, make_url, text
+from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.orm import Session
+from sqlalchemy.pool import NullPool
+
+from bench_service import wall_clock
+from bench_service.model.errors import BenchBusy
+from bench_service.persistence.database import TCP, Database, storage_errors
+
+
+class BenchLease(Protocol):
+    """The right to drive a bench, held for a process's life, and whether it is still ours."""
+
+    def held(self) -> bool: ...
+
+    def regain(self) -> bool: ...
+
+    def release(self) -> None: ...
+
+
+PASSING_S = 5.0
+"""How long a process that starts waits for a supervisor that makes the bench safe at this moment [s]."""
+SUPERVISOR = "supervisor"
+
+
+def acquire_lease(database_url: str, bench_id: str, role: str = "process") -> BenchLease:
+    """Take the bench, at once or not at all; only a supervisor, which has it for a moment, is waited for.
+
+    `role`: as what others shall name the holder. Raises `BenchBusy`, naming the holder where it is known.
+    """
+    deadline = wall_clock.monotonic_s() + PASSING_S
+    while True:
+        try:
+            return _lease(database_url, bench_id, role)
+        except BenchBusy as busy:
+            if not busy.passing or role == SUPERVISOR or wall_clock.monotonic_s() > deadline:
+                raise
+        wall_clock.pause(0.02)
+
+
+def _lease(database_url: str, bench_id: str, role: str) -> BenchLease:
+    with storage_errors():
+        url = make_url(database_url)
+        if url.get_backend_name() == "sqlite":
+            return FileLease(Path(url.database or "bench.sqlite").parent / f"bench-{bench_id}.lock", bench_id, role)
+        return ServerLease(url, bench_id, role)
+
+
+def _written_holder(file: int) -> str:
+    """Role and process id in a lock file; its holder writes it a moment after it took the lock."""
+    for _ in range(20):
+        holder = os.pread(file, 32, 0).decode(errors="replace").strip()
+        if holder:
+            return holder
+        wall_clock.pause(0.01)
+    return ""
+
+
+class FileLease:
+    """A locked file, with the holder's process id in it."""
+
+    def __init__(self, path: Path, bench_id: str, role: str) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._mutex = threading.Lock()
+        self._given_back = False
+        self._path = path
+        self._bench_id = bench_id
+        self._role = role
+        self._file: int | None = self._locked()
+
+    def held(self) -> bool:
+        """Whether the locked file is still the one that others would lock."""
+        with self._mutex:
+            if self._file is None:
+                return False
+            try:
+                there = self._path.stat()
+            except OSError:
+                return False
+            here = os.fstat(self._file)
+            return (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino)
+
+    def regain(self) -> bool:
+        """Lock the file that is there now, after ours was taken away; False where somebody else was first."""
+        with self._mutex:
+            self._drop()
+            if self._given_back:  # a thread that looks once more while the process ends
+                return False
+            try:
+                self._file = self._locked()
+            except (BenchBusy, OSError):
+                return False
+            return True
+
+    def release(self) -> None:
+        """Give the bench back, for good; a second time does nothing."""
+        with self._mutex:
+            self._given_back = True
+            self._drop()
+
+    def _drop(self) -> None:
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+    def _locked(self) -> int:
+        """The file, locked, with our process id in it. Raises `BenchBusy`."""
+        file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            self._lock(file)
+            os.ftruncate(file, 0)
+            os.pwrite(file, f"{self._role} {os.getpid()}\n".encode(), 0)
+        except BaseException:  # a full disk: an open file that nobody knows would keep the lock from us too
+            os.close(file)
+            raise
+        return file
+
+    def _lock(self, file: int) -> None:
+        for again in range(5, -1, -1):
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return
+            except BlockingIOError:
+                if not again:
+                    raise _busy(self._bench_id, _written_holder(file)) from None
+            wall_clock.pause(0.01)  # it may only be somebody who looks whether it is taken: `lease_holder`
+
+
+class ServerLease:
+    """An advisory lock of a connection of its own."""
+
+    def __init__(self, url: URL, bench_id: str, role: str) -> None:
+        self._mutex = threading.Lock()
+        self._given_back = False
+        self._bench_id = bench_id
+        self._key = lease_key(bench_id)
+        self._engine = create_engine(
+            url,
+            poolclass=NullPool,
+            isolation_level="AUTOCOMMIT",
+            connect_args={
+                **TCP,
+                "application_name": f"bench {bench_id} {role} pid {os.getpid()} on {socket.gethostname()}"[:63],
+            },
+        )
+        self._connection: Connection | None = self._locked()
+
+    def held(self) -> bool:
+        """Ask the server over the connection that has the lock: while it answers, the lock is ours."""
+        with self._mutex:
+            if self._connection is None:
+                return False
+            try:
+                self._connection.execute(text("SELECT 1"))
+            except SQLAlchemyError:
+                self._drop()
+                return False
+            return True
+
+    def regain(self) -> bool:
+        """Lock again over a new connection, after the old one ended; False where that cannot be done now."""
+        with self._mutex:
+            self._drop()
+            if self._given_back:  # a thread that looks once more while the process ends
+                return False
+            try:
+                self._connection = self._locked()
+            except (BenchBusy, SQLAlchemyError):
+                return False
+            return True
+
+    def release(self) -> None:
+        """Give the bench back, for good; a second time does nothing."""
+        with self._mutex:
+            self._given_back = True
+            self._drop()
+
+    def _locked(self) -> Connection:
+        """A connection that has the lock. Raises `BenchBusy`, and the driver's errors."""
+        connection = self._engine.connect()
+        try:
+            if not connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": self._key}):
+                raise _busy(self._bench_id, holder(connection, self._key))
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
+    def _drop(self) -> None:
+        if self._connection is not None:
+            self._connection.invalidate()
+            self._connection.close()
+            self._connection = None
+
+
+def lease_holder(database: Database, database_url: str, bench_id: str) -> str | None:
+    """Who drives a bench now, in a person's words; None: nobody, or only a supervisor that makes it safe.
+
+    On SQLite the lock is tried for a moment in its shared form, which a process that starts meanwhile waits out.
+    """
+    if database.is_postgres:
+        with database.read() as session:
+            return _worker(holder(session, lease_key(bench_id)))
+    path = Path(make_url(database_url).database or "bench.sqlite").parent / f"bench-{bench_id}.lock"
+    try:
+        file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return _worker(os.pread(file, 32, 0).decode(errors="replace").strip() or "another process")
+    else:
+        return None
+    finally:
+        os.close(file)
+
+
+def _worker(holder: str | None) -> str | None:
+    return None if holder is None or f"{SUPERVISOR} " in holder else holder
+
+
+def _busy(bench_id: str, who: str | None) -> BenchBusy:
+    """For example: bench 'sim' is driven by process 4711."""
+    named = who or "another process"
+    return BenchBusy(f"bench {bench_id!r} is driven by {named}", passing=f"{SUPERVISOR} " in named)
+
+
+def lease_key(bench_id: str) -> int:
+    """The advisory lock of a bench."""
+    return int.from_bytes(hashlib.sha256(f"bench lease {bench_id}".encode()).digest()[:8], "big", signed=True)
+
+
+def holder(connection: Connection | Session, key: int) -> str | None:
+    """Who has an advisory lock, in the words of its connection; None where nobody has it."""
+    query = text(
+        "SELECT a.application_name FROM pg_locks l JOIN pg_stat_activity a ON a.pid = l.pid "
+        "WHERE l.locktype = 'advisory' AND l.granted AND l.objsubid = 1 "
+        "AND l.classid::bigint = :high AND l.objid::bigint = :low "
+        "AND l.database = (SELECT oid FROM pg_database WHERE datname = current_database())"
+    )
+    low, high = key & 0xFFFFFFFF, (key >> 32) & 0xFFFFFFFF
+    row = connection.execute(query, {"high": high, "low": low}).first()
+    return None if row is None else f"{row[0]!r}" if row[0] else "another process"

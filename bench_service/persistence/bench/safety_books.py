@@ -1,0 +1,66 @@
+"""What a supervisor reads and writes in the database: the stop of its bench, and what it did.
+
+Of all tables it needs these few, and loads nothing else. The database is opened when it is first asked, so that a
+supervisor works without one that does not answer.
+"""
+
+from functools import cached_property
+
+from sqlalchemy import select
+
+from bench_service import wall_clock
+from bench_service.model.errors import NotFound
+from bench_service.model.records import BenchStop
+from bench_service.persistence.bench.registry_store import SqlBenchRegistry
+from bench_service.persistence.database import Database, connect
+from bench_service.persistence.jobs.job_store import SqlJobStore
+from bench_service.persistence.tables.bench import BenchStopRow
+from bench_service.persistence.tables.telemetry import AuditRow
+
+
+class SqlSafetyBooks:
+    """`bench_service.bench.supervisor.SafetyBooks` of one bench."""
+
+    def __init__(self, database_url: str, bench_id: str) -> None:
+        self._url = database_url
+        self._bench_id = bench_id
+
+    @cached_property
+    def _database(self) -> Database:
+        return connect(self._url)
+
+    def stopped(self) -> bool:
+        with self._database.read() as session:
+            query = select(BenchStopRow.bench).where(BenchStopRow.bench == self._bench_id)
+            return session.scalar(query) is not None
+
+    def confirm_safe(self, by: str) -> None:
+        SqlBenchRegistry(self._database).confirm_safe(self._bench_id, wall_clock.now(), by)
+
+    def stop(self, reason: str) -> None:
+        SqlBenchRegistry(self._database).stop_bench(BenchStop(self._bench_id, wall_clock.now(), reason))
+
+    def note(self, by: str, text: str, job: str | None) -> None:
+        at = wall_clock.now()
+        with self._database.write() as session:
+            session.add(
+                AuditRow(
+                    id=wall_clock.new_id(),
+                    at=at,
+                    who=by,
+                    action="make_safe",
+                    target=f"bench {self._bench_id}",
+                    outcome="noted",
+                    detail={"text": text, "job": job},
+                )
+            )
+        if job is not None:
+            try:
+                SqlJobStore(self._database).note(job, "note", at, {"text": text, "by": by})
+            except NotFound:
+                return
+
+    def close(self) -> None:
+        """Close the database's connections."""
+        if "_database" in self.__dict__:
+            self._database.dispose()

@@ -1,0 +1,1 @@
+"""Recordings, results, corrections and units in SQL."""

@@ -1,0 +1,56 @@
+"""Reading the chunks of one recording again, each checked against the hash it was stored with.
+
+Knows where a sample lies: all chunks but the last have the same number of samples. Must not know what samples mean.
+"""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from sqlalchemy import select
+
+from bench_service.formats.chunk import UnreadableChunk, decode_chunk
+from bench_service.model.errors import DamagedRecording
+from bench_service.persistence.database import Database
+from bench_service.persistence.tables.evidence import ChunkRow
+from procedures.core.recording import RawArray
+
+
+@dataclass(frozen=True)
+class ChunkReader:
+    """The chunks of one recording; each is a short transaction of its own."""
+
+    database: Database
+    recording_id: str
+    chunk_rows: int
+
+    def blocks(self, names: Sequence[str], start: int, stop: int) -> Iterator[RawArray]:
+        """Samples start…stop (half open) of the named channels. Raises `DamagedRecording`, naming the chunk."""
+        if stop <= start:
+            return
+        for number in range(start // self.chunk_rows, (stop - 1) // self.chunk_rows + 1):
+            first = number * self.chunk_rows
+            block = self._block(number, names)
+            expected = min(self.chunk_rows, stop - first)
+            if len(block) < expected:
+                raise self._failure(number, f"has {len(block)} samples, {expected} at least are wanted")
+            yield block[max(0, start - first) : expected]
+
+    def _block(self, number: int, names: Sequence[str]) -> RawArray:
+        query = select(ChunkRow.payload, ChunkRow.sha256).where(
+            ChunkRow.recording_id == self.recording_id, ChunkRow.number == number
+        )
+        with self.database.read() as session:
+            row = session.execute(query).one_or_none()
+        if row is None:
+            raise self._failure(number, "is missing")
+        payload, sha256 = row
+        if hashlib.sha256(payload).hexdigest() != sha256:
+            raise self._failure(number, "is damaged: its bytes do not have the hash they were stored with")
+        try:
+            return decode_chunk(payload, names)
+        except UnreadableChunk as error:
+            raise self._failure(number, f"cannot be read: {error}") from error
+
+    def _failure(self, number: int, what: str) -> DamagedRecording:
+        return DamagedRecording(f"chunk {number} of recording {self.recording_id} {what}")

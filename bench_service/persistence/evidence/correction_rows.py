@@ -1,0 +1,68 @@
+"""Corrections as rows and back, and how they join a unit. Knows the shapes only; no transaction begins here."""
+
+from collections.abc import Sequence
+
+from pydantic import TypeAdapter
+from sqlalchemy import select, update
+from sqlalchemy.orm import Session
+
+from bench_service import wall_clock
+from bench_service.evidence.corrections import StoredCorrection
+from bench_service.model.errors import NotFound
+from bench_service.model.records import StoredResult
+from bench_service.persistence.tables.evidence import CorrectionRow, ResultCorrectionRow
+from procedures.core.unit_correction import UnitCorrection
+
+CORRECTION = TypeAdapter(UnitCorrection)
+
+
+def correction_of_row(row: CorrectionRow) -> StoredCorrection:
+    """The correction that a row keeps."""
+    correction = CORRECTION.validate_python(row.document)
+    return StoredCorrection(row.id, row.unit, row.result_id, row.made_at, row.is_current, correction, row.simulated)
+
+
+def check_corrections(session: Session, result: StoredResult) -> None:
+    """The corrections that a result rests on must exist. Raises `NotFound`."""
+    for correction_id in result.corrections:
+        if session.scalar(select(CorrectionRow.id).where(CorrectionRow.id == correction_id)) is None:
+            raise NotFound("correction", correction_id)
+
+
+def correction_lineage(result: StoredResult) -> list[ResultCorrectionRow]:
+    """The rows that say which corrections a result used."""
+    return [
+        ResultCorrectionRow(result_id=result.id, position=position, correction_id=correction_id)
+        for position, correction_id in enumerate(result.corrections)
+    ]
+
+
+def retire_current(session: Session, unit: str | None, kind: str) -> None:
+    """No correction of that kind is the unit's current one any more."""
+    session.execute(
+        update(CorrectionRow)
+        .where(CorrectionRow.unit == unit, CorrectionRow.kind == kind, CorrectionRow.is_current)
+        .values(is_current=False)
+    )
+
+
+def add_corrections(
+    session: Session, result: StoredResult, corrections: Sequence[UnitCorrection], make_current: bool
+) -> None:
+    """Add to a unit's history; of two that become current at once, the index lets one wait and the store try again."""
+    for correction in corrections:
+        if make_current:
+            retire_current(session, result.unit, correction.kind)
+        session.add(
+            CorrectionRow(
+                id=wall_clock.new_id(),
+                unit=result.unit,
+                kind=correction.kind,
+                result_id=result.id,
+                made_at=result.created_at,
+                is_current=make_current,
+                simulated=result.simulated,
+                document=CORRECTION.dump_python(correction, mode="json"),
+            )
+        )
+        session.flush()

@@ -1,0 +1,210 @@
+"""Results, calibrations and lineage in SQL. Must not know how a result was computed."""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from itertools import islice
+from typing import Any
+
+from sqlalchemy import select, update
+from sqlalchemy.orm import Session
+
+from bench_service import wall_clock
+from bench_service.model.errors import NotFound
+from bench_service.model.records import Idempotency, Page, ResultValue, StoredCalibration, StoredResult
+from bench_service.persistence.database import Database
+from bench_service.persistence.evidence.correction_rows import add_corrections, check_corrections, correction_lineage
+from bench_service.persistence.evidence.result_rows import (
+    TRIADS,
+    calibration_of_row,
+    lineage_rows,
+    quantity_rows,
+    result_of_row,
+    row_of_result,
+)
+from bench_service.persistence.evidence.result_values import newest_first, of_verdicts, value_of_row, values_query
+from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
+from bench_service.persistence.pages import page
+from bench_service.persistence.tables.evidence import (
+    CalibrationRow,
+    RecordingRow,
+    ResultCalibrationRow,
+    ResultCorrectionRow,
+    ResultRecordingRow,
+    ResultRow,
+)
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.unit_correction import UnitCorrection
+
+
+class SqlResultStore:
+    """`bench_service.jobs.stores.ResultStore`."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def add(
+        self,
+        result: StoredResult,
+        calibrations: Sequence[TriadCalibration] = (),
+        make_current: bool = True,
+        idempotency: Idempotency | None = None,
+        corrections: Sequence[UnitCorrection] = (),
+    ) -> StoredResult:
+        if (calibrations or corrections) and result.unit is None:
+            raise ValueError("a calibration or correction needs the unit that it belongs to")
+        if len({c.kind for c in corrections}) < len(corrections):
+            raise ValueError("a result gives at most one correction of a kind")
+
+        def once() -> StoredResult:
+            with self._database.write() as session:
+                known = made_before(session, idempotency, "result")
+                if known is not None:
+                    return _results(session, [_found(session, known)])[0]
+                remember(session, idempotency, "result", result.id, result.created_at)
+                _check_lineage(session, result)
+                session.add(row_of_result(result))
+                session.flush()
+                session.add_all([*quantity_rows(result), *lineage_rows(result), *correction_lineage(result)])
+                if calibrations:
+                    _add_calibration(session, result, calibrations, make_current)
+                add_corrections(session, result, corrections, make_current)
+                return result
+
+        return again_after_conflict(once)
+
+    def get(self, result_id: str) -> StoredResult:
+        with self._database.read() as session:
+            return _results(session, [_found(session, result_id)])[0]
+
+    def list(
+        self, *, job_id: str | None = None, unit: str | None = None, after: str | None = None, limit: int = 50
+    ) -> Page[StoredResult]:
+        query = select(ResultRow)
+        if job_id is not None:
+            query = query.where(ResultRow.job_id == job_id)
+        if unit is not None:
+            query = query.where(ResultRow.unit == unit)
+        with self._database.read() as session:
+            rows = page(session, query, ResultRow.id, after, limit, _itself)
+            return Page(_results(session, rows.items), rows.next)
+
+    def newest_verdict(self, unit: str, procedure: str, *, simulated: bool) -> StoredResult | None:
+        query = of_verdicts(select(ResultRow), unit, procedure, simulated).limit(1)
+        with self._database.read() as session:
+            return next(iter(_results(session, session.scalars(query).all())), None)
+
+    def values(
+        self,
+        unit: str,
+        procedure: str,
+        quantity: str,
+        *,
+        simulated: bool,
+        limit: int,
+        before: str | None = None,
+        parameters: dict[str, Any] | None = None,
+    ) -> tuple[ResultValue, ...]:
+        query = of_verdicts(values_query(quantity), unit, procedure, simulated)
+        with self._database.read() as session:
+            rows = newest_first(session, query, before)
+            same = (row for row in rows if parameters is None or row.parameters == parameters)
+            return tuple(value_of_row(row, quantity) for row in islice(same, limit))
+
+    def calibrations_of(self, results: Sequence[str]) -> tuple[str, ...]:
+        query = select(CalibrationRow.result_id, CalibrationRow.id).where(CalibrationRow.result_id.in_(results))
+        with self._database.read() as session:
+            found = {result_id: made for result_id, made in session.execute(query)}  # noqa: C416  rows are not tuples
+        return tuple(found[result_id] for result_id in results if result_id in found)
+
+    def of_recording(self, recording_id: str) -> tuple[str, ...]:
+        query = (
+            select(ResultRecordingRow.result_id)
+            .where(ResultRecordingRow.recording_id == recording_id)
+            .distinct()
+            .order_by(ResultRecordingRow.result_id.desc())
+        )
+        with self._database.read() as session:
+            return tuple(session.scalars(query))
+
+    def calibrations(self, unit: str, after: str | None = None, limit: int = 50) -> Page[StoredCalibration]:
+        query = select(CalibrationRow).where(CalibrationRow.unit == unit)
+        with self._database.read() as session:
+            return page(session, query, CalibrationRow.id, after, limit, calibration_of_row)
+
+    def calibration(self, calibration_id: str) -> StoredCalibration:
+        with self._database.read() as session:
+            row = session.get(CalibrationRow, calibration_id)
+            if row is None:
+                raise NotFound("calibration", calibration_id)
+            return calibration_of_row(row)
+
+    def current_calibration(self, unit: str) -> StoredCalibration | None:
+        query = select(CalibrationRow).where(CalibrationRow.unit == unit, CalibrationRow.is_current)
+        with self._database.read() as session:
+            row = session.scalar(query)
+            return None if row is None else calibration_of_row(row)
+
+
+def _itself(row: ResultRow) -> ResultRow:
+    return row
+
+
+def _found(session: Session, result_id: str) -> ResultRow:
+    row = session.get(ResultRow, result_id)
+    if row is None:
+        raise NotFound("result", result_id)
+    return row
+
+
+def _results(session: Session, rows: Sequence[ResultRow]) -> tuple[StoredResult, ...]:
+    """Results with their lineage, in three queries however many they are."""
+    ids = [row.id for row in rows]
+    recordings: dict[str, list[ResultRecordingRow]] = defaultdict(list)
+    calibrations: dict[str, list[ResultCalibrationRow]] = defaultdict(list)
+    corrections: dict[str, list[ResultCorrectionRow]] = defaultdict(list)
+    if ids:
+        used = select(ResultRecordingRow).where(ResultRecordingRow.result_id.in_(ids))
+        for recording in session.scalars(used.order_by(ResultRecordingRow.position)):
+            recordings[recording.result_id].append(recording)
+        applied = select(ResultCalibrationRow).where(ResultCalibrationRow.result_id.in_(ids))
+        for calibration in session.scalars(applied.order_by(ResultCalibrationRow.position)):
+            calibrations[calibration.result_id].append(calibration)
+        corrected = select(ResultCorrectionRow).where(ResultCorrectionRow.result_id.in_(ids))
+        for correction in session.scalars(corrected.order_by(ResultCorrectionRow.position)):
+            corrections[correction.result_id].append(correction)
+    return tuple(result_of_row(row, recordings[row.id], calibrations[row.id], corrections[row.id]) for row in rows)
+
+
+def _check_lineage(session: Session, result: StoredResult) -> None:
+    """What a result was made from must exist. Raises `NotFound`."""
+    for recording_id, _ in result.recordings:
+        if session.scalar(select(RecordingRow.id).where(RecordingRow.id == recording_id)) is None:
+            raise NotFound("recording", recording_id)
+    for calibration_id in result.calibrations:
+        if session.scalar(select(CalibrationRow.id).where(CalibrationRow.id == calibration_id)) is None:
+            raise NotFound("calibration", calibration_id)
+    check_corrections(session, result)
+
+
+def _add_calibration(
+    session: Session, result: StoredResult, triads: Sequence[TriadCalibration], make_current: bool
+) -> None:
+    """Add to a unit's history; of two that become current at once, the index lets one wait and the store try again."""
+    if make_current:
+        session.execute(
+            update(CalibrationRow)
+            .where(CalibrationRow.unit == result.unit, CalibrationRow.is_current)
+            .values(is_current=False)
+        )
+    session.add(
+        CalibrationRow(
+            id=wall_clock.new_id(),
+            unit=result.unit,
+            result_id=result.id,
+            made_at=result.created_at,
+            is_current=make_current,
+            triads=TRIADS.dump_python(tuple(triads), mode="json"),
+            simulated=result.simulated,
+        )
+    )
+    session.flush()

@@ -1,0 +1,67 @@
+"""One quantity of many results: the queries, and what a row says. No transaction begins here."""
+
+from collections.abc import Iterator
+from typing import Any, TypeVar
+
+from sqlalchemy import Row, Select, and_, select
+from sqlalchemy.orm import Session
+
+from bench_service.model.errors import NotFound
+from bench_service.model.quantities import Quantity, quantity
+from bench_service.model.records import ResultValue
+from bench_service.persistence.tables.evidence import ResultQuantityRow, ResultRow
+from bench_service.persistence.tables.jobs import JobRow
+
+Q = TypeVar("Q", bound=Select[*tuple[Any, ...]])
+AT_ONCE = 20
+"""Rows in memory; where the quantity is a JSON pointer, each with its document."""
+ABOUT = (
+    ResultRow.id,
+    ResultRow.job_id,
+    ResultRow.created_at,
+    ResultRow.simulated,
+    ResultRow.code_version,
+    ResultRow.parameters,
+)
+
+
+def of_verdicts(query: Q, unit: str, procedure: str, simulated: bool) -> Q:
+    """Of results: those of a procedure that gave a job of the unit its verdict, newest first; no second analyses."""
+    return (
+        query.join(JobRow, JobRow.result_id == ResultRow.id)
+        .where(ResultRow.unit == unit, ResultRow.name == procedure, ResultRow.simulated == simulated)
+        .order_by(ResultRow.id.desc())
+    )
+
+
+def values_query(name: str) -> Select[*tuple[Any, ...]]:
+    """What `value_of_row` needs; the whole document only where a JSON pointer leads into it."""
+    if name.startswith("/"):
+        return select(*ABOUT, ResultRow.document)
+    kept = ResultQuantityRow
+    named = and_(kept.result_id == ResultRow.id, kept.name == name)
+    return select(*ABOUT, kept.value, kept.unit, kept.standard_uncertainty).outerjoin(kept, named)
+
+
+def newest_first(
+    session: Session, query: Select[*tuple[Any, ...]], before: str | None
+) -> Iterator[Row[*tuple[Any, ...]]]:
+    """All rows of a query that begins with the newest id, or with the newest one older than `before`."""
+    query = query.limit(AT_ONCE)
+    while rows := session.execute(query if before is None else query.where(ResultRow.id < before)).all():
+        yield from rows
+        before = rows[-1].id
+
+
+def value_of_row(row: Row[*tuple[Any, ...]], name: str) -> ResultValue:
+    """What one result says of the quantity."""
+    return ResultValue(row.id, row.job_id, row.created_at, row.simulated, row.code_version, _quantity(row, name))
+
+
+def _quantity(row: Row[*tuple[Any, ...]], name: str) -> Quantity | None:
+    if not name.startswith("/"):
+        return None if row.value is None else Quantity(name, row.value, row.unit, row.standard_uncertainty)
+    try:
+        return quantity(row.document, name)
+    except NotFound:
+        return None

@@ -1,0 +1,96 @@
+"""Units in SQL, as they are declared. Calibrations and corrections belong to the result store: only joined here."""
+
+from typing import Any
+
+from pydantic import TypeAdapter
+from sqlalchemy import bindparam, select
+from sqlalchemy.orm import aliased
+
+from bench_service import wall_clock
+from bench_service.model.errors import NotFound
+from bench_service.persistence.database import Database
+from bench_service.persistence.evidence.correction_rows import CORRECTION
+from bench_service.persistence.evidence.result_rows import TRIADS
+from bench_service.persistence.idempotency import again_after_conflict
+from bench_service.persistence.tables.evidence import CalibrationRow, CorrectionRow, UnitRow
+from procedures.core.unit import Unit
+
+UNIT = TypeAdapter(Unit)
+_JOINED = {
+    "calibrations",
+    "calibration_id",
+    "thermal_correction",
+    "thermal_correction_id",
+    "converter",
+    "converter_id",
+}
+"""What other tables know of a unit."""
+
+
+class SqlUnitStore:
+    """`bench_service.evidence.units.UnitStore`."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def put_unit(self, unit: Unit) -> None:
+        document = UNIT.dump_python(unit, mode="json", exclude=_JOINED)
+
+        def once() -> None:
+            with self._database.write() as session:
+                session.merge(UnitRow(serial=unit.serial, document=document, updated_at=wall_clock.now()))
+
+        again_after_conflict(once)
+
+    def unit(self, serial: str) -> Unit:
+        with self._database.read() as session:
+            row = session.execute(_UNIT, {"serial": serial}).one_or_none()
+        if row is None:
+            raise NotFound("unit", serial)
+        return _unit(*row)
+
+    def units(self) -> tuple[Unit, ...]:
+        with self._database.read() as session:
+            rows = session.execute(_UNITS.order_by(UnitRow.serial)).all()
+        return tuple(_unit(*row) for row in rows)
+
+
+_THERMAL, _CONVERTER = aliased(CorrectionRow), aliased(CorrectionRow)
+_UNITS = (
+    select(
+        UnitRow.document,
+        CalibrationRow.triads,
+        CalibrationRow.id,
+        _THERMAL.document,
+        _THERMAL.id,
+        _CONVERTER.document,
+        _CONVERTER.id,
+    )
+    .outerjoin(CalibrationRow, (CalibrationRow.unit == UnitRow.serial) & CalibrationRow.is_current)
+    .outerjoin(_THERMAL, (_THERMAL.unit == UnitRow.serial) & (_THERMAL.kind == "thermal") & _THERMAL.is_current)
+    .outerjoin(
+        _CONVERTER, (_CONVERTER.unit == UnitRow.serial) & (_CONVERTER.kind == "converter") & _CONVERTER.is_current
+    )
+)
+
+_UNIT = _UNITS.where(UnitRow.serial == bindparam("serial"))
+
+
+def _unit(
+    document: dict[str, Any],
+    triads: list[Any] | None,
+    calibration_id: str | None,
+    thermal: dict[str, Any] | None,
+    thermal_id: str | None,
+    converter: dict[str, Any] | None,
+    converter_id: str | None,
+) -> Unit:
+    joined: dict[str, Any] = {
+        "calibrations": TRIADS.validate_python(triads or []),
+        "calibration_id": calibration_id,
+        "thermal_correction": None if thermal is None else CORRECTION.validate_python(thermal).thermal,
+        "thermal_correction_id": thermal_id,
+        "converter": None if converter is None else CORRECTION.validate_python(converter).converter,
+        "converter_id": converter_id,
+    }
+    return UNIT.validate_python({**document, **joined})

@@ -1,0 +1,41 @@
+"""Tables of benches: as registered, their stops, their live state."""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy.orm import Mapped, mapped_column
+
+from bench_service.persistence.tables.columns import Id, Table
+
+
+class BenchRow(Table):
+    __tablename__ = "benches"
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    document: Mapped[dict[str, Any]]
+    updated_at: Mapped[datetime]
+
+
+class BenchStopRow(Table):
+    """A bench that was stopped and not released yet."""
+
+    __tablename__ = "bench_stops"
+
+    bench: Mapped[str] = mapped_column(Id, primary_key=True)
+    at: Mapped[datetime]
+    reason: Mapped[str]
+    safe_at: Mapped[datetime | None]
+    safe_by: Mapped[str]
+
+
+class BenchLiveRow(Table):
+    """The last that a bench's driver said of it."""
+
+    __tablename__ = "bench_live"
+
+    bench: Mapped[str] = mapped_column(Id, primary_key=True)
+    at: Mapped[datetime]
+    host: Mapped[str]
+    process: Mapped[int]
+    job_id: Mapped[str | None] = mapped_column(Id)
+    document: Mapped[dict[str, Any]]

@@ -1,0 +1,177 @@
+"""Tables of evidence: units, recordings with their chunks, results, calibrations, corrections, and lineage."""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import BigInteger, Float, ForeignKey, Index, LargeBinary, text
+from sqlalchemy.orm import Mapped, mapped_column
+
+from bench_service.persistence.tables.columns import Document, Id, Table
+
+
+class UnitRow(Table):
+    __tablename__ = "units"
+
+    serial: Mapped[str] = mapped_column(Id, primary_key=True)
+    document: Mapped[dict[str, Any]]
+    updated_at: Mapped[datetime]
+
+
+class RecordingRow(Table):
+    __tablename__ = "recordings"
+    __table_args__ = (
+        Index("ix_recordings_job_id_id", "job_id", "id"),
+        Index("ix_recordings_unit_id", "unit", "id"),
+        Index("ix_recordings_state_stored_bytes", "state", "stored_bytes"),
+        Index(
+            "uq_recordings_complete_station",
+            "job_id",
+            "station_index",
+            unique=True,
+            sqlite_where=text("state = 'complete'"),
+            postgresql_where=text("state = 'complete'"),
+        ),
+    )
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    unit: Mapped[str]
+    bench: Mapped[str | None]
+    job_id: Mapped[str | None] = mapped_column(Id, ForeignKey("jobs.id"))
+    station_index: Mapped[int | None]
+    station: Mapped[dict[str, Any] | None] = mapped_column(Document)
+    channels: Mapped[list[Any]]
+    rate_hz: Mapped[float] = mapped_column(Float(53))
+    start_s: Mapped[float] = mapped_column(Float(53))
+    launched_s: Mapped[float | None] = mapped_column(Float(53))
+    sample_type: Mapped[str]
+    samples: Mapped[int] = mapped_column(BigInteger)
+    chunk_rows: Mapped[int]
+    chunks: Mapped[int]
+    stored_bytes: Mapped[int] = mapped_column(BigInteger)
+    content_hash: Mapped[str]
+    simulated: Mapped[bool]
+    state: Mapped[str]
+    created_at: Mapped[datetime]
+    source: Mapped[dict[str, Any]]
+    checkpoint: Mapped[dict[str, Any] | None] = mapped_column(Document)
+
+
+class ChunkRow(Table):
+    __tablename__ = "chunks"
+
+    recording_id: Mapped[str] = mapped_column(Id, ForeignKey("recordings.id"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    start_sample: Mapped[int] = mapped_column(BigInteger)
+    samples: Mapped[int]
+    sha256: Mapped[str]
+    payload: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class ResultRow(Table):
+    __tablename__ = "results"
+    __table_args__ = (Index("ix_results_job_id_id", "job_id", "id"), Index("ix_results_unit_id", "unit", "id"))
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    kind: Mapped[str]
+    name: Mapped[str]
+    version: Mapped[str]
+    parameters: Mapped[dict[str, Any]]
+    document: Mapped[dict[str, Any]]
+    verdict: Mapped[str]
+    code_version: Mapped[str]
+    simulated: Mapped[bool]
+    created_at: Mapped[datetime]
+    unit: Mapped[str | None]
+    job_id: Mapped[str | None] = mapped_column(Id, ForeignKey("jobs.id"))
+    seed: Mapped[int | None] = mapped_column(BigInteger)
+    context: Mapped[dict[str, Any]]
+
+
+class ResultRecordingRow(Table):
+    __tablename__ = "result_recordings"
+    __table_args__ = (Index("ix_result_recordings_recording_id", "recording_id"),)
+
+    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"), primary_key=True)
+    position: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    recording_id: Mapped[str] = mapped_column(Id, ForeignKey("recordings.id"))
+    content_hash: Mapped[str]
+
+
+class ResultQuantityRow(Table):
+    """A number of a result under its name, out of its document: a trend over many results reads no document."""
+
+    __tablename__ = "result_quantities"
+
+    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"), primary_key=True)
+    name: Mapped[str] = mapped_column(Id, primary_key=True)
+    value: Mapped[float] = mapped_column(Float(53))
+    unit: Mapped[str]
+    standard_uncertainty: Mapped[float | None] = mapped_column(Float(53))
+
+
+class CalibrationRow(Table):
+    __tablename__ = "calibrations"
+    __table_args__ = (
+        Index("ix_calibrations_unit_id", "unit", "id"),
+        Index(
+            "uq_calibrations_current_unit",
+            "unit",
+            unique=True,
+            sqlite_where=text("is_current"),
+            postgresql_where=text("is_current"),
+        ),
+    )
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    unit: Mapped[str]
+    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"))
+    made_at: Mapped[datetime]
+    is_current: Mapped[bool]
+    triads: Mapped[list[Any]]
+    simulated: Mapped[bool]
+
+
+class ResultCalibrationRow(Table):
+    __tablename__ = "result_calibrations"
+    __table_args__ = (Index("ix_result_calibrations_calibration_id", "calibration_id"),)
+
+    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"), primary_key=True)
+    position: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    calibration_id: Mapped[str] = mapped_column(Id, ForeignKey("calibrations.id"))
+
+
+class CorrectionRow(Table):
+    """A correction set of a unit, of the kind "thermal" or "converter"; one of a kind is current."""
+
+    __tablename__ = "corrections"
+    __table_args__ = (
+        Index("ix_corrections_unit_id", "unit", "id"),
+        Index(
+            "uq_corrections_current_unit_kind",
+            "unit",
+            "kind",
+            unique=True,
+            sqlite_where=text("is_current"),
+            postgresql_where=text("is_current"),
+        ),
+    )
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    unit: Mapped[str]
+    kind: Mapped[str]
+    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"))
+    made_at: Mapped[datetime]
+    is_current: Mapped[bool]
+    simulated: Mapped[bool]
+    document: Mapped[dict[str, Any]]
+
+
+class ResultCorrectionRow(Table):
+    """Which correction sets a result used."""
+
+    __tablename__ = "result_corrections"
+    __table_args__ = (Index("ix_result_corrections_correction_id", "correction_id"),)
+
+    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"), primary_key=True)
+    position: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    correction_id: Mapped[str] = mapped_column(Id, ForeignKey("corrections.id"))

@@ -1,0 +1,64 @@
+"""What a monitor counts, in SQL: walks along indices, never over whole rows."""
+
+import shutil
+from datetime import datetime
+from pathlib import Path
+
+from sqlalchemy import func, or_, select
+
+from bench_service.model.job import FINAL
+from bench_service.model.records import RecordingState
+from bench_service.persistence.database import Database
+from bench_service.persistence.tables.evidence import RecordingRow
+from bench_service.persistence.tables.jobs import JobRow
+from bench_service.telemetry.tallies import Ending
+
+
+class SqlTallyStore:
+    """`bench_service.telemetry.tallies.TallyStore`."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def endings(self, since: datetime | None, after: str, limit: int) -> tuple[Ending, ...]:
+        query = (
+            select(
+                JobRow.id,
+                JobRow.procedure,
+                JobRow.state,
+                JobRow.verdict,
+                JobRow.created_at,
+                JobRow.started_at,
+                JobRow.finished_at,
+                JobRow.stations_done,
+            )
+            .where(JobRow.finished_at.is_not(None), JobRow.state.in_([state.value for state in FINAL]))
+            .order_by(JobRow.finished_at, JobRow.id)
+            .limit(limit)
+        )
+        if since is not None:
+            later = or_(JobRow.finished_at > since, JobRow.id > after)
+            query = query.where(JobRow.finished_at >= since, later)
+        with self._database.read() as session:
+            return tuple(
+                Ending(id_, procedure, state, verdict or "", created, started, finished, done)
+                for id_, procedure, state, verdict, created, started, finished, done in session.execute(query)
+                if finished is not None
+            )
+
+    def stations_of_open_jobs(self) -> int:
+        open_states = ("queued", "running", "paused", "interrupted")
+        with self._database.read() as session:
+            return session.scalar(select(func.sum(JobRow.stations_done)).where(JobRow.state.in_(open_states))) or 0
+
+    def recorded_bytes(self) -> int:
+        listed = (RecordingState.COMPLETE.value, RecordingState.INTERRUPTED.value)
+        with self._database.read() as session:
+            found = session.scalar(select(func.sum(RecordingRow.stored_bytes)).where(RecordingRow.state.in_(listed)))
+        return int(found or 0)
+
+    def free_bytes(self) -> int | None:
+        file = self._database.engine.url.database
+        if self._database.is_postgres or not file:
+            return None
+        return shutil.disk_usage(Path(file).parent).free

@@ -1,0 +1,109 @@
+"""One service of a process: the services of each noun, and its life from registration to its end."""
+
+from collections.abc import Callable, Sequence
+
+from bench_service.bench.driver import BenchDriver
+from bench_service.bench.live.values import LiveBoard
+from bench_service.bench.safety import SafetyService
+from bench_service.campaigns.service import CampaignService
+from bench_service.campaigns.stores import Stores
+from bench_service.evidence.analyses import AnalysisService
+from bench_service.evidence.imports import ImportService
+from bench_service.evidence.units import register
+from bench_service.jobs.planning import Planner
+from bench_service.jobs.queue_service import QueueService
+from bench_service.jobs.service import JobService
+from bench_service.jobs.stops import StopService
+from bench_service.jobs.worker import Worker
+from bench_service.model.errors import NotReady
+from bench_service.telemetry.tracing import Traces
+
+LEAST_FREE_BYTES = 200_000_000
+"""With less room on the database's disk the service says that it is not ready: an hour of samples is about 17 MB."""
+
+
+class BenchService:
+    """Everything that HTTP, pages and command line can ask, by noun."""
+
+    def __init__(
+        self,
+        stores: Stores,
+        driver: BenchDriver | None,
+        planner: Planner,
+        worker: Worker | None,
+        code_version: str,
+        safety: SafetyService,
+        live: LiveBoard | None = None,
+        free_bytes: Callable[[], int | None] = lambda: None,
+        traces: Traces | None = None,
+    ) -> None:
+        """`driver`: of this process's own bench; None: it plans and queues for benches that workers drive.
+
+        `free_bytes`: room on the database's disk, where that is known.
+        """
+        self.safety = safety
+        self.traces = traces or Traces()
+        self.live = live or LiveBoard(stores.live)
+        self.stores = stores
+        self.planner = planner
+        self.catalogue = planner.catalogue
+        self.code_version = code_version
+        self.benches = planner.benches
+        self.imports = ImportService(stores)
+        self.analyses = AnalysisService(stores, planner.catalogue, stores.jobs.get, code_version)
+        self.queues = QueueService(stores, planner.benches, self._wake)
+        self.jobs = JobService(stores, planner, self.queues, driver, worker, code_version, self._wake)
+        self.stops = StopService(stores, planner.benches, safety, self._wake)
+        self.campaigns = CampaignService(stores, planner, self.analyses, self.jobs.submit, self.jobs.cancel)
+        self._driver = driver
+        self._worker = worker
+        self._free_bytes = free_bytes
+
+    def register(self) -> None:
+        """Remember the bench and its units, and forget what crashed imports left."""
+        self.imports.discard_crashed()
+        if self._driver is None:
+            return
+        mounted = self._driver.mounted()
+        for unit in mounted:
+            register(self.stores.units, unit)
+        self.stores.benches.put_bench(self._driver.description, [unit.serial for unit in mounted])
+        if self._worker is not None:
+            self.safety.at_start(self._driver.description.id)
+
+    def begin(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
+        """Begin to work, beside the first answers. The bench's lease must be held.
+
+        `warm_up` is called once the engine runs and the numerics are loaded.
+        """
+        if self._worker is not None:
+            self._worker.begin([lambda: (self.catalogue.procedures, self.catalogue.methods), *warm_up])
+            self.campaigns.conductor.begin()
+
+    def ready(self) -> tuple[str, ...]:
+        """Return once a job could start, with what a person should know all the same.
+
+        A stopped bench is such a note: it refuses by a person's will, and the service works. Raises `NotReady` with
+        every reason, `StorageFailure` where the database does not answer.
+        """
+        self.stores.jobs.counts()
+        reasons: list[str] = []
+        free = self._free_bytes()
+        if free is not None and free < LEAST_FREE_BYTES:
+            reasons.append(f"the disk is nearly full: {free} bytes are free, {LEAST_FREE_BYTES} are needed")
+        if self._worker is not None:
+            reasons += self._worker.troubles()
+        if reasons:
+            raise NotReady(reasons)
+        stops = (self.stores.benches.bench_stop(bench) for bench in self.benches.ids())
+        return tuple(f"bench {stop.bench} is stopped: {stop.reason}" for stop in stops if stop is not None)
+
+    def stop(self) -> None:
+        """End the service: the running job is left for the next start, the bench made safe."""
+        self.campaigns.conductor.stop()
+        if self._worker is not None:
+            self._worker.shut_down()
+
+    def _wake(self) -> None:
+        if self._worker is not None:
+            self._worker.wake()

@@ -1,0 +1,1 @@
+"""What the service records of itself: log context, traces, counts, audit trail."""

@@ -1,0 +1,132 @@
+"""The linear estimator of a triad's coefficients and its weights, and what the table's flaws do to its answer.
+
+Two weightings. "noise": the table is taken as it is commanded, and each channel is weighted by its noise alone (thesis
+3.3.6). "noise_and_table": the table's flaws are unknowns with declared spreads, so the outputs are weighted by
+``S = C + F·Fᵀ``, with C the noise of the station means and F = K·∂v/∂p·σ_p the flaws at one standard deviation each.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.linalg import qr, solve_triangular
+
+from procedures.analysis.calibration.table_errors import SOURCES, TableErrors
+from procedures.analysis.least_squares.determination import require_full_rank
+from procedures.analysis.least_squares.whitening import whitener
+from procedures.core.arrays import Array
+
+Weighting = Literal["noise_and_table", "noise"]
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """The linear estimator of a plan: what it multiplies the outputs with, and what noise does to the answer."""
+
+    design: Array
+    """[1 v_x v_y v_z], shape (n, 4)."""
+    gain: Array
+    """G: the twelve coefficients are ``Σ G[:, c, i]·U[i, c]`` over channels and stations, shape (12, 3, n)."""
+    noise_covariance: Array
+    """``G·C·Gᵀ`` of the twelve coefficients, channel by channel, shape (12, 12)."""
+    condition: float
+    """Condition number of the column-scaled design."""
+
+    def coefficients(self, outputs: Array) -> Array:
+        """Of outputs (n, 3), shape (12,)."""
+        return np.einsum("kcn,nc->k", self.gain, outputs)
+
+    def modelled(self, coefficients: Array) -> Array:
+        """``b + K·v`` at the stations for twelve coefficients, shape (n, 3)."""
+        return self.design @ coefficients.reshape(3, 4).T
+
+    def remaining(self) -> Array:
+        """``1 − A·G``: what the fit leaves of the outputs, both stacked channel by channel, shape (3n, 3n)."""
+        n = len(self.design)
+        explained = np.einsum("ia,cadj->cidj", self.design, self.gain.reshape(3, 4, 3, n))
+        return np.eye(3 * n) - explained.reshape(3 * n, 3 * n)
+
+
+@dataclass(frozen=True)
+class TableShare:
+    """What the table's flaws add to the twelve coefficients."""
+
+    per_sd: Array
+    """Change of the coefficients per standard deviation of each flaw, shape (12, P)."""
+    source: tuple[str, ...]
+
+    @property
+    def covariance(self) -> Array:
+        """Shape (12, 12)."""
+        return self.per_sd @ self.per_sd.T
+
+    def standard_uncertainty(self, source: str) -> Array:
+        """Of the twelve coefficients from one source alone, shape (12,)."""
+        columns = np.array([s == source for s in self.source], dtype=bool)
+        return np.sqrt(np.sum(self.per_sd[:, columns] ** 2, axis=1))
+
+    def by_source(self) -> dict[str, Array]:
+        """Standard uncertainties (12,) of every source that contributes."""
+        parts = {source: self.standard_uncertainty(source) for source in SOURCES}
+        return {source: part for source, part in parts.items() if np.any(part > 0.0)}
+
+
+def estimator(what: str, vectors: Array, noise_covariance: Array, of_table: Array | None = None) -> Estimator:
+    """Generalised least squares for input vectors (n, 3) and covariances of the station means (3, n, n).
+
+    ``x̂ = (AᵀS⁻¹A)⁻¹AᵀS⁻¹·U`` over all three channels. `of_table` F has shape (n, 3, P), as `TableErrors.of_outputs`
+    gives it; without it, or where no flaw is declared, S = C and each channel stands alone. Raises `Undetermined`
+    naming the lost combinations.
+    """
+    design = np.column_stack([np.ones(len(vectors)), vectors])
+    condition = require_full_rank(what, design, ("b_i", "K_i1", "K_i2", "K_i3"))
+    whiteners = np.array([whitener(c) for c in noise_covariance])
+    flaws = None if of_table is None else of_table[:, :, np.any(of_table != 0.0, axis=(0, 1))]
+    if flaws is None or flaws.shape[2] == 0:
+        gain, covariance = _by_channel(design, whiteners)
+    else:
+        gain = _with_flaws(design, whiteners, flaws)
+        covariance = np.einsum("kci,cij,lcj->kl", gain, noise_covariance, gain, optimize=True)
+    return Estimator(design, gain, covariance, condition)
+
+
+def _by_channel(design: Array, whiteners: Array) -> tuple[Array, Array]:
+    """Gain (12, 3, n) and covariance (12, 12) of three separate fits, whiteners (3, n, n)."""
+    scale = np.linalg.norm(design, axis=0)
+    gain, covariance = np.zeros((3, 4, 3, len(design))), np.zeros((3, 4, 3, 4))
+    for channel, weights in enumerate(whiteners):
+        pseudo_inverse = np.linalg.pinv(weights @ design / scale) / scale[:, None]
+        gain[channel, :, channel] = pseudo_inverse @ weights
+        covariance[channel, :, channel] = pseudo_inverse @ pseudo_inverse.T
+    return gain.reshape(12, 3, -1), covariance.reshape(12, 12)
+
+
+def _with_flaws(design: Array, whiteners: Array, flaws: Array) -> Array:
+    """Gain (12, 3, n) where flaws (n, 3, P) at one standard deviation each are estimated together with the triad.
+
+    With ``W·C·Wᵀ = 1`` the least squares of ``|W(U − A·x − F·p)|² + |p|²`` over x and p has the x of S = C + F·Fᵀ
+    (matrix inversion lemma), and S is never inverted: dwells so long that their noise vanishes beside the table do no
+    harm. The orthogonal factors of [W·F W·A; 1 0], flaws first, leave the coefficients' triangle R in the lower corner.
+    """
+    n, p = len(design), flaws.shape[2]
+    scale = np.linalg.norm(design, axis=0)
+    stacked = np.zeros((3 * n + p, p + 12))
+    for channel, weights in enumerate(whiteners):
+        rows = slice(channel * n, channel * n + n)
+        stacked[rows, :p] = weights @ flaws[:, channel]
+        stacked[rows, p + 4 * channel : p + 4 * channel + 4] = weights @ design / scale
+    stacked[3 * n :, :p] = np.eye(p)
+    q, r = qr(stacked, mode="economic")
+    whitened = np.asarray(solve_triangular(r[p:, p:], q[: 3 * n, p:].T)).reshape(12, 3, n)
+    return np.einsum("kci,cij->kcj", whitened, whiteners, optimize=True) / np.tile(scale, 3)[:, None, None]
+
+
+def table_share(plan: Estimator, of_table: Array, table: TableErrors) -> TableShare:
+    """The table's flaws carried through the outputs `of_table` F (n, 3, P) and the estimator into the coefficients."""
+    return TableShare(np.einsum("kcn,ncp->kp", plan.gain, of_table, optimize=True), table.source)
+
+
+def joint_table_covariance(gyro: TableShare, accelerometer: TableShare) -> Array:
+    """Covariance of all twenty-four coefficients from the table's flaws, which both triads share, shape (24, 24)."""
+    both = np.vstack([gyro.per_sd, accelerometer.per_sd])
+    return both @ both.T

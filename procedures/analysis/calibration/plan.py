@@ -1,0 +1,188 @@
+"""A calibration before it runs: the uncertainty of every coefficient, and the limits that it cannot resolve."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from procedures.analysis.calibration.estimator import Estimator, TableShare, Weighting, estimator, table_share
+from procedures.analysis.calibration.reference import reference_vectors
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.station_plan import dwell_for, windows
+from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
+from procedures.analysis.calibration.verification import magnitude_sensitivity, predicted_sd
+from procedures.core import units
+from procedures.core.arrays import Array
+from procedures.core.recording import Station
+from procedures.core.site import Site
+from procedures.core.unit import Unit
+
+BIASES = (0, 4, 8)
+SCALE_FACTORS = (1, 6, 11)
+
+_TURNS = (
+    "whole turns of the table at a known rate determine it instead (procedure scale_factor_whole_turns: ±n·360°, the "
+    "Earth's rate cancels; IEEE Std 647)"
+)
+
+
+@dataclass(frozen=True)
+class TriadPlan:
+    """One triad at the stations of a plan: what it will see, what is known of its noise, and the table's flaws."""
+
+    triad: str
+    unit: Unit
+    stations: tuple[Station, ...]
+    axes: tuple[tuple[float, float], ...]
+    """(rate, acceleration) of the table's axes, for the time that moves take."""
+    vectors: Array
+    table: TableErrors
+    matrix: Array
+    """K as far as known: of the current calibration, else the identity (nominal outputs)."""
+    calibrated: bool = False
+    """Whether K is of a calibration."""
+    weighting: Weighting = "noise_and_table"
+
+    def noise_covariance(self, dwell_s: float | None = None) -> Array | None:
+        """Of the station means, (3, n, n), at the planned dwell or another; None where the noise is not known."""
+        stations = [s if dwell_s is None else replace(s, record_s=dwell_s) for s in self.stations]
+        return triad_covariance(self.unit.triad(self.triad), windows(stations, self.axes))
+
+    def estimator(self, noise_covariance: Array) -> Estimator:
+        """The generalised least squares of this plan. Raises `Undetermined`."""
+        flaws = self.table.of_outputs(self.matrix) if self.weighting == "noise_and_table" else None
+        return estimator(f"the {self.triad} coefficients", self.vectors, noise_covariance, flaws)
+
+    def share(self, plan: Estimator) -> TableShare:
+        """What the table's flaws add."""
+        return table_share(plan, self.table.of_outputs(self.matrix), self.table)
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A limit on the scatter of a coefficient between calibrations: the plan must be finer than it."""
+
+    triad: str
+    name: str
+    columns: tuple[int, ...]
+    limit: float
+    """SI; relative for a scale factor."""
+    display: str
+    display_size: float
+
+
+def triad_plan(
+    triad: str,
+    unit: Unit,
+    stations: Sequence[Station],
+    axes: Sequence[tuple[float, float]],
+    site: Site,
+    uncertainty: TableUncertainty,
+    weighting: Weighting = "noise_and_table",
+) -> TriadPlan:
+    """A triad's plan at stations that all carry table angles."""
+    angles = [s.angles for s in stations if s.angles is not None]
+    vectors = reference_vectors(triad, angles, site)
+    table = table_errors(angles, vectors, uncertainty, of_gravity=triad == "accelerometer")
+    known = unit.calibration(triad)
+    calibrated = known is not None and known.output_unit != "count"
+    matrix = known.matrix_array if known is not None and calibrated else np.eye(3)
+    return TriadPlan(triad, unit, tuple(stations), tuple(axes), vectors, table, matrix, calibrated, weighting)
+
+
+def predicted_parts(plan: TriadPlan) -> tuple[Array, Array] | None:
+    """Standard uncertainties of the twelve coefficients from noise and from the table, each (12,).
+
+    None where the noise is not known. Raises `Undetermined`.
+    """
+    noise = plan.noise_covariance()
+    if noise is None:
+        estimator(f"the {plan.triad} coefficients", plan.vectors, np.array([np.eye(len(plan.stations))] * 3))
+        return None
+    gls = plan.estimator(noise)
+    return np.sqrt(np.diagonal(gls.noise_covariance)), np.sqrt(np.diagonal(plan.share(gls).covariance))
+
+
+def basis(plans: Sequence[TriadPlan]) -> str:
+    """What the predicted uncertainties of a unit rest on: its calibration, or its nominal scale factors."""
+    nominal = [plan.triad for plan in plans if not plan.calibrated]
+    if len(nominal) == len(plans):
+        return "nominal scale factors: the unit has no calibration yet; uncertainties scale with the true ones"
+    calibration = f"calibration {plans[0].unit.calibration_id or 'of the unit'}"
+    of_others = "".join(
+        f"; {triad}: nominal scale factors, uncertainties scale with the true ones" for triad in nominal
+    )
+    return calibration + of_others
+
+
+def run_to_run_requirements(
+    gyro_bias_deg_h: float, gyro_scale_ppm: float, accelerometer_bias_m_s2: float, accelerometer_scale_ppm: float
+) -> tuple[Requirement, ...]:
+    """The four limits on stability from launch to launch (thesis 4.3, 5.6)."""
+    deg_h, ppm = units.DEG_PER_HOUR, units.PPM
+    return (
+        Requirement("gyro", "bias", BIASES, gyro_bias_deg_h * deg_h, "deg/h", deg_h),
+        Requirement("gyro", "scale factor", SCALE_FACTORS, gyro_scale_ppm * ppm, "ppm", ppm),
+        Requirement("accelerometer", "bias", BIASES, accelerometer_bias_m_s2, "m/s^2", 1.0),
+        Requirement("accelerometer", "scale factor", SCALE_FACTORS, accelerometer_scale_ppm * ppm, "ppm", ppm),
+    )
+
+
+def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
+    """A sentence where the plan is coarser than a limit: what is expected, and the dwell that would do, if any would.
+
+    What counts is what scatters from one calibration to the next: noise, and the table's pointing; constant flaws of
+    the table do not. Only the noise falls with the dwell.
+    """
+
+    def uncertainty(dwell_s: float | None) -> float:
+        noise = plan.noise_covariance(dwell_s)
+        if noise is None:
+            return 0.0
+        gls = plan.estimator(noise)
+        pointing = plan.share(gls).standard_uncertainty("pointing")
+        columns = list(requirement.columns)
+        variance = np.diagonal(gls.noise_covariance)[columns] + pointing[columns] ** 2
+        size = np.diagonal(plan.matrix) if requirement.display == "ppm" else np.ones(3)
+        return float(np.max(np.sqrt(variance) / np.abs(size)))
+
+    expected = uncertainty(None)
+    if expected <= requirement.limit:
+        return None
+    r = requirement
+    dwell = dwell_for(uncertainty, r.limit, max(s.record_s for s in plan.stations))
+    way_out = (
+        f"a dwell of about {_length(dwell)} at each station would be needed{_alone(r)}"
+        if dwell is not None
+        else f"no dwell gets there{_alone(r)}"
+    )
+    turns = f"; {_TURNS}" if r.triad == "gyro" and r.name == "scale factor" else ""
+    return (
+        f"{r.triad} {r.name} run to run: the limit of {r.limit / r.display_size:g} {r.display} cannot be resolved, "
+        f"the plan's standard uncertainty is {expected / r.display_size:.3g} {r.display}; {way_out}{turns}"
+    )
+
+
+def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size: float) -> str | None:
+    """A sentence where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit [SI]."""
+    noise = plan.noise_covariance()
+    if noise is None:
+        return None
+    weights, _ = magnitude_sensitivity(plan.vectors, plan.matrix)
+    expected = predicted_sd(np.einsum("ic,cij,jc->ij", weights, noise, weights)) / float(np.sqrt(3.0))
+    if expected <= limit:
+        return None
+    return (
+        f"{plan.triad} bias in run: the limit of {limit / display_size:g} {display} cannot be resolved, the noise of "
+        f"the dwells alone makes δ/√3 about {expected / display_size:.3g} {display}"
+    )
+
+
+def _length(dwell_s: float) -> str:
+    """A dwell in the unit that a person would plan it in."""
+    hours = dwell_s / units.HOUR
+    return f"{hours:.2g} h" if hours < 48.0 else f"{hours / 24.0:.0f} days"
+
+
+def _alone(requirement: Requirement) -> str:
+    return " by the Earth's rate alone" if requirement.triad == "gyro" else ""

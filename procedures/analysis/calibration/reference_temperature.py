@@ -1,0 +1,211 @@
+"""Station means of an accelerometer triad brought to the reference temperatures with the unit's correction (T 4.1).
+
+T 4.1 corrects to a force, ``f = [K0 + A]·(V + B0 + B)`` with A and B the polynomials in the temperatures' departures;
+at the reference A = B = 0 and ``f = K0·(V₀ + B0)``. So what the channel would have shown there is
+
+``V₀ = [1 + A/K0]·(V + B0 + B) − B0 = Ṽ/K0 − B0``,
+
+whatever the constants K0 and B0 of this launch are: a calibration finds those anew. Cross-coupling stays as it is, for
+A multiplies all that passes a torquer. An error δ of B0 leaves δ·A/K0, a thousandth of it. In the form ``switched`` the
+regime is taken as static: a dwell is too short for the indicator.
+
+Temperatures are the sensors' means over the dwell, their lag taken out by their slope, ``T = T_s + τ·dT_s/dt``. What
+the converter's first stage leaves uncertain the correction's own fit has taken up; it is not counted twice.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from procedures.analysis.calibration.multiposition import TriadFit
+from procedures.analysis.calibration.station_means import StationMeans
+from procedures.analysis.cells import cell_means
+from procedures.analysis.thermal.regime import RegimeSettings
+from procedures.core.arrays import Array
+from procedures.core.converter import at_reference
+from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.imu_model import COEFFICIENT_NAMES
+from procedures.core.recording import Recording
+from procedures.core.thermal_correction import (
+    POWERS_OF_ALPHA,
+    POWERS_OF_BETA,
+    AxisCorrection,
+    Form,
+    ThermalCorrection,
+    terms,
+)
+
+SENSORS = ("temperature_case", "temperature_converter")
+"""Channels of Δt and Δb."""
+CELLS = 12
+"""Stretches of a dwell that its temperatures' line is fitted to."""
+LEAST_CELL_S = 1.0
+"""A unit sends its temperatures once a second."""
+
+
+@dataclass(frozen=True)
+class StationTemperatures:
+    """Case and converter at the middle of each dwell, lag taken out, each (n, 2) [°C]."""
+
+    mean_c: Array
+    mean_sd_c: Array
+    """From the scatter about a straight line."""
+    slope_c_s: Array
+
+
+@dataclass(frozen=True)
+class AtReference:
+    """Station means as they would have been at the reference temperatures, and what that leaves uncertain."""
+
+    means: StationMeans
+    temperatures: StationTemperatures
+    change_m_s2: Array
+    """What was added to the outputs, (n, 3)."""
+    of_correction: Array
+    """Covariance of the outputs from the correction's coefficients, alike at all stations, (3, n, n)."""
+    of_sensors: Array
+    """The same from the sensors' noise, (3, n, n)."""
+
+    @property
+    def covariance(self) -> Array:
+        """Both, (3, n, n) [(m/s²)²]."""
+        return self.of_correction + self.of_sensors
+
+
+@dataclass(frozen=True)
+class ThermalShare:
+    """What the correction did to a calibration, JSON-ready."""
+
+    form: Form
+    regime: str
+    """What the form ``switched`` was told: "static"; the other forms ask for none: ""."""
+    case_c: tuple[float, ...]
+    """At each station."""
+    converter_c: tuple[float, ...]
+    change_m_s2: tuple[tuple[float, ...], ...]
+    """Added to the outputs x, y, z of each station."""
+    from_correction: dict[str, float]
+    """Standard uncertainty that the correction's coefficients leave in each calibration coefficient; it is part of
+    theirs."""
+    from_sensors: dict[str, float]
+    """The same of the temperature sensors' noise."""
+
+
+def station_temperatures(recordings: Sequence[Recording], lag_s: tuple[float, float]) -> StationTemperatures:
+    """Case and converter temperature of each recording. Raises `MissingChannel`, `UnfitRecording`, `BadParameter`."""
+    rows: list[tuple[Array, Array, Array]] = []
+    for recording in recordings:
+        info = recording.info
+        cell_s = max(LEAST_CELL_S, info.duration_s / CELLS)
+        if info.duration_s < 4.0 * cell_s:
+            raise BadParameter("dwell_s", info.duration_s, f"at least {4 * LEAST_CELL_S:g} s: temperatures need a line")
+        cells = cell_means(recording, SENSORS, cell_s)
+        count = cells.rates.shape[1]
+        about = (np.arange(count) - 0.5 * (count - 1)) * cells.cell_s
+        mean = cells.rates.mean(axis=1)
+        if not np.all(np.isfinite(mean)):
+            raise UnfitRecording(f"recording {info.id}: a temperature is not a number")
+        slope = cells.rates @ about / np.sum(about**2)
+        left = cells.rates - mean[:, None] - slope[:, None] * about
+        variance = np.sum(left**2, axis=1) / (count - 2)
+        lag = np.array(lag_s)
+        sd = np.sqrt(variance * (1.0 / count + lag**2 / np.sum(about**2)))
+        rows.append((mean + lag * slope, sd, slope))
+    mean_c, sd_c, slope_c_s = (np.array(column) for column in zip(*rows, strict=True))
+    return StationTemperatures(mean_c, sd_c, slope_c_s)
+
+
+def bring_to_reference(
+    recordings: Sequence[Recording], means: StationMeans, correction: ThermalCorrection, lag_s: tuple[float, float]
+) -> AtReference:
+    """Accelerometer station means at the correction's reference temperatures.
+
+    `lag_s`: time constants of case and converter sensor by their data sheet, as the correction's fit was given them.
+    Raises `UnfitRecording` where the outputs are no specific forces, `BadParameter`, `MissingChannel`.
+    """
+    if means.output_unit != "m/s^2":
+        raise UnfitRecording(f"outputs in {means.output_unit} cannot be corrected for temperature: m/s^2 are needed")
+    found = station_temperatures(recordings, lag_s)
+    case, converter = found.mean_c.T
+
+    def brought(case_c: Array, converter_c: Array) -> Array:
+        v = means.outputs
+        if correction.first_stage is not None:
+            v = at_reference(v, converter_c, correction.first_stage)
+        felt = correction.apply(v, case_c, converter_c, 0.0)
+        scale, bias = (np.array([getattr(a, n) for a in correction.axes]) for n in ("scale", "bias_m_s2"))
+        return felt / scale - bias
+
+    outputs = brought(case, converter)
+    by_sensor = [
+        (brought(case + step[0], converter + step[1]) - outputs) / STEP_C for step in ((STEP_C, 0.0), (0.0, STEP_C))
+    ]
+    of_sensors = np.sum([(d * found.mean_sd_c[:, [s]]) ** 2 for s, d in enumerate(by_sensor)], axis=0)
+    staged = means.outputs
+    if correction.first_stage is not None:
+        staged = at_reference(staged, converter, correction.first_stage)
+    of_correction = [_of_correction(axis, staged[:, i], case, converter) for i, axis in enumerate(correction.axes)]
+    return AtReference(
+        replace(means, outputs=outputs),
+        found,
+        outputs - means.outputs,
+        np.array(of_correction),
+        np.array([np.diag(column) for column in of_sensors.T]),
+    )
+
+
+STEP_C = 0.01
+"""Of the differences by temperature."""
+
+
+def _of_correction(axis: AxisCorrection, v: Array, case: Array, converter: Array) -> Array:
+    """``J·Σ·Jᵀ`` (n, n): ``∂V₀/∂α = x·(V + B0 + B)/K0``, ``∂V₀/∂β = (1 + A/K0)·x``, x the powers of the departures."""
+    if not axis.covariance:
+        return np.zeros((len(v), len(v)))
+    dt, db = case - axis.case_reference_c, converter - axis.converter_reference_c
+    of_a = terms(axis.form, POWERS_OF_ALPHA, dt, db, np.zeros_like(dt))
+    of_b = terms(axis.form, POWERS_OF_BETA, dt, db, np.zeros_like(dt))
+    gain = 1.0 + of_a @ np.array(axis.alpha) / axis.scale
+    through = v + axis.bias_m_s2 + of_b @ np.array(axis.beta)
+    jacobian = np.column_stack([of_a * (through / axis.scale)[:, None], of_b * gain[:, None]])
+    return jacobian @ np.array(axis.covariance) @ jacobian.T
+
+
+def thermal_share(at: AtReference, correction: ThermalCorrection, fit: TriadFit) -> ThermalShare:
+    """What the correction did to a calibration of the accelerometers, through the estimator that made the fit."""
+
+    def share(covariance: Array) -> dict[str, float]:
+        gain = fit.estimator.gain
+        variance = np.einsum("kci,cij,kcj->k", gain, covariance, gain)
+        return dict(zip(COEFFICIENT_NAMES, np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
+
+    form = correction.axes[0].form
+    return ThermalShare(
+        form,
+        "static" if form is Form.SWITCHED else "",
+        tuple(at.temperatures.mean_c[:, 0].tolist()),
+        tuple(at.temperatures.mean_c[:, 1].tolist()),
+        tuple(tuple(row) for row in at.change_m_s2.tolist()),
+        share(at.of_correction),
+        share(at.of_sensors),
+    )
+
+
+def thermal_warnings(at: AtReference, correction: ThermalCorrection) -> tuple[str, ...]:
+    """What the reader must know of a correction's use at these temperatures."""
+    warnings: list[str] = []
+    unknown = [name for name, axis in zip("xyz", correction.axes, strict=True) if not axis.covariance]
+    if unknown:
+        warnings.append(
+            f"the thermal correction of accelerometer {', '.join(unknown)} has no covariance: its share in the "
+            "uncertainties is missing"
+        )
+    fastest = RegimeSettings().release_rate_c_s
+    moving = int(np.sum(np.abs(at.temperatures.slope_c_s[:, 0]) > fastest))
+    if correction.axes[0].form is Form.SWITCHED and moving:
+        warnings.append(
+            f"at {moving} stations the case changed faster than {60.0 * fastest:g} °C/min, but the correction of the "
+            "form 'switched' was applied as in the static regime: let the unit warm through, or use the form 'both'"
+        )
+    return tuple(warnings)

@@ -1,0 +1,160 @@
+"""What a calibration tells of one triad, as plain JSON-ready numbers."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from procedures.analysis.calibration.estimator import Weighting
+from procedures.analysis.calibration.multiposition import TriadFit
+from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, observable_derivative, scalar_parameters
+from procedures.analysis.calibration.verification import Magnitudes
+from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """One coefficient of ``U = b + K·v`` with its standard uncertainty and what that is made of."""
+
+    name: str
+    """"gyro.b_x", "accelerometer.K11", …"""
+    unit: str
+    estimate: float
+    standard_uncertainty: float
+    from_noise: float
+    from_table: float
+    from_table_source: dict[str, float]
+    """The table's part by source: orthogonality, level, azimuth, gravity, pointing."""
+
+
+@dataclass(frozen=True)
+class StationResidual:
+    """Outputs minus model at one station, channels x, y, z, with their expected standard deviations."""
+
+    label: str
+    residual: tuple[float, ...]
+    expected_sd: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ScalarParameter:
+    """One of the nine that magnitudes determine: from magnitudes alone, from the linear fit, and how far apart."""
+
+    name: str
+    unit: str
+    scalar: float
+    standard_uncertainty: float
+    linear: float
+    difference_sigmas: float
+    """In standard deviations of the difference, both estimates' common data allowed for."""
+
+
+@dataclass(frozen=True)
+class ScalarCheck:
+    """The scalar calibration of the same stations, which trusts no angle of the table."""
+
+    parameters: tuple[ScalarParameter, ...]
+    condition: float
+    p_value: float | None
+
+
+@dataclass(frozen=True)
+class TriadSummary:
+    """Everything a calibration says of one triad."""
+
+    calibration: TriadCalibration
+    coefficients: tuple[Coefficient, ...]
+    condition: float
+    residuals: tuple[StationResidual, ...]
+    chi_square: float
+    degrees_of_freedom: int
+    p_value: float | None
+    noise_known: bool
+    magnitudes: Magnitudes
+    scalar: ScalarCheck | None = None
+    weighting: Weighting = "noise"
+    """Results of procedure versions before 1.1.0 do not say: theirs is this."""
+
+
+def coefficient_unit(name: str, output_unit: str, input_unit: str) -> str:
+    """Unit of b is the output's; of K "1" where output and input have the same unit."""
+    if name.startswith("b"):
+        return output_unit
+    return "1" if output_unit == input_unit else f"{output_unit}/({input_unit})"
+
+
+def triad_summary(
+    fit: TriadFit, magnitudes: Magnitudes, labels: Sequence[str], scalar: ScalarCheck | None = None
+) -> TriadSummary:
+    """Numbers of a fit, ready to be stored."""
+    return TriadSummary(
+        fit.calibration(),
+        _coefficients(fit),
+        fit.condition,
+        tuple(
+            StationResidual(label, tuple(r.tolist()), tuple(sd.tolist()))
+            for label, r, sd in zip(labels, fit.residuals, fit.residual_sd, strict=True)
+        ),
+        fit.chi_square,
+        fit.degrees_of_freedom,
+        fit.p_value,
+        fit.noise_known,
+        magnitudes,
+        scalar,
+        fit.weighting,
+    )
+
+
+def _coefficients(fit: TriadFit) -> tuple[Coefficient, ...]:
+    total = np.sqrt(np.diagonal(fit.covariance))
+    noise = np.sqrt(np.diagonal(fit.noise_covariance))
+    table = np.sqrt(np.diagonal(fit.table.covariance))
+    sources = fit.table.by_source()
+    return tuple(
+        Coefficient(
+            f"{fit.triad}.{name}",
+            coefficient_unit(name, fit.output_unit, fit.input_unit),
+            float(fit.coefficients[i]),
+            float(total[i]),
+            float(noise[i]),
+            float(table[i]),
+            {source: float(part[i]) for source, part in sources.items()},
+        )
+        for i, name in enumerate(COEFFICIENT_NAMES)
+    )
+
+
+def scalar_check(fit: TriadFit, scalar: ScalarFit) -> ScalarCheck:
+    """Scalar against linear, parameter by parameter.
+
+    Both are functions of the same outputs, so the difference has the covariance ``D·(C + F·Fᵀ)·Dᵀ`` with
+    ``D = J·G_linear − G_scalar`` over all outputs of all channels, C noise and F the table's flaws; G_linear is the
+    estimator that made the fit, whatever its weights.
+    """
+    linear_gain = np.einsum("pk,kcn->pnc", observable_derivative(fit.coefficients), fit.estimator.gain)
+    difference = linear_gain - scalar.gain
+    variance = np.einsum("pnc,cnm,pmc->p", difference, fit.station_noise, difference)
+    flaws = np.einsum("pnc,ncq->pq", difference, fit.of_table)
+    sd = np.sqrt(variance + np.sum(flaws**2, axis=1))
+    linear = scalar_parameters(fit.coefficients)
+    own = scalar.standard_uncertainties
+    parameters = tuple(
+        ScalarParameter(
+            name,
+            _scalar_unit(name, fit),
+            float(scalar.parameters[i]),
+            float(own[i]),
+            float(linear[i]),
+            float((scalar.parameters[i] - linear[i]) / sd[i]) if sd[i] > 1e-9 * own[i] else 0.0,
+        )
+        for i, name in enumerate(PARAMETERS)
+    )
+    return ScalarCheck(parameters, scalar.condition, scalar.p_value)
+
+
+def _scalar_unit(name: str, fit: TriadFit) -> str:
+    if name.startswith("t"):
+        return "rad"
+    if name.startswith("b"):
+        return fit.output_unit
+    return "1" if fit.output_unit == fit.input_unit else f"{fit.input_unit}/{fit.output_unit}"

@@ -1,0 +1,135 @@
+"""From the recordings of a multiposition calibration to the summary of a triad: means, fit, magnitudes, cross-check."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from procedures.analysis.calibration.estimator import Weighting
+from procedures.analysis.calibration.multiposition import TriadFit, fit_triad
+from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
+from procedures.analysis.calibration.reference_temperature import (
+    ThermalShare,
+    bring_to_reference,
+    thermal_share,
+    thermal_warnings,
+)
+from procedures.analysis.calibration.scalar import fit_scalar, nominal_start, start_from_data
+from procedures.analysis.calibration.station_means import StationMeans, station_means
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.summary import (
+    ScalarCheck,
+    TriadSummary,
+    scalar_check,
+    triad_summary,
+)
+from procedures.analysis.calibration.table_errors import TableUncertainty, table_errors
+from procedures.analysis.calibration.verification import magnitudes
+from procedures.core.arrays import Array
+from procedures.core.errors import UnfitRecording
+from procedures.core.recording import Recording
+from procedures.core.site import Site
+from procedures.core.table_angles import TableAngles
+from procedures.core.thermal_correction import ThermalCorrection
+from procedures.core.unit import TriadRecord
+
+
+def analyse_triad(
+    recordings: Sequence[Recording],
+    triad: str,
+    site: Site,
+    uncertainty: TableUncertainty,
+    record: TriadRecord | None,
+    with_scalar: bool = False,
+    weighting: Weighting = "noise_and_table",
+) -> TriadSummary:
+    """Calibrate one triad from one recording a station. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
+    means = station_means(recordings, triad)
+    return analyse_means(means, site, uncertainty, record, with_scalar, weighting)[0]
+
+
+def analyse_means(
+    means: StationMeans,
+    site: Site,
+    uncertainty: TableUncertainty,
+    record: TriadRecord | None,
+    with_scalar: bool = False,
+    weighting: Weighting = "noise_and_table",
+    more: Array | None = None,
+) -> tuple[TriadSummary, TriadFit]:
+    """Calibrate one triad from its station means; `more` is what else makes them uncertain beside noise, (3, n, n).
+
+    Raises `UnfitRecording`, `Undetermined`.
+    """
+    triad = means.triad
+    angles = station_angles(means)
+    vectors = reference_vectors(triad, angles, site)
+    table = table_errors(angles, vectors, uncertainty, of_gravity=triad == "accelerometer")
+    noise, known = noise_of_means(means, record)
+    noise = noise if more is None else noise + more
+    unit = INPUT_UNITS[triad]
+    fit = fit_triad(triad, means.output_unit, unit, vectors, means.outputs, noise, table, known, weighting)
+    reference = reference_magnitude(triad, site)
+    scalar = _scalar(means, reference, noise, known, fit) if with_scalar else None
+    after = magnitudes(means.outputs, fit.calibration(), reference, means.labels, fit.magnitude_sd)
+    return triad_summary(fit, after, means.labels, scalar), fit
+
+
+@dataclass(frozen=True)
+class AccelerometerSettings:
+    """How accelerometers are calibrated."""
+
+    with_scalar: bool = False
+    weighting: Weighting = "noise_and_table"
+    correction: ThermalCorrection | None = None
+    """Brings their means to its reference temperatures first; None: they are taken as they are."""
+    lag_s: tuple[float, float] = (0.0, 0.0)
+    """Of case and converter sensor."""
+
+
+def analyse_accelerometers(
+    recordings: Sequence[Recording],
+    site: Site,
+    uncertainty: TableUncertainty,
+    record: TriadRecord | None,
+    settings: AccelerometerSettings,
+) -> tuple[TriadSummary, ThermalShare | None, tuple[str, ...]]:
+    """The accelerometers' summary; with a correction what that did to them, and what to know of its use.
+
+    Raises as `analyse_triad` and `bring_to_reference`.
+    """
+    means, correction = station_means(recordings, "accelerometer"), settings.correction
+    how = settings.with_scalar, settings.weighting
+    if correction is None:
+        return analyse_means(means, site, uncertainty, record, *how)[0], None, ()
+    brought = bring_to_reference(recordings, means, correction, settings.lag_s)
+    summary, fit = analyse_means(brought.means, site, uncertainty, record, *how, brought.covariance)
+    return summary, thermal_share(brought, correction, fit), thermal_warnings(brought, correction)
+
+
+def noise_of_means(means: StationMeans, record: TriadRecord | None) -> tuple[Array, bool]:
+    """Covariance of the station means, (3, n, n), and whether it comes from the unit's record.
+
+    Outputs in counts have no record in their unit. Without one the scatter of batch means within each dwell stands in.
+    """
+    known = None if means.output_unit == "count" else triad_covariance(record, means.windows)
+    if known is not None:
+        return known, True
+    floor = 1e-9 * float(np.abs(means.outputs).max())
+    sd = np.maximum(means.mean_sd, floor if floor > 0.0 else 1.0)
+    return np.array([np.diag(column**2) for column in sd.T]), False
+
+
+def station_angles(means: StationMeans) -> list[TableAngles]:
+    """Commanded table angles of every station, or `UnfitRecording` where one was taken without."""
+    for label, angles in zip(means.labels, means.angles, strict=True):
+        if angles is None:
+            raise UnfitRecording(f"recording {label} has no table angles: its orientation is not known")
+    return [angles for angles in means.angles if angles is not None]
+
+
+def _scalar(means: StationMeans, reference: float, noise: Array, known: bool, fit: TriadFit) -> ScalarCheck:
+    in_counts = means.output_unit == "count"
+    start = start_from_data(means.outputs, reference) if in_counts else nominal_start()
+    scalar = fit_scalar(f"the scalar {fit.triad} parameters", means.outputs, noise, reference, start, known)
+    return scalar_check(fit, scalar)

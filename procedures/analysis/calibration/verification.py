@@ -1,0 +1,132 @@
+"""Magnitudes before and after correction: what a calibration is worth at each orientation, and what it should be worth.
+
+The magnitude of a corrected vector does not depend on where the table really stood, only on the unit and its
+coefficients (thesis 5.4, 5.5; Tables 5.3, 5.4).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.special import chdtrc
+
+from procedures.analysis.least_squares.whitening import whitener
+from procedures.core.arrays import Array
+from procedures.core.imu_model import TriadCalibration, correct
+
+
+@dataclass(frozen=True)
+class Magnitudes:
+    """|v̂| at n stations before and after correction, in SI; plain tuples, JSON-ready."""
+
+    triad: str
+    unit: str
+    reference: float
+    labels: tuple[str, ...]
+    before: tuple[float, ...] | None
+    """None where the outputs are in counts: they have no magnitude."""
+    after: tuple[float, ...]
+    expected_sd: tuple[float, ...]
+    """Of the errors after correction; empty where the noise is not known."""
+    mean_error_before: float | None
+    sd_before: float | None
+    mean_error_after: float
+    sd_after: float
+    """Sample standard deviation over the stations, n − 1 (Tables 5.3, 5.4)."""
+    per_axis: float
+    """``δ/√3`` (thesis 5.1): one axis's share of it, all three taken as alike."""
+    per_axis_sd: float
+    """Standard uncertainty of that figure, ``δ/√(2(n − 1))/√3``: independent errors of n stations."""
+
+    @property
+    def errors(self) -> tuple[float, ...]:
+        """|v̂| − reference after correction."""
+        return tuple(value - self.reference for value in self.after)
+
+
+def magnitudes(
+    outputs: Array,
+    calibration: TriadCalibration,
+    reference: float,
+    labels: Sequence[str],
+    expected_sd: Array | None = None,
+) -> Magnitudes:
+    """Statistics of |U| and |K⁻¹(U − b)| over outputs (n, 3) against a reference magnitude [SI]."""
+    after = np.linalg.norm(correct(outputs, calibration), axis=1)
+    before = None if calibration.output_unit == "count" else np.linalg.norm(outputs, axis=1)
+    sd_after = _sample_sd(after)
+    return Magnitudes(
+        calibration.triad,
+        calibration.input_unit,
+        reference,
+        tuple(labels),
+        None if before is None else tuple(before.tolist()),
+        tuple(after.tolist()),
+        () if expected_sd is None else tuple(expected_sd.tolist()),
+        None if before is None else float(np.mean(before) - reference),
+        None if before is None else _sample_sd(before),
+        float(np.mean(after) - reference),
+        sd_after,
+        sd_after / float(np.sqrt(3.0)),
+        sd_after / float(np.sqrt(3.0) * np.sqrt(2.0 * max(1, len(after) - 1))),
+    )
+
+
+def _sample_sd(values: Array) -> float:
+    return float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
+
+
+def magnitude_sensitivity(vectors: Array, matrix: Array) -> tuple[Array, Array]:
+    """How |v̂| errs with the outputs and with the coefficients: ∂|v̂|/∂U (n, 3) and ∂|v̂|/∂(twelve) (n, 12).
+
+    ``w = K⁻ᵀ·v/|v|``; an error of a coefficient of channel c acts as ``−w_c·[1 v_x v_y v_z]``.
+    """
+    weights = vectors / np.linalg.norm(vectors, axis=1)[:, None] @ np.linalg.inv(matrix)
+    design = np.column_stack([np.ones(len(vectors)), vectors])
+    return weights, -np.einsum("nc,na->nca", weights, design).reshape(len(vectors), 12)
+
+
+def error_covariance(
+    vectors: Array,
+    calibration: TriadCalibration,
+    noise_covariance: Array,
+    bias_run_to_run_sd: float,
+    scale_factor_run_to_run_sd: float,
+) -> Array:
+    """Covariance (n, n) [SI²] of the errors of |v̂| to expect when the unit is switched on anew and verified.
+
+    Three parts: the calibration's own covariance; the noise of the verification's dwells, `noise_covariance` (3, n, n);
+    and the change of bias and scale factor between two launches, each of which departs from the unit's mean by the
+    run-to-run standard deviation (hence twice the variance).
+    """
+    matrix = calibration.matrix_array
+    weights, of_coefficients = magnitude_sensitivity(vectors, matrix)
+    noise = np.einsum("ic,cij,jc->ij", weights, noise_covariance, weights)
+    launch = block_diag(
+        *[_launch_variance(c, matrix, bias_run_to_run_sd, scale_factor_run_to_run_sd) for c in range(3)]
+    )
+    coefficients = calibration.covariance_array + 2.0 * launch
+    return of_coefficients @ coefficients @ of_coefficients.T + noise
+
+
+def _launch_variance(channel: int, matrix: Array, bias_sd: float, scale_sd: float) -> Array:
+    """Of [b, K_i1, K_i2, K_i3] of a channel from launch to launch, (4, 4): its scale factor carries its whole row."""
+    row = np.concatenate([[0.0], matrix[channel]])
+    return np.diag([bias_sd**2, 0.0, 0.0, 0.0]) + scale_sd**2 * np.outer(row, row)
+
+
+def predicted_sd(covariance: Array) -> float:
+    """Root of the expected sample variance over stations for errors of zero mean and this covariance (n, n).
+
+    ``E[s²] = (tr C − Σ C/n)/(n − 1)``.
+    """
+    n = len(covariance)
+    return float(np.sqrt(max(0.0, (np.trace(covariance) - covariance.sum() / n) / (n - 1)))) if n > 1 else 0.0
+
+
+def chi_square_p(errors: Array, covariance: Array) -> tuple[float, float]:
+    """``χ² = eᵀC⁻¹e`` with n degrees of freedom, and the chance of one at least as large."""
+    whitened = whitener(covariance) @ errors
+    statistic = float(whitened @ whitened)
+    return statistic, float(chdtrc(len(errors), statistic))

@@ -1,0 +1,1 @@
+"""Weighted least squares that every fit stands on: whitening, rank and determination."""

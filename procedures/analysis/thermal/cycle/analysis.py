@@ -1,0 +1,280 @@
+"""A whole thermal cycle: runs with each axis up become a correction, and what it is worth (thesis 4.2, paper C)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+
+import numpy as np
+
+from procedures.analysis.thermal.correlation import correlation
+from procedures.analysis.thermal.cycle.forms import RunSoaks, normalised_triad, soak_table, soaks_of, worth
+from procedures.analysis.thermal.cycle.gyros import found, gyro_noises, gyro_temperatures
+from procedures.analysis.thermal.cycle.results import (
+    AccelerometerCorrelation,
+    AxisFound,
+    FormFound,
+    RunFound,
+    ThermalCycle,
+)
+from procedures.analysis.thermal.cycle.runs import CycleSettings, PreparedRun, prepare, with_forces
+from procedures.analysis.thermal.cycle.series import CycleSeries
+from procedures.analysis.thermal.cycle.traces import allan_of, leg_regimes, trace
+from procedures.analysis.thermal.fit import AxisFit, fit_correction
+from procedures.analysis.thermal.judgement import Corrects, corrected, magnitude
+from procedures.core.converter import ConverterTriad
+from procedures.core.errors import DomainError
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.noise import NoiseCoefficients
+from procedures.core.recording import AXES
+from procedures.core.thermal_correction import Form, ThermalCorrection
+
+CURRENT = "the unit's current correction"
+SINGLE_REGIME_SHARE = 0.02
+"""With less of a run in a regime, nothing is said of it."""
+WORSE = 1.5
+"""A dynamic regime that the fit explains so many times worse than the static one has heat where no sensor is. Tried on
+the rig: 0.8 to 1.0 where every term acts at a sensor, 2.4 to 2.8 where some act at a block without one."""
+SAME_REFERENCE_C = 0.05
+"""The converter drifts some 1e-4 m/s² a °C: a smaller difference is below every claim."""
+REFERENCE_WITHIN_C = 8.0
+"""A reference soak further from the reference than this is told."""
+
+
+@dataclass(frozen=True)
+class KnownOfUnit:
+    """What is known of the unit before the cycle; None where nothing is."""
+
+    converter: ConverterTriad | None = None
+    calibration: TriadCalibration | None = None
+    """Of the accelerometers, in m/s²."""
+    correction: ThermalCorrection | None = None
+    gyro_noise: tuple[NoiseCoefficients, ...] | None = None
+
+
+def analyse_cycle(
+    series: Sequence[tuple[str, CycleSeries]],
+    settings: CycleSettings,
+    form: Form,
+    gravity_m_s2: float,
+    known: KnownOfUnit,
+    *,
+    judge_current: bool = False,
+    noise_from_cycle: bool = True,
+) -> ThermalCycle:
+    """`series`: each run with the id of its recording.
+
+    `judge_current`: 3σ, |ĝ| and Allan are those of ``known.correction``, which this cycle did not make.
+    `noise_from_cycle`: gyros are tested against the noise that the cycle itself shows, not against the known one.
+    Raises `BadParameter`, `Undetermined`, `UnfitRecording`.
+    """
+    converter = _first_stage(known, judge_current)
+    warnings = [*_unknowns(known, converter), *_two_references(converter, settings)]
+    runs = [prepare(s, settings, gravity_m_s2, converter) for _, s in series]
+    if known.calibration is not None:
+        runs, doubts = with_forces(runs, settings, known.calibration)
+        warnings += doubts
+    cells = [run.cells for run in runs]
+    lags = (settings.lag_sd_s, settings.lag_sd_s)
+    fitted, fits = fit_correction(cells, settings.reference_c, form, lags)
+    correction = replace(fitted, first_stage=converter)
+    judged = known.correction if judge_current and known.correction is not None else correction
+    soaked = [soaks_of(run, judged.axes[0].case_reference_c) for run in runs]
+    comparable = known.correction if known.correction and known.correction.first_stage == converter else None
+    forms, refused = _forms(runs, soaked, correction, settings, gravity_m_s2, comparable)
+    plain = _plain(judged)
+    found_runs = tuple(
+        _run(recording, run, judged, plain, soak, settings, gravity_m_s2)
+        for (recording, _), run, soak in zip(series, runs, soaked, strict=True)
+    )
+    axes = [_axis(fit) for fit in fits]
+    return ThermalCycle(
+        judged="current" if judged is not correction else "fit",
+        reference_c=settings.reference_c,
+        stage_one=converter is not None,
+        force_known=known.calibration is not None,
+        regime_delay_s=settings.regime.delay_s,
+        runs=found_runs,
+        axes=(axes[0], axes[1], axes[2]),
+        correction=correction,
+        soaks=soak_table(runs, soaked, judged),
+        magnitude_m_s2=tuple((_about_mean(r, plain, gravity_m_s2), _about_mean(r, judged, gravity_m_s2)) for r in runs),
+        forms=forms,
+        accelerometers=_correlations(runs, judged),
+        gyros=gyro_temperatures(runs, settings, None if noise_from_cycle else known.gyro_noise),
+        gyro_noise=gyro_noises(runs, settings, known.gyro_noise),
+        allan=tuple(curve for run in runs for curve in allan_of(run, judged)),
+        warnings=(*warnings, *refused, *_doubts(found_runs, soaked, axes, settings)),
+    )
+
+
+def _first_stage(known: KnownOfUnit, judge_current: bool) -> ConverterTriad | None:
+    """The converter's models to take out first: those that go with the correction that is judged."""
+    if judge_current and known.correction is not None:
+        return known.correction.first_stage
+    return known.converter
+
+
+def _two_references(converter: ConverterTriad | None, settings: CycleSettings) -> list[str]:
+    """A sentence where the two stages refer to different readings of the converter's sensor."""
+    if converter is None:
+        return []
+    first, second = converter[0].scale.reference_c, settings.reference_c[1]
+    if abs(first - second) < SAME_REFERENCE_C:
+        return []
+    return [
+        f"stage one refers to {first:g} °C of the converter's sensor, the correction to {second:g} °C: the reference "
+        "is then of two temperatures; set reference_converter_c to stage one's"
+    ]
+
+
+def _unknowns(known: KnownOfUnit, converter: ConverterTriad | None) -> list[str]:
+    warnings: list[str] = []
+    if converter is None:
+        warnings.append(
+            "no model of the unit's signal converter is known: stage one was left out, and the terms of the "
+            "converter's sensor hold the converter's own drift beside the accelerometers'"
+        )
+    if known.calibration is None:
+        warnings.append(
+            "the unit has no calibration of its accelerometers in m/s²: forces were taken as those of an ideal, level "
+            "seat; a horizontal axis that feels some gravity then mixes its scale's drift into its bias"
+        )
+    return warnings
+
+
+def _plain(correction: ThermalCorrection) -> ThermalCorrection:
+    """K0 and B0 alone."""
+    none = (0.0, 0.0, 0.0, 0.0)
+    x, y, z = (replace(a, alpha=none, beta=none, form=Form.BOTH, dynamic_offset=(0.0, 0.0)) for a in correction.axes)
+    return ThermalCorrection(correction.triad, (x, y, z))
+
+
+def _forms(
+    runs: Sequence[PreparedRun],
+    soaked: Sequence[RunSoaks],
+    correction: ThermalCorrection,
+    settings: CycleSettings,
+    gravity_m_s2: float,
+    current: ThermalCorrection | None,
+) -> tuple[tuple[FormFound, ...], list[str]]:
+    """Every way to correct, side by side; a sentence for each that these runs cannot determine."""
+    answers: list[FormFound] = []
+    refused: list[str] = []
+    cells = [run.cells for run in runs]
+    chosen = correction.axes[0].form
+
+    def add(name: str, make: Corrects) -> None:
+        answers.append(worth(name, runs, soaked, make, gravity_m_s2))
+
+    for form in Form:
+        try:
+            add(form.value, correction if form is chosen else fit_correction(cells, settings.reference_c, form)[0])
+        except DomainError as refusal:
+            refused.append(f"the form {form.value!r} could not be fitted for comparison: {refusal}")
+    try:
+        add("normalised polynomial (C)", normalised_triad(runs, soaked, settings.reference_c[0]))
+    except DomainError as refusal:
+        refused.append(f"C's normalised polynomial could not be fitted for comparison: {refusal}")
+    if current is not None:
+        add(CURRENT, current)
+    return tuple(answers), refused
+
+
+def _run(
+    recording: str,
+    run: PreparedRun,
+    judged: ThermalCorrection,
+    plain: ThermalCorrection,
+    soaked: RunSoaks,
+    settings: CycleSettings,
+    gravity_m_s2: float,
+) -> RunFound:
+    return RunFound(
+        recording,
+        run.series.name,
+        run.series.up,
+        len(run.dynamic) * run.series.sample_s,
+        run.cells.force_m_s2,
+        run.series.legs,
+        leg_regimes(run, settings.regime.delay_s),
+        float(1.0 - run.dynamic.mean()),
+        trace(run, judged, plain, soaked.reference, gravity_m_s2),
+    )
+
+
+def _about_mean(run: PreparedRun, correction: Corrects, gravity_m_s2: float) -> float:
+    errors = magnitude(run.cells, correction, gravity_m_s2).errors_m_s2
+    return float(np.std(errors))
+
+
+def _axis(fit: AxisFit) -> AxisFound:
+    still, moving = (sd if isfinite(sd) else None for sd in fit.residual_sd_m_s2)
+    return AxisFound(
+        fit.correction,
+        tuple(fit.correction.standard_uncertainties().tolist()),
+        (still, moving),
+        fit.effective_samples,
+        fit.condition,
+        fit.order.bic,
+        fit.order.p_value,
+        fit.order.preferred,
+    )
+
+
+def _correlations(runs: Sequence[PreparedRun], judged: Corrects) -> tuple[AccelerometerCorrelation, ...]:
+    """Of outputs over K0 and of corrected forces with the case temperature, axis by axis, run by run."""
+    answers: list[AccelerometerCorrelation] = []
+    after = [corrected(run.cells, judged) for run in runs]
+    for axis, name in enumerate(AXES):
+        for run, forces in zip(runs, after, strict=True):
+            before = run.cells.output_m_s2[:, axis] * judged.scales[axis]
+            old, new = (
+                found(run.series.name, name, correlation(v, run.cells.case_c, run.cells.cell_s))
+                for v in (before, forces[:, axis])
+            )
+            answers.append(AccelerometerCorrelation(old, new))
+    return tuple(answers)
+
+
+def _doubts(
+    runs: Sequence[RunFound], soaked: Sequence[RunSoaks], axes: Sequence[AxisFound], settings: CycleSettings
+) -> list[str]:
+    """What a reader must know before believing the numbers."""
+    warnings: list[str] = []
+    for run, soak in zip(runs, soaked, strict=True):
+        warnings += _of_regimes(run, settings.regime.delay_s)
+        if abs(soak.reference.case_c - settings.reference_c[0]) > REFERENCE_WITHIN_C:
+            warnings.append(
+                f"{run.name}: the soak nearest to the reference of {settings.reference_c[0]:g} °C had its case at "
+                f"{soak.reference.case_c:.1f} °C: 3σ is about that one, and K0 and B0 are extrapolated"
+            )
+    for name, axis in zip(AXES, axes, strict=True):
+        still, moving = axis.residual_sd_m_s2
+        if still and moving and moving > WORSE * still:
+            warnings.append(
+                f"accelerometer {name}: what the fit leaves is {moving / still:.1f} times as large on ramps as in "
+                f"soaks ({moving:.2g} against {still:.2g} m/s²): heat acts where no sensor is, or a sensor's lag is "
+                "not what it was given as"
+            )
+        if axis.preferred_order != 2:
+            warnings.append(
+                f"accelerometer {name}: by the Bayesian criterion order {axis.preferred_order} describes the cycle "
+                "best, the correction is of the second"
+            )
+    return warnings
+
+
+def _of_regimes(run: RunFound, delay_s: float) -> list[str]:
+    warnings: list[str] = []
+    if min(run.static_share, 1.0 - run.static_share) < SINGLE_REGIME_SHARE:
+        warnings.append(f"{run.name}: {run.static_share:.0%} of the run was static: one regime is hardly there")
+    for number, (leg, regime) in enumerate(zip(run.legs, run.regimes, strict=True), start=1):
+        where = f"{run.name}, leg {number} ({leg.target_c:g} °C)"
+        if regime.onset_delay_s is not None and regime.onset_delay_s > delay_s:
+            warnings.append(
+                f"{where}: the regime became dynamic {regime.onset_delay_s:.0f} s after the ramp began, later than the "
+                f"indicator's {delay_s:.0f} s"
+            )
+        if regime.chatter:
+            warnings.append(f"{where}: the regime became dynamic {regime.chatter} times with no ramp to explain it")
+    return warnings

@@ -1,0 +1,67 @@
+"""A thermal cycle against its limits."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from procedures.analysis.thermal.cycle.results import GyroNoise, ThermalCycle
+from procedures.core import units
+from procedures.core.limits import Check, Limit, check
+from procedures.core.recording import AXES
+
+THESIS = "thesis 4.3, 5.6"
+
+
+@dataclass(frozen=True)
+class CycleLimits:
+    """Each the most that is allowed."""
+
+    three_sigma_m_s2: float
+    magnitude_rms_m_s2: float
+    allan_rise: float
+    gyro_random_walk_deg_sqrt_h: float
+    gyro_bias_in_run_deg_h: float
+    level: float
+    """Chance that three sound gyros together are said to depend on temperature."""
+
+
+def cycle_checks(cycle: ThermalCycle, limits: CycleLimits) -> tuple[Check, ...]:
+    """3σ and Allan of each accelerometer, |ĝ|, each gyro's dependence on temperature and noise."""
+    found: list[Check] = []
+    for axis, name in enumerate(AXES):
+        worst = max(cycle.soaks, key=lambda s: s.after_m_s2[axis])
+        found.append(
+            check(
+                f"accelerometer_{name} 3σ after correction",
+                worst.after_m_s2[axis],
+                Limit("m/s^2", maximum=limits.three_sigma_m_s2, source=THESIS),
+                note=f"worst soak: {worst.target_c:g} °C",
+            )
+        )
+    worst_g = max(after for _, after in cycle.magnitude_m_s2)
+    limit = Limit("m/s^2", maximum=limits.magnitude_rms_m_s2, source=THESIS)
+    found.append(check("|ĝ| over the cycle, rms about its mean", worst_g, limit, note="worst run"))
+    for name in AXES:
+        steepest = max(curve.rise for curve in cycle.allan if curve.axis == name)
+        limit = Limit("1", maximum=limits.allan_rise, source="thesis fig. 4.15: no positive slope")
+        found.append(check(f"accelerometer_{name} rise of the Allan deviation", steepest, limit, note="worst run"))
+    # Bonferroni: three gyros, one chance.
+    limit = Limit("1", minimum=limits.level / len(AXES), source="thesis table 4.6: no correlation")
+    found += [check(f"gyro_{g.axis} independence of temperature, p-value", g.p_value, limit) for g in cycle.gyros]
+    for name in AXES:
+        noises = [g for g in cycle.gyro_noise if g.axis == name]
+        found.append(_noise(f"gyro_{name} random walk in the cycle", noises, 1, limits.gyro_random_walk_deg_sqrt_h))
+        found.append(_noise(f"gyro_{name} bias instability in the cycle", noises, 2, limits.gyro_bias_in_run_deg_h))
+    return tuple(found)
+
+
+def _noise(name: str, noises: list[GyroNoise], process: int, maximum: float) -> Check:
+    """The mean over the runs that show it; where none does, the least that it is known to stay below."""
+    unit, size = (("arcsec", units.ARCSEC), ("deg/√h", units.DEG_PER_SQRT_HOUR), ("deg/h", units.DEG_PER_HOUR))[process]
+    limit = Limit(unit, maximum=maximum, source=THESIS)
+    values = [(g.quantization, g.random_walk, g.bias_instability)[process] for g in noises]
+    seen = [v for v in values if v is not None]
+    if seen:
+        return check(name, float(np.mean(seen)) / size, limit, note=f"seen in {len(seen)} of {len(values)} runs")
+    bound = min(g.upper_limits[process] for g in noises)
+    return check(name, bound / size, limit, note="not observed: the value is what it stays below")

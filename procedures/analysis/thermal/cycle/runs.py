@@ -1,0 +1,137 @@
+"""From second means to what the fits see: stage one, lags, regimes, and the force that each accelerometer felt.
+
+Stage one takes the converter's own drift out of nominal outputs first (paper C; `core.converter.at_reference`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.analysis.thermal.cycle.series import CycleSeries
+from procedures.analysis.thermal.fit import fit_correction
+from procedures.analysis.thermal.judgement import nearest, soaks
+from procedures.analysis.thermal.regime import RegimeSettings, RegimeTrace, regimes
+from procedures.analysis.thermal.runs import ThermalRun, thermal_run, without_lag
+from procedures.core.arrays import Array
+from procedures.core.converter import ConverterTriad, at_reference
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.thermal_correction import ThermalCorrection
+
+PASSES = 2
+"""Fits whose correction tells what each axis would have shown at the reference, and so the force that it felt."""
+
+
+@dataclass(frozen=True)
+class CycleSettings:
+    """What may be set in the analysis of a cycle; SI but for °C."""
+
+    cell_s: float = 60.0
+    """Cells that the fits work on."""
+    case_lag_s: float = 5.0
+    converter_lag_s: float = 5.0
+    """Time constants of the two sensors, by their data sheet."""
+    lag_sd_s: float = 0.05
+    """Standard uncertainty of each."""
+    reference_c: tuple[float, float] = (20.0, 20.0)
+    """Readings of case and converter sensor at which the correction changes nothing but K0 and B0."""
+    regime: RegimeSettings = field(default_factory=RegimeSettings)
+    gyro_trim_s: float = 600.0
+    """Start of each launch that the gyros' noise is not judged by (thesis 4.1.1)."""
+    level: float = 0.01
+    """Of tests."""
+    confidence: float = 0.95
+    """Of intervals."""
+
+    @property
+    def lag_s(self) -> dict[str, float]:
+        """By the names of `thermal_run`."""
+        return {"case": self.case_lag_s, "converter": self.converter_lag_s}
+
+
+@dataclass(frozen=True)
+class PreparedRun:
+    """One run, a row a second and a row a cell."""
+
+    series: CycleSeries
+    trace: RegimeTrace
+    """The regime of each second."""
+    output_m_s2: Array
+    """After stage one, (n, 3)."""
+    case_c: Array
+    """Without the sensor's lag, (n,)."""
+    converter_c: Array
+    cells: ThermalRun
+
+    @property
+    def dynamic(self) -> NDArray[np.bool_]:
+        return self.trace.dynamic
+
+
+def prepare(
+    series: CycleSeries, settings: CycleSettings, gravity_m_s2: float, converter: ConverterTriad | None
+) -> PreparedRun:
+    """A run ready to be fitted, with gravity along the axis that is up as its force.
+
+    Raises `BadParameter`, `UnfitRecording`.
+    """
+    case = without_lag(series.case_c, series.sample_s, settings.case_lag_s)
+    board = without_lag(series.converter_c, series.sample_s, settings.converter_lag_s)
+    output = series.output_m_s2
+    if converter is not None:
+        output = at_reference(output, board, converter)
+    trace = regimes(series.case_c, series.sample_s, settings.regime)
+    cells = thermal_run(
+        series.up,
+        gravity_m_s2,
+        series.sample_s,
+        {"output": output, "case": series.case_c, "converter": series.converter_c},
+        cell_s=settings.cell_s,
+        lag_s=settings.lag_s,
+        trace=trace,
+    )
+    return PreparedRun(series, trace, output, case, board, cells)
+
+
+def with_forces(
+    runs: Sequence[PreparedRun], settings: CycleSettings, calibration: TriadCalibration
+) -> tuple[list[PreparedRun], list[str]]:
+    """The runs with the force that each accelerometer felt by the unit's calibration, and warnings.
+
+    ``f_i = (V_i − b_i)/K_ii`` at the reference temperatures: effective, with what mounting and cross-coupling put into
+    it. No soak is quite at the reference, so V there is what the correction of a first fit says of the nearest soak.
+    """
+    bias, scale = calibration.bias_array, np.diagonal(calibration.matrix_array)
+    for _ in range(PASSES):
+        correction, _ = fit_correction([r.cells for r in runs], settings.reference_c)
+        runs = [_with_force(r, (_at_reference(r.cells, correction) - bias) / scale) for r in runs]
+    warnings: list[str] = []
+    for run in runs:
+        others = [f for axis, f in enumerate(run.cells.force_m_s2) if axis != run.series.up]
+        if max(map(abs, others)) > LARGEST_TILT * abs(run.cells.force_m_s2[run.series.up]):
+            warnings.append(
+                f"{run.series.name}: by the unit's calibration its other axes feel "
+                f"{', '.join(f'{f:.3g}' for f in others)} m/s²: is it the unit that was calibrated, and was it level?"
+            )
+    return list(runs), warnings
+
+
+LARGEST_TILT = 0.05
+"""Of gravity along a horizontal axis: more is no unlevel seat any more."""
+
+
+def _at_reference(run: ThermalRun, correction: ThermalCorrection) -> Array:
+    """Mean output in the soak nearest to the reference, brought to the reference temperatures, (3,) [m/s²].
+
+    ``V₀ = Ṽ/K0 − B0``: the corrected force through the correction's own constants.
+    """
+    at = nearest(soaks(run), correction.axes[0].case_reference_c, within_c=np.inf)
+    own = slice(at.start, at.stop)
+    felt = correction.apply(run.output_m_s2[own], run.case_c[own], run.converter_c[own], run.dynamic[own]).mean(axis=0)
+    return np.array([f / a.scale - a.bias_m_s2 for f, a in zip(felt, correction.axes, strict=True)])
+
+
+def _with_force(run: PreparedRun, force: Array) -> PreparedRun:
+    x, y, z = force.tolist()
+    return replace(run, cells=replace(run.cells, force_m_s2=(x, y, z)))

@@ -1,0 +1,1 @@
+"""Scale factors from whole turns of the table: plan, fit, summary."""

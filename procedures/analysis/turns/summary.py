@@ -1,0 +1,166 @@
+"""What whole turns tell of a gyro triad, as plain JSON-ready numbers."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from procedures.analysis.calibration.station_means import station_means
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.summary import Coefficient
+from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.turns.fit import Term, TurnFit, Turning, fit_turns, turning
+from procedures.analysis.turns.plan import coefficient_names
+from procedures.core import units
+from procedures.core.arrays import Array
+from procedures.core.errors import UnfitRecording
+from procedures.core.imu_model import TriadCalibration, triad_calibration
+from procedures.core.recording import AXES, Recording, Station
+from procedures.core.site import Site
+from procedures.core.unit import TriadRecord
+
+PLAUSIBLE = 0.2
+"""A channel that counts so much more or less than the turns made, relative, is not that of the turning axis."""
+LINEAR = 4
+"""Of each channel's parameters the first four: b and its row of K."""
+
+
+@dataclass(frozen=True)
+class RatePoint:
+    """Scale factor of one axis at one rate and direction, as a departure from the fitted K."""
+
+    axis: str
+    rate_deg_s: float
+    """Signed."""
+    turns: int
+    departure: float
+    """``(y − b·T − K·E)/(2πn·K·e) − 1``, relative: what asymmetry and nonlinearity are made of."""
+    standard_uncertainty: float
+    """Of noise and table at this station alone."""
+    modelled: float
+    """The same by the fitted terms."""
+
+
+@dataclass(frozen=True)
+class WholeTurns:
+    """Everything that whole turns tell of a gyro triad."""
+
+    coefficients: tuple[Coefficient, ...]
+    calibration: TriadCalibration
+    """b and K with their covariance; the terms beyond the linear ones are not part of it."""
+    reference_rate_deg_s: float
+    """Where the quadratic and the cubic term have the sizes given."""
+    points: tuple[RatePoint, ...]
+    condition: float
+    chi_square: float
+    degrees_of_freedom: int
+    p_value: float | None
+    noise_known: bool
+
+    def coefficient(self, name: str) -> Coefficient:
+        """By its name without the triad: "K11", "asymmetry_x"."""
+        return next(c for c in self.coefficients if c.name == f"gyro.{name}")
+
+
+def analyse_turns(
+    recordings: Sequence[Recording],
+    site: Site,
+    uncertainty: TableUncertainty,
+    record: TriadRecord | None,
+    terms: Sequence[Term],
+    reference_rate_deg_s: float,
+) -> WholeTurns:
+    """Fit the gyro channels of recordings of whole turns.
+
+    Raises `UnfitRecording` where a recording's station has no turn, where the channels are not in angle units, or where
+    a channel did not count the turns made; `MissingChannel`; `Undetermined`.
+    """
+    means = station_means(recordings, "gyro")
+    if means.output_unit != "rad/s":
+        raise UnfitRecording(f"the gyro channels are in {means.output_unit}: whole turns need a nominal scale in rad")
+    stations = _stations(recordings)
+    seconds = means.windows[:, 1] - means.windows[:, 0]
+    motion = turning(stations, seconds, site)
+    outputs = means.outputs * seconds[:, None]
+    _require_turns(motion, outputs, means.labels)
+    noise = triad_covariance(record, means.windows)
+    reference = reference_rate_deg_s * units.DEG
+    fit = fit_turns(motion, outputs, terms, reference, noise, uncertainty)
+    return WholeTurns(
+        _coefficients(fit, terms),
+        _calibration(fit),
+        reference_rate_deg_s,
+        _points(motion, outputs, fit),
+        fit.estimator.condition,
+        fit.chi_square,
+        fit.degrees_of_freedom,
+        fit.p_value,
+        noise is not None,
+    )
+
+
+def _stations(recordings: Sequence[Recording]) -> list[Station]:
+    stations = [r.info.station for r in recordings]
+    for recording, station in zip(recordings, stations, strict=True):
+        if station is None or station.turn is None or station.angles is None:
+            raise UnfitRecording(f"recording {recording.info.id}: its station has no whole turns")
+    return [s for s in stations if s is not None]
+
+
+def _require_turns(motion: Turning, outputs: Array, labels: Sequence[str]) -> None:
+    """Each station's own channel counted about as many turns as were made, in their direction."""
+    for i, channel in enumerate(motion.channels):
+        made = motion.angle_rad[i] * np.sign(motion.axis_b[i, channel])
+        if not abs(outputs[i, channel] / made - 1.0) < PLAUSIBLE:
+            raise UnfitRecording(
+                f"station {labels[i]}: gyro_{AXES[channel]} counted {outputs[i, channel] / (2.0 * np.pi):.4g} turns "
+                f"where {made / (2.0 * np.pi):.4g} were made"
+            )
+
+
+def _coefficients(fit: TurnFit, terms: Sequence[Term]) -> tuple[Coefficient, ...]:
+    names = coefficient_names(terms)
+    total, noise = np.sqrt(np.diagonal(fit.covariance)), np.sqrt(np.diagonal(fit.noise_covariance))
+    table = np.sqrt(np.sum(fit.estimator.table_per_sd**2, axis=1))
+    sources = {s: fit.estimator.of_source(s) for s in ("orthogonality", "pointing")}
+    values = fit.parameters.ravel()
+    return tuple(
+        Coefficient(
+            f"gyro.{name}",
+            "rad/s" if name.startswith("b_") else "1",
+            float(values[i]),
+            float(total[i]),
+            float(noise[i]),
+            float(table[i]),
+            {source: float(part[i]) for source, part in sources.items()},
+        )
+        for i, name in enumerate(names)
+    )
+
+
+def _calibration(fit: TurnFit) -> TriadCalibration:
+    per_channel = fit.parameters.shape[1]
+    linear = [c * per_channel + i for c in range(3) for i in range(LINEAR)]
+    covariance = fit.covariance[np.ix_(linear, linear)]
+    return triad_calibration("gyro", "rad/s", "rad/s", fit.parameters[:, :LINEAR], covariance)
+
+
+def _points(motion: Turning, outputs: Array, fit: TurnFit) -> tuple[RatePoint, ...]:
+    bias, matrix = fit.parameters[:, 0], fit.parameters[:, 1:LINEAR]
+    known = motion.seconds[:, None] * bias + motion.earth_rad @ matrix.T
+    turned = motion.turned_b @ matrix.T
+    points: list[RatePoint] = []
+    for i, c in enumerate(motion.channels):
+        departure = (outputs[i, c] - known[i, c]) / turned[i, c] - 1.0
+        direction = float(np.sign(motion.axis_b[i, c]))
+        points.append(
+            RatePoint(
+                AXES[c],
+                float(motion.rate_rad_s[i]) / units.DEG * direction,
+                round(float(motion.angle_rad[i]) * direction / (2.0 * np.pi)),
+                float(departure),
+                float(fit.output_sd[i, c] / abs(turned[i, c])),
+                float(departure - fit.residuals[i, c] / turned[i, c]),
+            )
+        )
+    return tuple(points)
