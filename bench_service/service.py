@@ -103,6 +103,7 @@ class BenchService:
         self.campaigns.conductor.stop()
         if self._worker is not None:
             self._worker.shut_down()
+        self.imports.close()
 
     def _wake(self) -> None:
         if self._worker is not None:
