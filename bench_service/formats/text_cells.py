@@ -90,6 +90,8 @@ def _hint(cell: str, name: str, is_time: bool, missing: bool, description: Impor
 
 
 def _number(cell: str, decimal: str) -> float | None:
+    if decimal == "," and "." in cell:
+        return None
     try:
         return float(cell.replace(",", ".") if decimal == "," else cell)
     except ValueError:

@@ -27,7 +27,9 @@ WRAPS_S = {
 WRAP_STEPS = 50.0
 """A fall is a wrap where the step that remains is no longer than so many usual ones."""
 REPEATS_KEPT = 4_000_000
-FALLS_KEPT = 1000
+FALLS_KEPT = 100
+FALLS_LOOKED_AT = 20_000
+"""Of a block: more are no wraps."""
 
 Stamps = NDArray[np.int64] | Array
 
@@ -37,8 +39,8 @@ class Fall:
     """A place where the time falls: the row before it, counted from 1, and the stamps of that row and the next."""
 
     row: int
-    before: float
-    after: float
+    before: int | float
+    after: int | float
     wrap: str | None
     """The name of the period that the clock begins again with; None: it is no wrap."""
 
@@ -112,23 +114,32 @@ class ClockColumn:
     def _fall(self, falls: NDArray[np.intp], steps: Array, raw: Stamps, row: int, time_s: Array) -> None:
         """Note falls; those that are wraps are carried on where that is wanted, in place."""
         shift = len(steps) - len(time_s)  # −1 in the first block, whose first stamp has no step
-        for at in falls[:FALLS_KEPT]:
-            wrap = self._wrap(float(steps[at]))
-            fall = Fall(row + int(at), float(raw[at]), float(raw[at + 1]), wrap)
+        carried = np.zeros(len(time_s))
+        for at in falls[:FALLS_LOOKED_AT]:
+            before, after = raw[at].item(), raw[at + 1].item()
+            wrap = self._wrap(float(steps[at]), before * self.scale_s, after * self.scale_s)
+            fall = Fall(row + int(at), before, after, wrap)
             if wrap is not None and self.unwrap:
                 self.wraps.append(fall)
-                self._carried_s += WRAPS_S[wrap]
-                time_s[at - shift :] += WRAPS_S[wrap]
+                carried[at - shift] += WRAPS_S[wrap]
                 continue
             self.fall_count += 1
             if len(self.falls) < FALLS_KEPT:
                 self.falls.append(fall)
-        self.fall_count += max(0, len(falls) - FALLS_KEPT)
+        if len(falls) > FALLS_LOOKED_AT:
+            at = int(falls[FALLS_LOOKED_AT])
+            self.falls.append(Fall(row + at, raw[at].item(), raw[at + 1].item(), None))
+            self.fall_count += len(falls) - FALLS_LOOKED_AT
+        time_s += np.cumsum(carried)
+        self._carried_s += float(carried.sum())
 
-    def _wrap(self, step_s: float) -> str | None:
+    def _wrap(self, step_s: float, before_s: float, after_s: float) -> str | None:
+        """The period that a fall is a beginning again of: both stamps lie in one, and hardly a step remains."""
         longest = WRAP_STEPS * (self.typical_s or 0.0)
         for name, period_s in WRAPS_S.items():
-            if 0.0 <= step_s + period_s <= min(longest, 0.5 * period_s):
+            unsigned = after_s >= 0.0 and before_s < period_s
+            signed = after_s >= -0.5 * period_s and before_s < 0.5 * period_s
+            if (unsigned or signed) and 0.0 <= step_s + period_s <= min(longest, 0.5 * period_s):
                 return name
         return None
 

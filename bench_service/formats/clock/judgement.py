@@ -123,8 +123,9 @@ def _require_growing(name: str, column: ClockColumn, description: ImportDescript
 def _fall(fall: Fall, column: ClockColumn, description: ImportDescription) -> str:
     row = fall.row + description.rows.first - 1
     unit = "s" if description.time_unit == "clock" else _UNIT[column.scale_s]
-    size = 1e-9 if description.time_unit == "clock" else 1.0
-    return f"{fall.before * size:.15g} {unit} in row {row}, {fall.after * size:.15g} {unit} in row {row + 1}"
+    size = 1e-9 if description.time_unit == "clock" else 1
+    before, after = (str(v) if isinstance(v, int) else f"{v:.15g}" for v in (fall.before * size, fall.after * size))
+    return f"{before} {unit} in row {row}, {after} {unit} in row {row + 1}"
 
 
 def _others(count: int) -> str:

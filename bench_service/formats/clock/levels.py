@@ -81,8 +81,10 @@ def changes(
     rise = np.clip(np.diff(level(late, ahead))[: before + stop] / period_s, -MOST_LOST, MOST_LOST)
     up, down = np.flatnonzero(rise >= least), np.flatnonzero(rise <= -least)
     # The level falls as soon as the fall is within sight: its place is at the far end of the window.
-    rows = np.concatenate([up, np.minimum(down + ahead - 1, before + len(steps) - 1)]) - before
-    samples = np.concatenate([np.maximum(1, np.rint(rise[up])), np.minimum(-1, np.rint(rise[down]))]).astype(np.int64)
+    begins_run = np.flatnonzero(np.diff(down, prepend=-2) > 1)  # rows that make up for a delay fall one by one
+    fallen = np.add.reduceat(rise[down], begins_run) if len(down) else np.empty(0)
+    rows = np.concatenate([up, np.minimum(down[begins_run] + ahead - 1, before + len(steps) - 1)]) - before
+    samples = np.concatenate([np.maximum(1, np.rint(rise[up])), np.minimum(-1, np.rint(fallen))]).astype(np.int64)
     return Places(rows.astype(np.int64), samples)
 
 

@@ -112,14 +112,19 @@ def _walked(
                 walk.first_batch = walk.first_batch or (start + int(begins[0]), float(time_s[begins[0]]))
                 walk.last_batch = (start + int(begins[-1]), float(time_s[begins[-1]]))
         elif pattern.kind == "jitter":
-            walk.means.append(_means(time_s[:stop]))
+            walk.means.append(_means(time_s[:stop], stretch_of(rows.count)))
     return walk
 
 
-def _means(time_s: Array) -> Array:
+def stretch_of(count: int) -> int:
+    """Rows whose mean stamp is one point of the regression: fewer in a short column."""
+    return STRETCH if count >= 16 * STRETCH else max(1, count // 32)
+
+
+def _means(time_s: Array, stretch: int) -> Array:
     """Mean stamp of each whole stretch."""
-    whole = len(time_s) // STRETCH
-    return time_s[: whole * STRETCH].reshape(whole, STRETCH).mean(axis=1)
+    whole = len(time_s) // stretch
+    return time_s[: whole * stretch].reshape(whole, stretch).mean(axis=1)
 
 
 def _pauses(rows: KeptRows, places: Places) -> tuple[NDArray[np.int64], Array]:
@@ -145,7 +150,7 @@ def _rate(rows: KeptRows, pattern: Pattern, walk: _Walk, places: Places) -> floa
     pauses, durations = _pauses(rows, places)
     means = np.concatenate(walk.means) if walk.means else np.empty(0)
     if len(means) >= 8:
-        return _slope(means, places, pauses)
+        return _slope(means, places, pauses, stretch_of(rows.count))
     last = rows.count - 1
     first_s, last_s = float(rows.read(0, 1)[0]), float(rows.read(last, last + 1)[0])
     paused = int(places.samples[places.samples > PAUSE].sum())
@@ -154,12 +159,12 @@ def _rate(rows: KeptRows, pattern: Pattern, walk: _Walk, places: Places) -> floa
     return steps / duration if steps > 0 and duration > 0.0 else 1.0 / pattern.period_s
 
 
-def _slope(means: Array, places: Places, pauses: NDArray[np.int64]) -> float:
+def _slope(means: Array, places: Places, pauses: NDArray[np.int64], stretch: int) -> float:
     """Samples a second by least squares over the means of stretches, each run between pauses with its own beginning."""
-    begin = STRETCH * np.arange(len(means))
-    k = begin + 0.5 * (STRETCH - 1) + places.before(begin)
+    begin = stretch * np.arange(len(means))
+    k = begin + 0.5 * (stretch - 1) + places.before(begin)
     run = np.searchsorted(pauses, begin, side="left")
-    whole = run == np.searchsorted(pauses, begin + STRETCH - 1, side="left")  # not across a pause
+    whole = run == np.searchsorted(pauses, begin + stretch - 1, side="left")  # not across a pause
     above = below = 0.0
     for number in np.unique(run[whole])[:MOST_RUNS]:
         inside = whole & (run == number)
