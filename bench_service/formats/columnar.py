@@ -16,6 +16,25 @@ from bench_service.formats.errors import UnreadableFile
 from procedures.core.arrays import Array
 
 _BLOCK_ROWS = 65_536
+_CUT_OFF = "it is cut off: what stands at its end, or what it announces, is missing; copy it once more"
+_DESCRIPTION = "it is damaged: its own description of columns and types cannot be read"
+_PACKED = "it is damaged: a column cannot be unpacked"
+_DAMAGES = (
+    ("magic bytes", _CUT_OFF),
+    ("file size is", _CUT_OFF),
+    ("Not an Arrow file", _CUT_OFF),
+    ("File is too small", _CUT_OFF),
+    ("xpected to", _CUT_OFF),
+    ("end of stream", _CUT_OFF),
+    ("thrift", _DESCRIPTION),
+    ("latbuffers", _DESCRIPTION),
+    ("metadata", _DESCRIPTION),
+    ("continuation token", _DESCRIPTION),
+    ("ecompress", _PACKED),
+    ("Codec failed", _PACKED),
+    ("orrupt", _PACKED),
+    ("page header", _PACKED),
+)
 _THRIFT_BYTES = 64 * MEGABYTE
 """Of the description in a Parquet file's footer."""
 
@@ -48,8 +67,14 @@ def columnar_columns(
     except (pa.ArrowException, OSError, UnicodeDecodeError, OverflowError, KeyError, IndexError) as error:
         if isinstance(error, MemoryError):
             raise
-        problem = str(error)[:200]
-        raise UnreadableFile(name, f"cannot be read as Parquet or Arrow: {problem}") from error
+        raise UnreadableFile(name, f"cannot be read as Parquet or Arrow: {_in_words(error)}") from error
+
+
+def _in_words(error: Exception) -> str:
+    """What Arrow says, shortened, after what it means where that is known."""
+    said = " ".join(str(error).split())[:120]
+    known = next((words for sign, words in _DAMAGES if sign in said), None)
+    return said if known is None else f"{known} ({said})"
 
 
 def _block(
@@ -127,10 +152,7 @@ def _opened(
             return file.iter_batches(batch_size=_BLOCK_ROWS, use_threads=False), indices, {i: i for i in wanted}
         batches = file.iter_batches(batch_size=_BLOCK_ROWS, columns=names, use_threads=False)
         return batches, indices, {index: position for position, index in enumerate(wanted)}
-    if start == b"ARRO":
-        schema = pa.ipc.open_file(source).schema
-    else:
-        schema = pa.ipc.open_stream(source).schema
+    schema = (pa.ipc.open_file if start == b"ARRO" else pa.ipc.open_stream)(source).schema
     indices = _indices(schema, columns, name, timed)
     wanted = sorted(set(indices))
     options = pa.ipc.IpcReadOptions(included_fields=wanted, use_threads=False)

@@ -110,8 +110,8 @@ class Survey:
                 channel = self._description.channels[column]
                 at = self._count + row + len(values) - len(rows) + self._description.rows.first
                 self._outside = (
-                    f"{self._names[channel.file]}: row {at}, channel {channel.name!r}: {rows[row, column]:.0f} does not "
-                    f"fit 32 bits; counts between {_INT32.min} and {_INT32.max} are expected"
+                    f"{self._names[channel.file]}: row {at}, channel {channel.name!r}: {rows[row, column]:.0f} does "
+                    f"not fit 32 bits; counts between {_INT32.min} and {_INT32.max} are expected"
                 )
         return True
 
@@ -128,7 +128,9 @@ class Survey:
         """What the rows say together. Raises `BadParameter`, `UnreadableFile`, `UnfitRecording`."""
         description = self._description
         if not self._count:
-            raise UnreadableFile(self._names[0], "has no rows of data")
+            first = description.rows.first
+            where = f" from row {first} on" if first > 1 else ""
+            raise UnreadableFile(self._names[0], f"has no rows of data{where}")
         clock, rate_hz, count = None, description.rate_hz or 0.0, self._count
         if self._clock is not None:
             column = description.time_column

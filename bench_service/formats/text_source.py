@@ -45,6 +45,8 @@ class TextSource:
         if kind is not None:
             raise UnreadableFile(self._name, f"is no delimited text but {kind}")
         encoding = _encoding(glance)
+        if encoding is None and 20 * glance[:4096].count(0) > len(glance[:4096]):
+            raise UnreadableFile(self._name, "is no delimited text: it has bytes of nought, as binary files have")
         if encoding is not None:
             self._decoder = codecs.getincrementaldecoder(encoding)(errors="replace")
         text = self._decoded(glance.removeprefix(codecs.BOM_UTF8))
@@ -60,8 +62,8 @@ class TextSource:
         if self._left < 0:
             raise UnreadableFile(
                 self._name,
-                f"unpacks to more than {self._allowed // MEGABYTE} MB, which is the most for a file of its size: send it "
-                "in parts",
+                f"unpacks to more than {self._allowed // MEGABYTE} MB, which is the most for a file of its size: send "
+                "it in parts",
             )
         if not data:
             self._ended = True
@@ -94,7 +96,7 @@ class TextSource:
         return self._ended
 
     def line(self, number: int) -> bytes:
-        """The next line with its end; empty at the end of the text. Raises `UnreadableFile` for one that is too long."""
+        """The next line with its end; empty at the end of the text. Raises `UnreadableFile` for one without an end."""
         self.fill(LINE_BYTES)
         end = self._buffer.find(b"\n", 0, LINE_BYTES) + 1
         if not end and len(self._buffer) >= LINE_BYTES:

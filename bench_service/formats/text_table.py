@@ -53,10 +53,18 @@ class TextTable:
         """Skip comments, take the names, and learn the width. Raises `UnreadableFile`."""
         lines = self._sample()
         if not lines:
-            raise UnreadableFile(self.name, f"line {self.first_line} is empty; a table was expected there")
+            skipped = (
+                f"; header_lines = {self.first_line - 1} leaves nothing of the file" if self.first_line > 1 else ""
+            )
+            raise UnreadableFile(
+                self.name,
+                f"line {self.first_line} is empty; a table was expected there{skipped or ': the file is empty'}",
+            )
         rows = [self.cells(line) for line in lines]
         if not lines[0].strip():
-            raise UnreadableFile(self.name, f"line {self.first_line} is empty; a table was expected there")
+            more = next((k for k, line in enumerate(lines) if line.strip()), None)
+            way = f": header_lines = {self.first_line - 1 + more} leaves out what is empty" if more else ""
+            raise UnreadableFile(self.name, f"line {self.first_line} is empty; a table was expected there{way}")
         filled = [row for row, line in zip(rows, lines, strict=True) if line.strip()]
         self.width = _usual_width(filled[1:] if header and len(filled) > 1 else filled, len(filled[0]))
         comments = self._comments(lines, rows, header)

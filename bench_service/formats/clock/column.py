@@ -70,7 +70,7 @@ class ClockColumn:
     _last_raw: float = 0.0
     _repeats: list[NDArray[np.int64]] = field(default_factory=list[NDArray[np.int64]])
     _repeat_count: int = 0
-    _times: SpooledTemporaryFile[bytes] = field(default_factory=lambda: SpooledTemporaryFile(IN_MEMORY_BYTES))
+    _times: SpooledTemporaryFile[bytes] = field(default_factory=lambda: SpooledTemporaryFile(IN_MEMORY_BYTES))  # noqa: SIM115  closed by `close`
 
     def add(self, stamps: Stamps, same: NDArray[np.bool_]) -> None:
         """The next rows: their stamps in the column's unit, and whether the channels of each equal the row before's."""

@@ -272,7 +272,7 @@ def _descriptor(stream: BinaryIO, closing: ExitStack) -> int:
     except (OSError, ValueError, AttributeError):
         pass
     try:
-        file = closing.enter_context(tempfile.TemporaryFile())
+        file = closing.enter_context(tempfile.TemporaryFile())  # noqa: SIM115  closed by the stack
         stream.seek(0)
         shutil.copyfileobj(stream, file)
         file.flush()
