@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from datetime import date
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pyarrow as pa
@@ -30,8 +30,8 @@ class NoClock(Exception):
         self.text = text
 
 
-def nanoseconds(texts: pa.Array, fraction: Fraction) -> NDArray[np.int64]:
-    """Times of a clock since midnight, or since 1970 where they have a date [ns]. Raises `NoClock`."""
+def nanoseconds(texts: Any, fraction: Fraction) -> NDArray[np.int64]:
+    """Times [ns] of an Arrow array of texts, since midnight or, with a date, since 1970. Raises `NoClock`."""
     if fraction == "decimal" and texts.null_count == 0:
         fast = _cast(texts)
         if fast is not None:
@@ -39,7 +39,7 @@ def nanoseconds(texts: pa.Array, fraction: Fraction) -> NDArray[np.int64]:
     return np.array(_slowly(texts.to_pylist(), fraction), np.int64)
 
 
-def _cast(texts: pa.Array) -> NDArray[np.int64] | None:
+def _cast(texts: Any) -> NDArray[np.int64] | None:
     """Arrow's own reading, where it reads them all."""
     for kind in (pa.timestamp("ns"), pa.time64("ns")):
         try:

@@ -110,7 +110,9 @@ class ImportDescription(_Strict):
         "refuse", description="lost rows; mark: NaN takes their place, for analyses that leave gaps out"
     )
     start_s: float = Field(0.0, description="bench time of the first sample")
-    rows: Rows = Field(default_factory=Rows, description="the part of the table that is read")
+    rows: Rows = Field(
+        default_factory=lambda: Rows.model_validate({}), description="the part of the table that is read"
+    )
     header_lines: int = Field(0, ge=0, le=10_000, description="lines of a text file before the table")
     header: bool = Field(True, description="whether a line of column names follows (text files)")
     delimiter: Literal[",", ";", "tab", "whitespace"] = ","

@@ -1,4 +1,4 @@
-"""Large files that small ones unpack to, that have no lines, no end or too many columns; and what they cost a service."""
+"""Large files that small ones unpack to, or without lines, end or bounds; and what each costs a service."""
 
 import gzip
 import io
@@ -123,7 +123,7 @@ class Cost:
     status: int
     time_s: float
     memory_mb: float
-    """Most of all its processes together above idle, pages that they share counted once."""
+    """Most of all its processes together above idle, see `memory_mb`."""
     delay_s: float
     """The longest answer of /healthz meanwhile."""
     quiet_s: float
@@ -139,12 +139,16 @@ def measured(service: Service, name: str) -> Cost:
     service.client.post("/api/v1/recordings", **small).raise_for_status()  # the reader's host is there when idle
     idle = memory_mb(service.process.pid)
     description = {**DESCRIPTION, **bomb.description}
-    with tempfile.TemporaryFile() as file, _watching(service) as seen:
+    with (
+        tempfile.TemporaryFile() as file,
+        httpx.Client(base_url=service.client.base_url, timeout=600) as fresh,  # the other one may have been idle long
+        _watching(service) as seen,
+    ):
         file.write(data)
         file.seek(0)
         pause(QUIET_S)
         begun = monotonic_s()
-        answer = service.client.post(
+        answer = fresh.post(
             "/api/v1/recordings", files=[("files", ("a", file))], data={"description": json.dumps(description)}
         )
         took_s = monotonic_s() - begun
@@ -187,16 +191,20 @@ def _watch(url: str, pid: int) -> None:
 
 
 def memory_mb(root: int) -> float:
-    """Proportional memory of a process and all that it began."""
-    return sum(_proportional_kb(pid) for pid in _family(root)) / 1000.0
+    """Memory of a process and all that it began, without the files that are mapped into it.
+
+    What a child shares with its parent since the fork is counted twice: an upper bound. The sum that counts it once
+    (smaps_rollup) holds a lock of the process that is watched, and so delays it.
+    """
+    return sum(_anonymous_mb(pid) for pid in _family(root))
 
 
-def _proportional_kb(pid: int) -> float:
+def _anonymous_mb(pid: int) -> float:
     try:
-        lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
-    except (OSError, ProcessLookupError):
+        resident, shared = Path(f"/proc/{pid}/statm").read_text().split()[1:3]
+    except (OSError, ValueError):
         return 0.0
-    return next((float(line.split()[1]) for line in lines if line.startswith("Pss:")), 0.0)
+    return (int(resident) - int(shared)) * os.sysconf("SC_PAGE_SIZE") / MB
 
 
 def _family(root: int) -> list[int]:

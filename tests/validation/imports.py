@@ -153,8 +153,9 @@ def bombs() -> bool:
         good = found.memory_mb <= MEMORY_MB and found.time_s <= TIME_S and found.delay_s <= DELAY_S + found.quiet_s
         good = good and found.status in (201, 413, 422)
         held = held and good
+        mark = "ok " if good else "BAD"
         console.print(
-            f"  {'ok ' if good else 'BAD'} {name:34s} {found.sent_mb:7.1f} MB sent: {found.status}, {found.time_s:5.1f} s, "
+            f"  {mark} {name:34s} {found.sent_mb:7.1f} MB sent: {found.status}, {found.time_s:5.1f} s, "
             f"{found.memory_mb:+6.0f} MB, healthz {found.delay_s:.3f} s at most (before: "
             f"{found.quiet_s:.3f} s); {found.words}",
             markup=False,

@@ -67,7 +67,7 @@ class ClockColumn:
     """Rows whose channels equal those of the row before, whatever their time."""
     _carried_s: float = 0.0
     _last_s: float = 0.0
-    _last_raw: float = 0.0
+    _last_raw: int | float = 0
     _repeats: list[NDArray[np.int64]] = field(default_factory=list[NDArray[np.int64]])
     _repeat_count: int = 0
     _times: SpooledTemporaryFile[bytes] = field(default_factory=lambda: SpooledTemporaryFile(IN_MEMORY_BYTES))  # noqa: SIM115  closed by `close`
@@ -84,7 +84,7 @@ class ClockColumn:
             self.typical_s = float(np.median(steps[steps > 0.0]))
         falls = np.flatnonzero(steps < 0.0)
         if len(falls):
-            raw = np.concatenate([[self._last_raw], stamps]) if self.count else np.asarray(stamps)
+            raw = [self._last_raw, *stamps.tolist()] if self.count else stamps.tolist()
             self._fall(falls, steps, raw, row, time_s)
         still = np.flatnonzero(steps == 0.0)
         if len(still):
@@ -111,12 +111,12 @@ class ClockColumn:
         self.resolution.add(units + np.rint(self._carried_s / self.scale_s), error)
         return units * self.scale_s + self._carried_s
 
-    def _fall(self, falls: NDArray[np.intp], steps: Array, raw: Stamps, row: int, time_s: Array) -> None:
+    def _fall(self, falls: NDArray[np.intp], steps: Array, raw: Sequence[int | float], row: int, time_s: Array) -> None:
         """Note falls; those that are wraps are carried on where that is wanted, in place."""
         shift = len(steps) - len(time_s)  # −1 in the first block, whose first stamp has no step
         carried = np.zeros(len(time_s))
         for at in falls[:FALLS_LOOKED_AT]:
-            before, after = raw[at].item(), raw[at + 1].item()
+            before, after = raw[at], raw[at + 1]
             wrap = self._wrap(float(steps[at]), before * self.scale_s, after * self.scale_s)
             fall = Fall(row + int(at), before, after, wrap)
             if wrap is not None and self.unwrap:
@@ -128,7 +128,7 @@ class ClockColumn:
                 self.falls.append(fall)
         if len(falls) > FALLS_LOOKED_AT:
             at = int(falls[FALLS_LOOKED_AT])
-            self.falls.append(Fall(row + at, raw[at].item(), raw[at + 1].item(), None))
+            self.falls.append(Fall(row + at, raw[at], raw[at + 1], None))
             self.fall_count += len(falls) - FALLS_LOOKED_AT
         time_s += np.cumsum(carried)
         self._carried_s += float(carried.sum())

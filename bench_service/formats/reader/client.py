@@ -13,7 +13,6 @@ import threading
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -87,7 +86,7 @@ class _Reading:
     source: dict[str, Any]
     _receive: "_Line" = field(repr=False)
 
-    @cached_property
+    @property
     def channels(self) -> tuple[Channel, ...]:
         """The channels of the recording."""
         return tuple(channel.channel() for channel in self.description.channels)
@@ -101,7 +100,10 @@ class _Reading:
                 return
             if kind != SAMPLES or len(payload) % (width * np.dtype(self.dtype).itemsize):
                 raise Broken(f"a frame of kind {kind!r}")
-            yield np.frombuffer(payload, self.dtype).reshape(-1, width)
+            if self.dtype is np.int32:
+                yield np.frombuffer(payload, np.int32).reshape(-1, width)
+            else:
+                yield np.frombuffer(payload, np.float64).reshape(-1, width)
 
 
 class FileReader:
