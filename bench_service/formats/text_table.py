@@ -111,8 +111,8 @@ class TextTable:
         if first and len(first[0]) != self.width and lines > 2:
             raise UnreadableFile(
                 self.name,
-                f"line {self.first_line} has {len(first[0])} columns, most lines have {self.width}: where it is cut off, "
-                f"header_lines = {self.first_line} leaves it out",
+                f"line {self.first_line} has {len(first[0])} columns, most lines have {self.width}: where it is cut "
+                f"off, header_lines = {self.first_line} leaves it out",
             )
 
     def _match_names(self, data: Sequence[list[bytes]]) -> None:

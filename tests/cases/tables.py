@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+import pytest
 
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.import_file import ImportedRecording, ImportFile, read_import
@@ -42,12 +43,10 @@ def samples(recording: ImportedRecording) -> Numbers:
 
 
 def refusal(data: str | bytes, **description: Any) -> str:
-    try:
+    with pytest.raises(DomainError) as refused:
         read(data, **description)
-    except DomainError as error:
-        assert len(str(error)) < 2000
-        return str(error)
-    raise AssertionError("it was not refused")
+    assert len(str(refused.value)) < 2000
+    return str(refused.value)
 
 
 def warnings(recording: ImportedRecording) -> str:

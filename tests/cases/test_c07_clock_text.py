@@ -12,7 +12,7 @@ FORCE = triad("accelerometer", ["ax", "ay", "az"], "g")
 
 
 def _accelerometers(stamps: list[str], seed: int = 7) -> str:
-    values = chance(seed).normal(0.0, 0.01, (len(stamps), 3)) + [0.0, 0.0, 1.0]
+    values = chance(seed).normal(0.0, 0.01, (len(stamps), 3)) + np.array([0.0, 0.0, 1.0])
     rows = [(stamp, *(f"{v:.4f}" for v in row)) for stamp, row in zip(stamps, values, strict=True)]
     return table(["time", "ax", "ay", "az"], rows)
 

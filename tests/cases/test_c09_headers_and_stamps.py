@@ -1,4 +1,4 @@
-"""Marks before names, text columns, stamps of nanoseconds and of types, stamps of arrival beside those of the sensor."""
+"""Marks before names, text columns, stamps of nanoseconds and of types, stamps of arrival beside the sensor's own."""
 
 import io
 from typing import Any

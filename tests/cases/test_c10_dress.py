@@ -9,7 +9,7 @@ from tests.cases.tables import chance, read, refusal, samples, table, triad
 
 RATE_HZ, ROWS = 202.7, 1500
 NAMES = ["Time (s)", "Acceleration x (m/s^2)", "Acceleration y (m/s^2)", "Acceleration z (m/s^2)"]
-VALUES = (chance(10).normal(0.0, 0.02, (ROWS, 3)) + [0.30, -0.12, 9.79]).round(6)
+VALUES = (chance(10).normal(0.0, 0.02, (ROWS, 3)) + np.array([0.30, -0.12, 9.79])).round(6)
 ROWS_OF_TEXT = [[f"{i / RATE_HZ:.9E}", *(f"{v:.9E}" for v in row)] for i, row in enumerate(VALUES)]
 WITH_COMMA = [[cell.replace(".", ",") for cell in row] for row in ROWS_OF_TEXT]
 QUOTED = [f'"{name}"' for name in NAMES]

@@ -147,9 +147,10 @@ def report(title: str, tally: Tally, count: int, took_s: float) -> bool:
 def bombs() -> bool:
     """Large and hostile files against what is promised."""
     held = True
-    for name in BOMBS:
+    for name, bomb in BOMBS.items():
+        data = bomb.make()
         with running_service() as service:
-            found = measured(service, name)
+            found = measured(service, bomb, data)
         good = found.memory_mb <= MEMORY_MB and found.time_s <= TIME_S and found.delay_s <= DELAY_S + found.quiet_s
         good = good and found.status in (201, 413, 422)
         held = held and good
