@@ -35,6 +35,9 @@ class Params(Parameters):
     )
     points: int = Field(100, ge=5, le=1000, description="cluster times, evenly in the logarithm, at the most")
     confidence: float = Field(0.6827, gt=0.0, lt=1.0, description="of the intervals")
+    gaps: Literal["refuse", "leave_out"] = Field(
+        "refuse", description="samples that are NaN; leave_out: every term that touches one is left out"
+    )
 
 
 @dataclass(frozen=True)
@@ -139,6 +142,7 @@ def _deviations(
                 sizes=sizes,
                 increments=channel.quantity in INCREMENTS,
                 confidence=params.confidence,
+                gaps="refuse" if params.gaps == "refuse" else "aware",
                 correlate=correlate,
             )
             for channel in channels
