@@ -73,6 +73,7 @@ class ImportService:
                 simulated=description.simulated,
                 dtype=imported.dtype,
                 source=imported.source,
+                gaps=description.gaps == "mark",
                 idempotency=idempotency,
             )
         )
