@@ -15,7 +15,7 @@ from bench_service.jobs.queue_service import QueueService
 from bench_service.jobs.service import JobService
 from bench_service.jobs.stops import StopService
 from bench_service.jobs.worker import Worker
-from bench_service.model.errors import NotReady
+from bench_service.model.errors import NotDriving, NotReady
 from bench_service.telemetry.tracing import Traces
 
 LEAST_FREE_BYTES = 200_000_000
@@ -79,6 +79,20 @@ class BenchService:
         if self._worker is not None:
             self._worker.begin([lambda: (self.catalogue.procedures, self.catalogue.methods), *warm_up])
             self.campaigns.conductor.begin()
+
+    def at_failed_start(self, then: Callable[[], object]) -> None:
+        """Have `then` called where the job engine does not start. To be called before `begin`."""
+        if self._worker is not None:
+            self._worker.at_failed_start(then)
+
+    def failed_start(self) -> NotDriving | None:
+        """Return the error of an engine that did not start; None where it runs, or may yet."""
+        return None if self._worker is None else self._worker.failed_start()
+
+    def require_start(self) -> None:
+        """Wait until the engine runs. Raises `NotDriving` where it does not start."""
+        if self._worker is not None:
+            self._worker.require_engine()
 
     def ready(self) -> tuple[str, ...]:
         """Return once a job could start, with what a person should know all the same.

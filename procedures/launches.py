@@ -1,6 +1,7 @@
-"""Recordings at rest, one a launch: parameters, result and report that `static_run` and `noise_analysis` share.
+"""Recordings at rest, one a launch: parameters, result and analysis that `static_run` and `noise_analysis` share.
 
-Knows how the answers are asked for and shown; the numerics are in `procedures.analysis.launch`.
+Knows how the answers are asked for and judged. The numerics are in `procedures.analysis.launch`, the report is in
+`procedures.reports.launch`.
 """
 
 from collections.abc import Sequence
@@ -16,9 +17,7 @@ from procedures.core import units
 from procedures.core.errors import UnfitRecording
 from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording
-from procedures.core.report import Report
 from procedures.procedure import Outcome, Parameters
-from procedures.reports import launch as pictures
 
 Part = Literal["gyros", "accelerometers", "all", "none"]
 
@@ -102,22 +101,6 @@ def analyse_launches(result: type[R], recordings: Sequence[Recording], params: N
     )
 
 
-def noise_report(result: NoiseResult) -> Report:
-    """Tables 4.1 and 4.2, the three ways, every step's effect, and the plots of every channel."""
-    launches, channels = result.launches, result.channels
-    doubts = pictures.disagreements(launches)
-    tables = [
-        pictures.side_by_side(channels, launches),
-        *((doubts,) if doubts else ()),
-        pictures.averaging_table(channels, launches),
-        pictures.steps_table(launches),
-        pictures.launch_means_table(channels, launches),
-        *(pictures.three_ways(launch) for launch in launches),
-    ]
-    figures = [figure for s in channels for figure in pictures.channel_figures(s.channel, launches)]
-    return Report(_summary(result), (*tables, *figures))
-
-
 def _checks(channels: Sequence[ChannelSummary], limits: NoiseLimits) -> tuple[Check, ...]:
     """Random walk of gyros and bias instability of both triads; of channels in counts only that there is a noise."""
     found: list[Check] = []
@@ -147,13 +130,3 @@ def _check(s: ChannelSummary, process: str, maximum: float, unit: str, size: flo
         return check(name, found.mean / size, limit, None if found.sd is None else found.sd / size)
     bound = min((r.upper_limit for r in found.values if r.upper_limit is not None), default=float("inf"))
     return check(name, bound / size, limit, note="not observed: the value is what it stays below")
-
-
-def _summary(result: NoiseResult) -> str:
-    hours = sum(launch.duration_s for launch in result.launches) / units.HOUR
-    dwell = (
-        "Quantization rules at no averaging time."
-        if result.averaging_time_s is None
-        else f"Quantization falls below the rest of the noise after {result.averaging_time_s:.0f} s at the latest."
-    )
-    return f"{len(result.launches)} launches at rest, {hours:.3g} h in all. {dwell}"

@@ -8,6 +8,7 @@ from typing import Annotated
 from pydantic import Field
 
 from procedures.analysis.calibration.reference import site_with
+from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.core.site import Site
 from procedures.procedure import Context, Parameters
 
@@ -35,6 +36,16 @@ class TableParameters(SiteParameters):
     orthogonality_sd_arcsec: Arcsec | None = Field(None, description="of each of the table's two right angles")
     pointing_sd_arcsec: Arcsec | None = Field(None, description="of each axis, anew at each station")
     level_sd_arcsec: Arcsec | None = Field(None, description="of the outer axis about each horizontal direction")
+
+    def table(self, site: Site) -> TableUncertainty:
+        """What table and site leave uncertain of the reference; what neither bench nor parameters declare is none."""
+        return TableUncertainty(
+            self.orthogonality_sd_arcsec or 0.0,
+            self.pointing_sd_arcsec or 0.0,
+            self.level_sd_arcsec or 0.0,
+            site.azimuth_sd_arcsec,
+            site.gravity_sd_m_s2 / site.gravity_m_s2,
+        )
 
 
 def declared_site(context: Context) -> dict[str, float]:

@@ -16,10 +16,10 @@ from procedures.analysis.thermal.profile_progress import (
     DISCONNECTED_CODE,
     SENSORS,
     SET_POINT,
+    CheckedSamples,
     ProfileProgress,
     SensorWatch,
     Standing,
-    check_samples,
 )
 from procedures.bench import Bench
 from procedures.bench.chamber import Chamber, ChamberReading
@@ -112,7 +112,7 @@ async def _driven(chamber: Chamber, profile: TemperatureProfile, stream: Stream,
     """The stream's blocks with what the chamber says beside them; each leg is commanded when the one before is done."""
     progress, watch = ProfileProgress(profile), SensorWatch(profile)
     sensors = [stream.channels[c] for c in columns]
-    step, taken = check_samples(stream.rate_hz), 0
+    checked = CheckedSamples(stream.rate_hz)
     await _command(chamber, profile.legs[0])
     try:
         async for block in stream.blocks:
@@ -120,13 +120,12 @@ async def _driven(chamber: Chamber, profile: TemperatureProfile, stream: Stream,
             said = [round(value / CHAMBER_SCALE_C) for value in (reading.air_c, reading.set_point_c)]
             yield np.column_stack([block, np.broadcast_to(np.array(said, dtype=np.int32), (len(block), 2))])
             _require_working(reading)
-            first, taken = taken, taken + len(block)
-            for sample in range((first // step + 1) * step, taken + 1, step):
-                codes = block[sample - first - 1, columns].tolist()
-                temperatures = [c.scale * (code - c.offset) for c, code in zip(sensors, codes, strict=True)]
+            for row, t_s in checked.of_block(len(block)):
+                codes = block[row, columns].tolist()
+                temperatures = [c.value(code) for c, code in zip(sensors, codes, strict=True)]
                 if (wrong := watch.step(codes, temperatures)) is not None:
                     raise DeviceFault(wrong)
-                if await _advance(chamber, progress, sample / step * CHECK_S, temperatures, said[0] * CHAMBER_SCALE_C):
+                if await _advance(chamber, progress, t_s, temperatures, said[0] * CHAMBER_SCALE_C):
                     return
     finally:
         if isinstance(stream.blocks, AsyncGenerator):
@@ -183,20 +182,18 @@ async def _soaked(bench: Bench, chamber: Chamber, profile: TemperatureProfile, s
     names = [channel.name for channel in stream.channels]
     if CONVERTER not in names:
         raise MissingChannel(CONVERTER, names)
-    column, step, taken = names.index(CONVERTER), check_samples(stream.rate_hz), 0
+    column, checked = names.index(CONVERTER), CheckedSamples(stream.rate_hz)
     sensor = stream.channels[column]
     await _command(chamber, profile.legs[0])
     async with aclosing(cast(AsyncGenerator[NDArray[np.int32], None], stream.blocks)) as blocks:
         async for block in blocks:
             reading = await chamber.read()
             _require_working(reading)
-            first, taken = taken, taken + len(block)
-            for sample in range((first // step + 1) * step, taken + 1, step):
-                code = int(block[sample - first - 1, column])
+            for row, t_s in checked.of_block(len(block)):
+                code = int(block[row, column])
                 if code == DISCONNECTED_CODE:
                     raise DeviceFault(f"{CONVERTER} is disconnected: it sends code {DISCONNECTED_CODE}")
-                own_c = sensor.scale * (code - sensor.offset)
-                readings = [own_c] * len(SENSORS)
-                if await _advance(chamber, progress, sample / step * CHECK_S, readings, reading.air_c):
+                readings = [sensor.value(code)] * len(SENSORS)
+                if await _advance(chamber, progress, t_s, readings, reading.air_c):
                     return
     raise SoakNotReached("the converter has not soaked in the time that the profile allows")

@@ -97,7 +97,7 @@ class SimulatedBench(Bench):
         return frozenset({"chamber"}) if self.chamber is not None and self.chamber.link_lost else frozenset()
 
     def true_calibration(self) -> dict[str, tuple[Array, Array]]:
-        """Triad -> (bias (3,) [rate], K (3, 3)) of the present launch, of the first one before any."""
+        """Triad -> (bias (3,) [rate], K (3, 3)) of the present launch, of the first one before any: for tests."""
         return launch_truth(self.config, max(1, self.supply.launches))
 
 
@@ -257,7 +257,7 @@ def _axes_rad(angles: Sequence[TableAngles]) -> Array:
 
 
 def dwell_means(config: WorldConfig, stations: Sequence[Station], launch: int = 1) -> DwellMeans:
-    """What the means of the stations' recordings would be, in milliseconds, for Monte Carlo.
+    """What the means of the stations' recordings would be, in milliseconds, for Monte Carlo (`tests.validation`).
 
     The unit is switched on with the table at zero and the stations follow as in a procedure: move, settle, record. See
     `simulators.imu.sensor.station_means` for what is equal to a full run and what only has the same distribution.

@@ -1,7 +1,10 @@
-"""Correction sets with numbers in every place, drawn: what has to come back as it was."""
+"""Correction sets with numbers in every place, drawn: what has to come back as it was; models from bench codes."""
 
 import numpy as np
 
+from procedures.analysis.thermal.converter import zero_and_scale
+from procedures.analysis.thermal.normalised import fit_normalised
+from procedures.core.arrays import Array
 from procedures.core.converter import ConverterModel, Normalised
 from procedures.core.thermal_correction import AxisCorrection, Form, ThermalCorrection
 from procedures.core.unit_correction import UnitCorrection
@@ -34,3 +37,14 @@ def thermal(seed: int, form: Form = Form.BOTH) -> UnitCorrection:
 
     first_stage = converter(seed + 1).converter if form is Form.SWITCHED else None
     return UnitCorrection("thermal", ThermalCorrection("accelerometer", (axis(), axis(), axis()), first_stage))
+
+
+def converter_model(
+    current_ma: float, plus_code: Array, minus_code: Array, sensor_c: Array, reference_c: float = 20.0
+) -> ConverterModel:
+    """Model of a channel from mean codes at ±current, one pair a soak, and what its sensor read there, all (n,)."""
+    found = zero_and_scale(current_ma, plus_code, minus_code)
+    return ConverterModel(
+        fit_normalised(sensor_c, found.scale_code_per_ma, reference_c, 2, relative=True),
+        fit_normalised(sensor_c, found.zero_code, reference_c, 2, relative=False),
+    )

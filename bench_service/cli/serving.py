@@ -12,6 +12,7 @@ import uvicorn
 from bench_service.app import create_app, open_service
 from bench_service.cli.logs import set_up
 from bench_service.cli.refusal import Refused
+from bench_service.service import BenchService
 from bench_service.settings import Settings
 from bench_service.wall_clock import pause
 
@@ -26,8 +27,18 @@ def ready(
     """A server around an open service, ready to run; the service is closed at the end, or when the server shuts down.
 
     `level`: from which on lines are logged, where the settings do not say.
-    Raises what `open_service` raises: before any thread or signal handler is there.
+    Raises what `open_service` raises, before any thread or signal handler is there. Where the job engine does not start
+    the server ends, and `NotDriving` is raised at the end of the block.
     """
+    with _opened(settings, drive, socket_file, level) as (server, service):
+        yield server
+        _check_start(service)
+
+
+@contextmanager
+def _opened(
+    settings: Settings, drive: bool, socket_file: Path | None, level: str
+) -> Generator[tuple[uvicorn.Server, BenchService]]:
     set_up(settings, level)
     with ExitStack() as closing:
         service = open_service(settings, closing, drive)
@@ -40,7 +51,19 @@ def ready(
             access_log=settings.log_access,
             timeout_graceful_shutdown=GRACE_S,
         )
-        yield uvicorn.Server(config)
+        server = uvicorn.Server(config)
+
+        def end() -> None:
+            server.should_exit = True
+
+        service.at_failed_start(end)
+        yield server, service
+
+
+def _check_start(service: BenchService) -> None:
+    failure = service.failed_start()
+    if failure is not None:
+        raise failure
 
 
 def check_port(settings: Settings) -> None:
@@ -59,15 +82,20 @@ def check_port(settings: Settings) -> None:
 
 @contextmanager
 def serving(settings: Settings, drive: bool = True, socket_file: Path | None = None) -> Generator[None]:
-    """A server in a thread beside this one, answering from the first line of the block. Raises as `ready`."""
-    with ready(settings, drive, socket_file) as running:
+    """A server in a thread beside this one, answering from the first line of the block, its job engine running.
+
+    Raises as `ready`, but before the block is entered.
+    """
+    with _opened(settings, drive, socket_file, "warning") as (running, service):
         thread = threading.Thread(target=running.run, name="http")
         thread.start()
         try:
             while not running.started:
                 if not thread.is_alive():
+                    _check_start(service)
                     raise Refused("the service did not start; the lines above say why")
                 pause(0.01)
+            service.require_start()
             yield
         finally:
             running.should_exit = True

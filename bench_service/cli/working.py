@@ -29,6 +29,7 @@ def work(settings: Settings, say: Callable[[str], object]) -> None:
     with accompanied(settings, lambda: started.is_set() and not ending.is_set()), ExitStack() as closing:
         service = open_service(settings, closing)
         service.begin()
+        service.require_start()
         service.ready()
         started.set()
         say(f"working for bench {settings.bench_id}")

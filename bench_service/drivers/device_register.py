@@ -58,7 +58,9 @@ class DeviceRegister:
             state = _read(file)
             os.close(file)
             holder = (state.by if state is not None else "") or "another process"
-            self.journal.write("link.refused", {"holder": holder})
+            refusals = DeviceJournal(self.journal.path)  # closed again: whoever has the link may rotate the journal
+            refusals.write("link.refused", {"holder": holder})
+            refusals.close()
             raise DeviceBusy(f"the devices of bench {self.bench_id!r} are driven by {holder}") from None
         return DeviceLink(file, self.journal, by or str(ProcessIdentity.own()), job)
 

@@ -9,7 +9,8 @@ of the old one.
 
 import json
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from threading import Event, Lock
 from typing import Any
 
@@ -103,10 +104,18 @@ class Engine:
         self._workflow = run_job
 
     def launch(self) -> None:
-        """Start working; jobs that a dead process left go on. The bench's lease must be held."""
-        DBOS.listen_queues([])
-        DBOS.launch()
-        self._never_wait_for_the_database()
+        """Start working; jobs that a dead process left go on. The bench's lease must be held.
+
+        Raises what kept it from starting, and leaves nothing running then.
+        """
+        try:
+            DBOS.listen_queues([])
+            with _failure_said_once():
+                DBOS.launch()
+            self._never_wait_for_the_database()
+        except Exception as error:
+            DBOS.destroy(destroy_registry=True)
+            raise self._understood(error) from error
 
     def run(self, job: Job) -> None:
         """Run a claimed job to its end. Raises `ShuttingDown`, or what kept its workflow from being written."""
@@ -229,6 +238,21 @@ class Engine:
         log.error("job %s failed inside the service: %s", job_id, error, exc_info=None if refused else error)
         kind = type(error).__name__
         return StepOutcome(Failure(kind, str(error)) if refused else Failure("InternalError", f"{kind}: {error}"))
+
+
+@contextmanager
+def _failure_said_once() -> Generator[None]:
+    """DBOS logs the traceback of a failed launch and raises it too; who asked for the launch says it."""
+    logger = logging.getLogger("dbos")
+
+    def dropped(record: logging.LogRecord) -> bool:
+        return record.exc_info is None
+
+    logger.addFilter(dropped)
+    try:
+        yield
+    finally:
+        logger.removeFilter(dropped)
 
 
 def _workflow_id(job: Job | RunningJob) -> str:

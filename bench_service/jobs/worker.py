@@ -6,13 +6,18 @@ meanwhile; jobs that are submitted meanwhile wait in the queue.
 
 import logging
 from collections.abc import Callable, Sequence
-from threading import Event, Thread
+from threading import Event, Lock, Thread
 from typing import Protocol
 
 from bench_service.jobs.dispatcher import JobEngine
 from bench_service.jobs.runner import JobRunner
-from bench_service.model.errors import NotDriving
+from bench_service.model.errors import NotDriving, ServiceError
 from bench_service.model.job import Job
+
+START_S = 60.0
+"""How long the engine may take to start [s]; loaded from a slow disk by a busy machine it takes ten."""
+LEAVE_S = 10.0
+"""How long a service that ends waits for an engine that is still starting [s]."""
 
 log = logging.getLogger(__name__)
 
@@ -43,21 +48,32 @@ class Worker:
         self._make_dispatcher = make_dispatcher
         self._engine: JobEngine | None = None
         self._dispatcher: JobDispatcher | None = None
-        self._failure: Exception | None = None
+        self._failure: str | None = None
         self._begun = Event()
+        self._deciding = Lock()
         self._thread: Thread | None = None
+        self._at_failure: Callable[[], object] = lambda: None
+
+    def at_failed_start(self, then: Callable[[], object]) -> None:
+        """Have `then` called, in another thread, where the engine does not start. To be said before `begin`."""
+        self._at_failure = then
 
     def begin(self, then: Sequence[Callable[[], object]]) -> None:
         """Load and launch the engine in a thread of its own, then do what can wait."""
         self._thread = Thread(target=self._begin, args=(then,), name="worker", daemon=True)
         self._thread.start()
+        Thread(target=self._give_up, name="worker's patience", daemon=True).start()
 
     def require_engine(self) -> JobEngine:
         """The engine, once it runs. Raises `NotDriving` with the reason where it did not start."""
         self._begun.wait()
         if self._engine is None:
-            raise NotDriving(f"the job engine did not start: {self._failure}")
+            raise NotDriving(self._failure)
         return self._engine
+
+    def failed_start(self) -> NotDriving | None:
+        """Why the engine did not start; None where it runs, or may yet."""
+        return None if self._failure is None else NotDriving(self._failure)
 
     def troubles(self) -> list[str]:
         """Why a job could not start on this bench now; waits for the engine after a start."""
@@ -83,7 +99,8 @@ class Worker:
         if self._thread is None:
             return
         self._runner.shut_down()
-        self._begun.wait()
+        if not self._begun.wait(LEAVE_S):
+            self._fail("the service ended before its job engine had started")
         if self._dispatcher is not None:
             self._dispatcher.shut_down()
         if self._engine is not None:
@@ -93,13 +110,37 @@ class Worker:
         try:
             engine = self._make_engine(self._runner)
             engine.launch()
-            self._dispatcher = self._make_dispatcher(self._runner, engine)
-            self._dispatcher.begin()
-            self._engine = engine
+            dispatcher = self._make_dispatcher(self._runner, engine)
         except Exception as failure:  # said to whoever asks, see `require_engine`
-            log.exception("the job engine did not start")
-            self._failure = failure
-        finally:
-            self._begun.set()
+            log.debug("the job engine did not start", exc_info=failure)
+            self._fail(f"the job engine did not start: {_sentence(failure)}")
+            return
+        with self._deciding:
+            late = self._begun.is_set()
+            if not late:
+                dispatcher.begin()
+                self._dispatcher, self._engine = dispatcher, engine
+                self._begun.set()
+        if late:
+            engine.shut_down()
+            return
         for work in then:
             work()
+
+    def _give_up(self) -> None:
+        if not self._begun.wait(START_S):
+            self._fail(f"the job engine did not start within {START_S:g} s")
+
+    def _fail(self, why: str) -> None:
+        with self._deciding:
+            if self._begun.is_set():
+                return
+            self._failure = why
+            self._begun.set()
+        self._at_failure()
+
+
+def _sentence(failure: Exception) -> str:
+    """A reason in one line. Our own errors say it; of another one its kind says more than its words."""
+    words = " ".join(str(failure).split())
+    return words if isinstance(failure, ServiceError) else f"{type(failure).__name__}: {words}"

@@ -3,6 +3,10 @@ database, which the engines of all benches share.
 
 On SQLite the books are written with ``synchronous=NORMAL``: a power cut may take back their last entries, and then a
 step is done again, which every step allows; what we acknowledge ourselves is written with FULL.
+
+Under Python 3.12 and newer the engine asks SQLite for the time as ``unixepoch('subsec')``, also in the defaults of its
+tables. An SQLite library older than 3.42 does not know that modifier and answers NULL, so our connections bring the
+function along.
 """
 
 import sqlite3
@@ -10,13 +14,30 @@ from typing import Any
 
 from sqlalchemy import make_url
 
+from bench_service import wall_clock
 from bench_service.persistence.database import TCP, connect
+
+KNOWS_SUBSEC = (3, 42, 0)
+"""The first version of SQLite whose ``unixepoch`` has milliseconds."""
 
 
 class _Books(sqlite3.Connection):
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         self.execute("PRAGMA synchronous=NORMAL")
+        if sqlite3.sqlite_version_info < KNOWS_SUBSEC:
+            self.create_function("unixepoch", 1, unix_epoch)
+            self.execute("PRAGMA trusted_schema=ON")  # a table's default may call it, however the library was built
+
+
+def unix_epoch(modifier: str) -> float:
+    """``unixepoch('subsec')`` as SQLite 3.42 defines it: seconds since 1970 with three decimals.
+
+    Raises `ValueError` for whatever else the function may be asked: the engine asks for nothing else.
+    """
+    if modifier not in ("subsec", "subsecond"):
+        raise ValueError(f"unixepoch({modifier!r}): only 'subsec' is known here")
+    return round(wall_clock.now().timestamp(), 3)
 
 
 def engine_database(database_url: str, bench_id: str) -> tuple[str, dict[str, Any]]:

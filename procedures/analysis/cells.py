@@ -7,7 +7,7 @@ import numpy as np
 
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.recording import INCREMENTS, RawArray, Recording, RecordingInfo
+from procedures.core.recording import RawArray, Recording, RecordingInfo, require_complete, require_finite
 
 
 @dataclass(frozen=True)
@@ -32,18 +32,12 @@ def cell_samples(rate_hz: float, cell_s: float) -> int:
 def channel_rows(info: RecordingInfo, names: Sequence[str], blocks: Iterator[RawArray]) -> Iterator[Array]:
     """The blocks of a recording as nominal rates, channel by channel, each (channels, n), in `rate_unit`.
 
-    ``scale·(raw − offset)``, times the sample rate where the channel gives increments.
+    Raises `MissingChannel`.
     """
-    columns = [info.column(name) for name in names]
-    channels = [info.channels[c] for c in columns]
-    per_second = [info.rate_hz if c.quantity in INCREMENTS else 1.0 for c in channels]
-    scale = (np.array([c.scale for c in channels]) * np.array(per_second))[:, None]
-    offset = np.array([c.offset for c in channels])[:, None]
+    columns, scale = [info.column(name) for name in names], info.nominal_scale(names)
     for block in blocks:
         rows = np.ascontiguousarray(block.T[columns], dtype=np.float64)
-        if np.any(offset):
-            rows -= offset
-        rows *= scale
+        scale.convert_rows(rows)
         yield rows
 
 
@@ -75,17 +69,18 @@ class CellStream:
     def finish(self) -> Cells:
         """All cells, once every sample came. Raises `UnfitRecording`."""
         info = self._info
-        if self._filled != self._means.shape[1]:
-            raise UnfitRecording(
-                f"recording {info.id}: {self._filled * self._samples + self._rest.shape[1]} samples where "
-                f"{info.count} are announced"
-            )
+        require_complete(info, self._filled * self._samples + self._rest.shape[1])
         return Cells(self._names, self._means, self._samples / info.rate_hz, info.since_launch_s)
 
 
 def cell_means(recording: Recording, names: Sequence[str], cell_s: float) -> Cells:
-    """Cell means of some channels of a recording. Raises `MissingChannel`, `UnfitRecording`, `BadParameter`."""
+    """Cell means of some channels of a recording.
+
+    Raises `MissingChannel`, `BadParameter`, and `UnfitRecording` where samples are not numbers, are not as many as
+    announced or less than a cell.
+    """
     stream = CellStream(recording.info, names, cell_s)
     for rows in channel_rows(recording.info, names, recording.blocks()):
+        require_finite(recording.info, names, rows.T)
         stream.add(rows)
     return stream.finish()

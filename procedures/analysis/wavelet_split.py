@@ -12,7 +12,8 @@ What unit noise is decides everything:
 * "rescaled": unit noise is each level's own, its details' median absolute deviation over 0.6745: no unit matters.
 
 J levels reach to 2^J samples, a *time*: 64 s at the thesis's 1 Hz and 0.64 s at 100 Hz. Quantization is averaged away
-within it, and so is every other noise: a random walk is to be read at averaging times well above. `levels_for` chooses.
+within it, and so is every other noise: a random walk is to be read at averaging times well above,
+τ of at least eight times that scale.
 
 The record is continued at its ends by its mirror image (half-sample symmetric), which makes no step there.
 """
@@ -102,18 +103,6 @@ def wavelet_split(
 def shortest_s(levels: int, cell_s: float, wavelet: str = "sym8") -> float:
     """The shortest series [s] that can be split into so many levels: ``2^levels·(filter − 1)`` cells (PyWavelets)."""
     return (_filter_length(wavelet) - 1) * 2**levels * cell_s
-
-
-def levels_for(scale_s: float, cell_s: float) -> int:
-    """Levels that reach to a time scale [s], ``log₂(scale/cell)`` rounded. Raises `BadParameter` where that is none.
-
-    To read a random walk at τ without quantization: a scale of τ/8 or less, and many cells long.
-    """
-    if not 0.0 < cell_s < float("inf"):
-        raise BadParameter("cell_s", cell_s, "finite and above 0 s")
-    if not sqrt(2.0) * cell_s <= scale_s < float("inf"):
-        raise BadParameter("scale_s", scale_s, f"finite, and at least 1.5 cells of {cell_s:g} s")
-    return max(1, round(log2(scale_s / cell_s)))
 
 
 def heursure(details: Array) -> float:

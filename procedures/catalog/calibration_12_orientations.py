@@ -29,7 +29,6 @@ from procedures.analysis.calibration.scalar import require_scalar_determined
 from procedures.analysis.calibration.station_means import launch_warnings
 from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS, windows
 from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
-from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers, analyse_triad
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -156,7 +155,8 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
     """Least squares over the station means of both triads."""
     params = resolve(params, context)
-    site, uncertainty = params.site(context), _uncertainty(params, context)
+    site = params.site(context)
+    uncertainty = params.table(site)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     _require_scalar(params, plans[1])
     gyro, accelerometer = (context.unit.triad(triad) for triad in TRIAD_NAMES)
@@ -185,7 +185,7 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
 def report(result: Result) -> Report:
     """Coefficients, checks, residuals and magnitudes (thesis Tables 5.1-5.4, figures 5.6-5.12)."""
     magnitudes = [t.magnitudes for t in result.triads]
-    tables = [pictures.coefficient_table(t) for t in result.triads]
+    tables = [pictures.triad_table(t) for t in result.triads]
     tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
     tables += [pictures.magnitude_table(magnitudes, "Magnitudes over the orientations")]
     figures = [f for t in result.triads for f in pictures.triad_figures(t)]
@@ -194,19 +194,9 @@ def report(result: Result) -> Report:
     return Report(sections=(*tables, *thermal, *figures, *stations))
 
 
-def _uncertainty(params: Params, context: Context) -> TableUncertainty:
-    site = params.site(context)
-    return TableUncertainty(
-        params.orthogonality_sd_arcsec or 0.0,
-        params.pointing_sd_arcsec or 0.0,
-        params.level_sd_arcsec or 0.0,
-        site.azimuth_sd_arcsec,
-        site.gravity_sd_m_s2 / site.gravity_m_s2,
-    )
-
-
 def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
-    site, uncertainty = params.site(context), _uncertainty(params, context)
+    site = params.site(context)
+    uncertainty = params.table(site)
     return triad_plan(
         triad, context.unit, schedule(params), context.bench.axis_motion, site, uncertainty, params.weighting
     )

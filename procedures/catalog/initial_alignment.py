@@ -12,8 +12,7 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis.calibration.station_plan import windows
-from procedures.analysis.calibration.table_errors import TableUncertainty
-from procedures.analysis.navigation.alignment import require_alignable
+from procedures.analysis.navigation.alignment import ThesisPrediction, require_alignable, thesis_prediction
 from procedures.analysis.repeated_alignment.expected import (
     ANGLES,
     TABLE,
@@ -25,12 +24,10 @@ from procedures.analysis.repeated_alignment.expected import (
 from procedures.analysis.repeated_alignment.observed import (
     Alignment,
     AngleErrors,
-    ThesisPrediction,
     alignment_errors,
     found_attitudes,
     judged_angle,
     recorded_alignments,
-    thesis_prediction,
     told_alignments,
 )
 from procedures.bench import Bench
@@ -117,7 +114,7 @@ def predict(params: Params, context: Context) -> Prediction:
     params = resolve(params, context)
     site, stations, axes = params.site(context), schedule(params), context.bench.axis_motion
     require_alignable(site.latitude_deg)
-    expected = expected_errors(planned_alignments(context.unit, site, _table(params), stations, axes))
+    expected = expected_errors(planned_alignments(context.unit, site, params.table(site), stations, axes))
     found = [_predicted(angle, expected) for angle in range(3)]
     thesis = thesis_prediction(context.unit, site, params.base_turn_arcsec, params.alignment_s)
     if thesis is not None:
@@ -140,7 +137,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     """Align from each recording's corrected means; judge all errors together. Raises as `predict`, `UnfitRecording`."""
     params = resolve(params, context)
     site = params.site(context)
-    plan = recorded_alignments(recordings, context.unit, site, _table(params))
+    plan = recorded_alignments(recordings, context.unit, site, params.table(site))
     expected = expected_errors(plan)
     found = found_attitudes(recordings, plan)
     errors = alignment_errors(found, plan)
@@ -166,16 +163,6 @@ def report(result: Result) -> Report:
         pictures.alignments_table(result.alignments),
     )
     return Report(f"{result.basis}. {pictures.sentence(result.angles[0], result.thesis)}", sections)
-
-
-def _table(params: Params) -> TableUncertainty:
-    p = params
-    return TableUncertainty(
-        p.orthogonality_sd_arcsec or 0.0,
-        p.pointing_sd_arcsec or 0.0,
-        p.level_sd_arcsec or 0.0,
-        p.azimuth_sd_arcsec or 0.0,
-    )
 
 
 def _predicted(angle: int, expected: ExpectedErrors) -> PredictedUncertainty:

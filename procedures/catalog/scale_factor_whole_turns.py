@@ -3,7 +3,7 @@
 Each axis of the unit in turn points upwards, along the table's outer axis, and the table makes n whole turns forth and
 n back at each of several rates while the unit is recorded. The turned angle is known to an arcsecond out of millions,
 the Earth's rate and the bias cancel between forth and back: so scale factors come out to a part in a million, where the
-Earth's rate alone leaves some hundred (methods.md, Errata), with asymmetry, nonlinearity and misalignments.
+Earth's rate alone leaves some hundred, with asymmetry, nonlinearity and misalignments.
 The outer axis must turn without end. The accelerometers are recorded but not judged.
 """
 
@@ -41,7 +41,7 @@ ACCELERATION_SHARE = 0.9
 
 
 class Limits(Parameters):
-    """Requirements on the measurement (issue 6) and on the unit (ours: the thesis's limit on the scale factor, 4.3)."""
+    """Requirements, ours: on the measurement, and on the unit by the limit on the scale factor of thesis 4.3."""
 
     scale_factor_3_sigma_ppm: float = Field(1.0, gt=0.0, le=1e6, description="three standard uncertainties")
     asymmetry_ppm: float = Field(10.0, gt=0.0, le=1e6)
@@ -166,9 +166,7 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
 def report(result: Result) -> Report:
     """Coefficients, scale factor over the rates, checks."""
     found = result.gyro
-    return Report(
-        sections=(pictures.coefficient_table(found), *pictures.rate_figures(found), pictures.rate_table(found))
-    )
+    return Report(sections=(pictures.turns_table(found), *pictures.rate_figures(found), pictures.rate_table(found)))
 
 
 def _program(params: Params) -> TurnProgram:
@@ -212,7 +210,7 @@ def _warnings(params: Params, plan: TurnPlan) -> tuple[str, ...]:
 
 def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
     limits, ppm = params.limits, units.PPM
-    of_scale = Limit("ppm", maximum=limits.scale_factor_3_sigma_ppm, source="issue 6")
+    of_scale = Limit("ppm", maximum=limits.scale_factor_3_sigma_ppm, source="ours")
     maxima = {
         "asymmetry": ("asymmetry", limits.asymmetry_ppm),
         "quadratic": ("nonlinearity, quadratic", limits.nonlinearity_ppm),

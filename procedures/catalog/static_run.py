@@ -21,8 +21,9 @@ from procedures.core.recording import TRIADS, Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
-from procedures.launches import NoiseParameters, NoiseResult, analyse_launches, noise_report
+from procedures.launches import NoiseParameters, NoiseResult, analyse_launches
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
+from procedures.reports.launch import noise_report
 
 DWELL_STEP_S = 5.0
 """The averaging time is rounded up to whole steps of this (thesis 4.1.3: 55 and 65 s gave 70 s)."""
@@ -108,7 +109,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 def report(result: Result) -> Report:
     """Tables 4.1 and 4.2 of the thesis, and the plots behind them."""
-    return noise_report(result)
+    return noise_report(result.launches, result.channels, result.averaging_time_s)
 
 
 def learns(result: Result, unit: Unit, origin: str) -> Unit:

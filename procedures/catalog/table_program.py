@@ -13,7 +13,7 @@ from pydantic import Field
 from procedures import steps
 from procedures.analysis.calibration.station_plan import move_time_s, windows
 from procedures.analysis.table_program.dialect import DELAY_MAX_S, Dwell, read_program, refusal
-from procedures.analysis.table_program.recorded import DwellRecord, channel_noise, dwell_records, mean_sd
+from procedures.analysis.table_program.recorded import DwellRecord, dwell_records, mean_sd
 from procedures.analysis.table_program.writing import THESIS_POSITIONS, dwells_at, write_program
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -42,7 +42,7 @@ class Params(Parameters):
         None,
         max_length=50_000,
         description="text: ':mode:position all', ':demand:position 1,deg; p 2,deg; p 3,deg', 'delay s', '% comment'; "
-        "axis 1 outer, 2 middle, 3 inner",
+        "axis 1 inner, 2 middle, 3 outer",
     )
     positions: tuple[tuple[Angle, Angle, Angle, Delay], ...] | None = Field(
         None,
@@ -102,7 +102,7 @@ def predict(params: Params, context: Context) -> Prediction:
     found: list[PredictedUncertainty] = []
     unknown: list[str] = []
     for channel in context.unit.channels:
-        noise = None if channel.rate_unit == "count" else channel_noise(context.unit, channel.name)
+        noise = context.unit.channel_noise(channel)
         if noise is None:
             unknown.append(channel.name)
             continue
@@ -175,10 +175,7 @@ def _used_s(dwell: Dwell, at: TableAngles, params: Params) -> float:
     """What of a delay is gone before the recording: the least time to move, and the settling [s]."""
     if params.axis_motion is None:
         raise BadParameter("axis_motion", None, "resolve the parameters first: how fast the axes move the bench says")
-    to = dwell.angles
-    turns = (to.outer_deg - at.outer_deg, to.middle_deg - at.middle_deg, to.inner_deg - at.inner_deg)
-    moving = max(move_time_s(turn, *axis) for turn, axis in zip(turns, params.axis_motion, strict=True))
-    return moving + params.settle_s
+    return move_time_s(at, dwell.angles, params.axis_motion) + params.settle_s
 
 
 def _recorded_s(dwell: Dwell, used_s: float) -> float:
@@ -206,7 +203,7 @@ def _unknown(channels: Sequence[str]) -> str:
 PROCEDURE = Procedure(
     "table_program",
     "Program of table positions",
-    "1.0.0",
+    "2.0.0",
     Params,
     Result,
     resolve,

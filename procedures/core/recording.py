@@ -8,18 +8,19 @@ divided by the sample period.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from procedures.core.arrays import Array
-from procedures.core.errors import MissingChannel
+from procedures.core.errors import MissingChannel, UnfitRecording
 from procedures.core.table_angles import TableAngles
 from procedures.core.temperature_profile import TemperatureProfile
 from procedures.core.turn import Turn
 
 RawArray = NDArray[np.int32] | NDArray[np.float64]
+V = TypeVar("V", float, Array)
 
 AXES = ("x", "y", "z")
 GYRO = tuple(f"gyro_{axis}" for axis in AXES)
@@ -74,6 +75,37 @@ class Channel:
     def rate_unit(self) -> str:
         """Unit of the channel once an increment is divided by the sample period."""
         return {"rad": "rad/s", "m/s": "m/s^2", "count": "count"}.get(self.unit, self.unit)
+
+    def value(self, raw: V) -> V:
+        """``scale·(raw − offset)`` in the channel's `unit`, of a number or of an array."""
+        return (raw - self.offset) * self.scale
+
+
+@dataclass(frozen=True)
+class NominalScale:
+    """Conversion of the raw samples of some channels to nominal rates: ``gain·(raw − offset)``, each in `rate_unit`."""
+
+    gain: Array
+    """The channels' scales, times the sample rate where a channel gives increments, (channels,)."""
+    offset: Array
+    """(channels,)"""
+
+    @classmethod
+    def of(cls, channels: Sequence[Channel], rate_hz: float) -> "NominalScale":
+        """The conversion of these channels at a sample rate [Hz]."""
+        per_second = (rate_hz if c.quantity in INCREMENTS else 1.0 for c in channels)
+        gain = np.array([c.scale * factor for c, factor in zip(channels, per_second, strict=True)])
+        return cls(gain, np.array([c.offset for c in channels]))
+
+    def rates(self, raw: Array) -> Array:
+        """Nominal rates of raw values (…, channels)."""
+        return (raw - self.offset) * self.gain
+
+    def convert_rows(self, rows: Array) -> None:
+        """The same in place for raw values channel by channel, (channels, n)."""
+        if np.any(self.offset):
+            rows -= self.offset[:, None]
+        rows *= self.gain[:, None]
 
 
 @dataclass(frozen=True)
@@ -133,6 +165,10 @@ class RecordingInfo:
                 return index
         raise MissingChannel(name, tuple(c.name for c in self.channels))
 
+    def nominal_scale(self, names: Sequence[str]) -> NominalScale:
+        """How raw samples of some channels become nominal rates. Raises `MissingChannel`."""
+        return NominalScale.of([self.channels[self.column(name)] for name in names], self.rate_hz)
+
 
 class Recording(Protocol):
     """Samples that can be read again and again, block by block."""
@@ -147,7 +183,7 @@ class Recording(Protocol):
 
 @dataclass(frozen=True)
 class MemoryRecording:
-    """A recording held in memory: for tests, and for short stretches cut out of a longer one."""
+    """A recording held in memory: for tests and for work at a prompt; the service reads its own from storage."""
 
     info: RecordingInfo
     raw: RawArray = field(repr=False)
@@ -159,13 +195,21 @@ class MemoryRecording:
 def rates(recording: Recording, names: Sequence[str]) -> Array:
     """All samples of some channels as nominal rates, shape (n, len(names)), in each channel's `rate_unit`.
 
-    ``scale·(raw − offset)``, times the sample rate where the channel gives increments. Raises `MissingChannel`.
+    Raises `MissingChannel`.
     """
-    info = recording.info
-    columns = [info.column(name) for name in names]
+    columns = [recording.info.column(name) for name in names]
     raw = np.concatenate([np.asarray(block)[:, columns] for block in recording.blocks()] or [np.empty((0, len(names)))])
-    channels = [info.channels[c] for c in columns]
-    per_second = np.array([info.rate_hz if c.quantity in INCREMENTS else 1.0 for c in channels])
-    scale = np.array([c.scale for c in channels]) * per_second
-    offset = np.array([c.offset for c in channels])
-    return (raw.astype(np.float64) - offset) * scale
+    return recording.info.nominal_scale(names).rates(raw.astype(np.float64))
+
+
+def require_finite(info: RecordingInfo, names: Sequence[str], samples: Array) -> None:
+    """Refuse samples (n, channels) that are not numbers. Raises `UnfitRecording` naming the channel."""
+    bad = np.flatnonzero(~np.all(np.isfinite(samples), axis=0))
+    if bad.size:
+        raise UnfitRecording(f"recording {info.id}: channel {names[bad[0]]} holds samples that are not numbers")
+
+
+def require_complete(info: RecordingInfo, seen: int) -> None:
+    """Refuse a recording whose blocks held another number of samples than it announces. Raises `UnfitRecording`."""
+    if seen != info.count or not seen:
+        raise UnfitRecording(f"recording {info.id}: {seen} samples where {info.count} are announced")

@@ -2,10 +2,14 @@
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from procedures.core.arrays import Array
 from procedures.core.converter import ConverterTriad
+from procedures.core.errors import DomainError
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.noise import NoiseCoefficients
-from procedures.core.recording import Channel
+from procedures.core.recording import TRIADS, Channel
 from procedures.core.thermal_correction import ThermalCorrection
 from procedures.core.unit_correction import CorrectionKind
 
@@ -24,6 +28,14 @@ class TriadRecord:
     """Relative, dimensionless."""
     noise_origin: str = "data sheet"
     """Where the coefficients come from: a data sheet, or the result that found them."""
+
+    def launch_covariance(self, outputs: Array) -> Array:
+        """How much outputs K·v (n, 3) of one launch depart from the unit's mean, for each channel, (3, n, n).
+
+        ``σ_b² + σ_s²·a_i·a_j``: the bias is common to all of them, and a scale factor carries its whole row of K.
+        """
+        relative = self.scale_factor_run_to_run_sd**2 * np.einsum("ic,jc->cij", outputs, outputs)
+        return self.bias_run_to_run_sd**2 + relative
 
 
 @dataclass(frozen=True)
@@ -59,3 +71,25 @@ class Unit:
     def triad(self, triad: str) -> TriadRecord | None:
         """The record of a triad by name."""
         return {"gyro": self.gyro, "accelerometer": self.accelerometer}[triad]
+
+    def channel_noise(self, channel: Channel) -> NoiseCoefficients | None:
+        """Noise of a triad's channel; None where it is not known, as for a channel in counts: the record is in SI."""
+        for triad, names in TRIADS.items():
+            record = self.triad(triad)
+            if channel.name in names and record is not None and channel.rate_unit != "count":
+                return record.noise[names.index(channel.name)]
+        return None
+
+    def known_matrix(self, triad: str) -> Array | None:
+        """K (3, 3) of the current calibration, None without one; of counts neither, for a plan is in SI."""
+        calibration = self.calibration(triad)
+        return None if calibration is None or calibration.output_unit == "count" else calibration.matrix_array
+
+    def required_calibration(self, triad: str, purpose: str) -> TriadCalibration:
+        """The current calibration of a triad for a purpose ("verify"). Raises `DomainError` that says what to do."""
+        calibration = self.calibration(triad)
+        if calibration is None:
+            raise DomainError(
+                f"unit {self.serial} has no calibration of its {triad} triad to {purpose}: calibrate it first"
+            )
+        return calibration

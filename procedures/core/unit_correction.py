@@ -11,7 +11,6 @@ from procedures.core.errors import BadParameter
 from procedures.core.thermal_correction import ThermalCorrection
 
 CorrectionKind = Literal["thermal", "converter"]
-CORRECTION_KINDS: tuple[CorrectionKind, ...] = ("thermal", "converter")
 
 
 @dataclass(frozen=True)

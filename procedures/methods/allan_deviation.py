@@ -150,7 +150,7 @@ def _deviations(
     for block in recording.blocks():
         for column, channel, stream in zip(columns, channels, streams, strict=True):
             with _naming(info.id, channel.name):
-                stream.add((np.asarray(block)[:, column].astype(np.float64) - channel.offset) * channel.scale)
+                stream.add(channel.value(np.asarray(block)[:, column].astype(np.float64)))
     return [_finished(stream, info.id, name) for stream, name in zip(streams, names, strict=True)]
 
 

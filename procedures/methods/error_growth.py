@@ -25,6 +25,7 @@ from procedures.core.noise import NoiseCoefficients
 from procedures.core.report import Report, Table
 from procedures.core.unit import Unit
 from procedures.procedure import Evidence, Method, Outcome, Parameters
+from procedures.reports import growth
 
 TILT_MAX_RAD = 0.01
 HEADING_MAX_RAD = 0.1
@@ -144,7 +145,7 @@ def report(result: Result) -> Report:
     rows = tuple((s.source, s.after_1h_m, s.at_end_m) for s in result.shares)
     end = f"after {result.time_s[-1] / units.HOUR:g} h, m"
     table = Table("95 % radius of the position by source", ("source", "after 1 h, m", end), rows, result.basis)
-    return Report(result.sentence, (table, *told.figures(result.time_s, result.curves)))
+    return Report(result.sentence, (table, *growth.figures(result.time_s, result.curves)))
 
 
 def _errors(

@@ -10,13 +10,13 @@ import numpy as np
 from pydantic import Field
 from scipy.linalg import block_diag
 
-from procedures.analysis.calibration.station_means import StationMeans, station_means
-from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.station_means import StationMeans, require_unit_of, station_means
+from procedures.analysis.calibration.station_noise import outputs_covariance
 from procedures.analysis.navigation.alignment import (
     InitialAttitude,
-    azimuth_error,
     initial_attitude,
     require_alignable,
+    thesis_prediction,
 )
 from procedures.analysis.navigation.instrument_errors import calibrated_triad
 from procedures.core import units
@@ -26,6 +26,7 @@ from procedures.core.imu_model import TriadCalibration, correct
 from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import RecordingInfo
 from procedures.core.report import Report, Table
+from procedures.core.site import Site
 from procedures.core.unit import Unit
 from procedures.procedure import Evidence, Method, Outcome, Parameters
 
@@ -132,14 +133,11 @@ def _aligned(
     covariances: list[Array] = []
     for triad in TRIADS:
         calibration, mean = calibrations[triad], means[triad]
-        if mean.output_unit != calibration.output_unit:
-            raise UnfitRecording(
-                f"the {triad} channels are in {mean.output_unit}, the calibration is for {calibration.output_unit}"
-            )
-        record = unit.triad(triad) if unit and mean.output_unit != "count" else None
+        require_unit_of(calibration, mean)
+        record = unit.triad(triad) if unit else None
         vector = correct(mean.outputs[i], calibration)
         errors = calibrated_triad(calibration, record, vector)
-        known = triad_covariance(record, window)
+        known = outputs_covariance(record, mean.output_unit, window)
         variance = mean.mean_sd[i] ** 2 if known is None else known[:, 0, 0]
         inverse = np.linalg.inv(calibration.matrix_array)
         vectors.append(vector)
@@ -157,7 +155,8 @@ def _told(
 ) -> AlignedAttitude:
     window = means["gyro"].windows[i]
     duration = float(window[1] - window[0])
-    predicted = _predicted(params, unit, duration)
+    site = Site(params.latitude_deg, params.gravity_m_s2, earth_rate_rad_s=params.earth_rate_rad_s)
+    predicted = None if unit is None else thesis_prediction(unit, site, params.base_turn_arcsec, duration)
     heading, pitch, roll = (attitude.angles_rad / units.DEG).tolist()
     sds = (np.sqrt(np.diagonal(attitude.covariance)) / units.DEG).tolist()
     gravity, rate, upward = attitude.magnitude_errors.tolist()
@@ -171,29 +170,11 @@ def _told(
         sds[1],
         sds[2],
         duration,
-        predicted[0],
-        predicted[1],
+        None if predicted is None else predicted.added_deg,
+        None if predicted is None else predicted.independent_deg,
         (gravity, rate, upward),
         (float(np.hypot(gravity_sd, params.gravity_sd_m_s2)), rate_sd, upward_sd),
     )
-
-
-def _predicted(params: Params, unit: Unit | None, duration_s: float) -> tuple[float | None, float | None]:
-    """Thesis 1.1 with the noisiest channel of each triad, since any of them may look east."""
-    gyro, accelerometer = (None, None) if unit is None else (unit.gyro, unit.accelerometer)
-    if gyro is None or accelerometer is None:
-        return None, None
-    added, independent = azimuth_error(
-        params.latitude_deg,
-        params.gravity_m_s2,
-        max(n.bias_instability for n in accelerometer.noise),
-        max(n.bias_instability for n in gyro.noise),
-        max(n.random_walk for n in gyro.noise),
-        params.base_turn_arcsec * units.ARCSEC,
-        duration_s,
-        params.earth_rate_rad_s,
-    )
-    return added / units.DEG, independent / units.DEG
 
 
 def _checks(a: AlignedAttitude, params: Params) -> tuple[Check, ...]:

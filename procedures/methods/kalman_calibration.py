@@ -10,16 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydantic import Field
-from scipy.special import chdtrc
 
+from procedures.analysis.least_squares.chi_square import tail_probability
 from procedures.analysis.recursive_bias import window_noise
 from procedures.analysis.recursive_bias.kalman import RecursiveBias, white_covariance
 from procedures.analysis.recursive_bias.window_noise import WindowMeans
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import Check, Limit, check, verdict
-from procedures.core.noise import NoiseCoefficients
-from procedures.core.recording import ACCELEROMETER, GYRO, TRIADS, Recording
+from procedures.core.recording import ACCELEROMETER, GYRO, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
 from procedures.procedure import Evidence, Method, Outcome, Parameters
@@ -133,7 +132,7 @@ def _of_channel(
     info = recording.info
     rate_unit = info.channels[info.column(name)].rate_unit
     prior, target = _asked(params, rate_unit)
-    noise = window_noise.known_noise(_recorded(unit, name)) if rate_unit != "count" else None
+    noise = window_noise.known_noise(unit.channel_noise(info.channels[info.column(name)]) if unit else None)
     z = taken.means[:, column] - params.known_input.get(name, 0.0)
     covariance = (
         window_noise.observed_covariance(z)
@@ -162,21 +161,12 @@ def _of_channel(
         target_sd=target,
         enough_after_s=None if enough is None else enough * taken.length_s,
         dwell_needed_s=needed,
-        innovations_p_value=float(chdtrc(len(bias.innovations), float(bias.innovations @ bias.innovations))),
+        innovations_p_value=tail_probability(float(bias.innovations @ bias.innovations), len(bias.innovations)),
         slow_noise_p_value=window_noise.slow_noise_p(z, covariance),
         time_s=tuple((taken.length_s * np.arange(1, len(z) + 1)).tolist()),
         estimates=tuple(estimates),
         sds=tuple(np.sqrt(bias.variances).tolist()),
     )
-
-
-def _recorded(unit: Unit | None, name: str) -> NoiseCoefficients | None:
-    """The record's coefficients of a channel of a triad."""
-    for triad, names in TRIADS.items():
-        record = unit.triad(triad) if unit else None
-        if record is not None and name in names:
-            return record.noise[names.index(name)]
-    return None
 
 
 def _asked(params: Params, rate_unit: str) -> tuple[float | None, float | None]:

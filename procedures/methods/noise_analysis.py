@@ -5,8 +5,9 @@ Channels may be angle or velocity increments, rates or specific forces, in SI or
 
 from procedures.core.report import Report
 from procedures.core.unit import Unit
-from procedures.launches import NoiseParameters, NoiseResult, analyse_launches, noise_report
+from procedures.launches import NoiseParameters, NoiseResult, analyse_launches
 from procedures.procedure import Evidence, Method
+from procedures.reports.launch import noise_report
 
 
 class Params(NoiseParameters):
@@ -24,7 +25,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 def report(result: Result) -> Report:
     """Tables and plots of every channel."""
-    return noise_report(result)
+    return noise_report(result.launches, result.channels, result.averaging_time_s)
 
 
 METHOD = Method("noise_analysis", "Noise of recordings at rest", "1.0.0", Params, Result, analyse, report)

@@ -12,15 +12,15 @@ from pydantic import Field, model_validator
 from procedures.analysis.calibration.reference import INPUT_UNITS
 from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, fit_scalar, nominal_start, start_from_data
 from procedures.analysis.calibration.station_means import station_means
-from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.station_noise import outputs_covariance
 from procedures.analysis.calibration.still import StillSettings, pose_means, still_stretches
-from procedures.analysis.calibration.triad_analysis import noise_of_means
+from procedures.analysis.calibration.triad_analysis import noise_of_means, scatter_covariance
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Check, Limit, check, verdict
-from procedures.core.recording import TRIADS, Recording, rates
+from procedures.core.recording import TRIADS, Recording, rates, require_finite
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
 from procedures.procedure import Evidence, Method, Outcome, Parameters
@@ -129,8 +129,7 @@ def _poses_of_one(recording: Recording, params: Params, unit: Unit | None) -> tu
     info, s = recording.info, params.still
     names = TRIADS[params.triad]
     samples = rates(recording, names)
-    if not np.all(np.isfinite(samples)):
-        raise UnfitRecording(f"recording {info.id} holds samples of the {params.triad} that are not numbers")
+    require_finite(info, names, samples)
     settings = StillSettings(s.initial_s, s.window_s, s.factor, s.shortest_s, s.margin_s)
     stretches = still_stretches(samples, info.rate_hz, settings)
     if not stretches:
@@ -138,12 +137,10 @@ def _poses_of_one(recording: Recording, params: Params, unit: Unit | None) -> tu
     outputs, sd = pose_means(samples, stretches)
     output_unit = info.channels[info.column(names[0])].rate_unit
     windows = np.array([[p.start, p.stop] for p in stretches]) / info.rate_hz + info.start_s
-    record = unit.triad(params.triad) if unit and output_unit != "count" else None
-    known = triad_covariance(record, windows)
+    known = outputs_covariance(unit.triad(params.triad) if unit else None, output_unit, windows)
     if known is not None:
         return outputs, known, True, output_unit
-    sd = np.maximum(np.maximum(sd, np.median(sd, axis=0)), 1e-9 * float(np.abs(outputs).max()))
-    return outputs, np.array([np.diag(column**2) for column in sd.T]), False, output_unit
+    return outputs, scatter_covariance(outputs, np.maximum(sd, np.median(sd, axis=0))), False, output_unit
 
 
 def _result(fit: ScalarFit, params: Params, output_unit: str) -> Result:

@@ -15,29 +15,25 @@ WEIGHTS = {"noise_and_table": "the noise and the table's declared accuracy", "no
 SYMBOL = {"gyro": "|ω|", "accelerometer": "|g|"}
 
 
-def coefficient_table(summary: TriadSummary) -> Table:
+def triad_table(summary: TriadSummary) -> Table:
+    """Coefficients of a triad from stations at rest."""
+    note = f"U = b + K·v. Condition of the design {summary.condition:.3g}. Weighted by {WEIGHTS[summary.weighting]}."
+    return coefficient_table(f"Coefficients of the {summary.calibration.triad} triad", summary.coefficients, note)
+
+
+def coefficient_table(title: str, coefficients: Sequence[Coefficient], note: str) -> Table:
     """Estimate ± standard uncertainty in the units people read; scale factors as departures from one [ppm]."""
-    triad = summary.calibration.triad
-    sources = tuple(summary.coefficients[0].from_table_source)
-    rows = tuple(_coefficient_row(c, sources) for c in summary.coefficients)
-    return Table(
-        f"Coefficients of the {triad} triad",
-        ("coefficient", "unit", "estimate", "± standard uncertainty", "of noise", "of table", *sources),
-        rows,
-        f"U = b + K·v. Condition of the design {summary.condition:.3g}. Weighted by {WEIGHTS[summary.weighting]}.",
-    )
+    sources = tuple(coefficients[0].from_table_source)
+    columns = ("coefficient", "unit", "estimate", "± standard uncertainty", "of noise", "of table", *sources)
+    return Table(title, columns, tuple(_coefficient_row(c, sources) for c in coefficients), note)
 
 
 def _coefficient_row(c: Coefficient, sources: Sequence[str]) -> tuple[str | float, ...]:
     name = c.name.split(".")[1]
-    diagonal = name in ("K11", "K22", "K33")
-    if c.unit == "1":
-        unit, size, zero = "ppm", units.PPM, 1.0 if diagonal else 0.0
-    else:
-        (unit, size), zero = units.DISPLAY.get(c.unit, (c.unit, 1.0)), 0.0
+    zero = 1.0 if name in ("K11", "K22", "K33") and c.unit == "1" else 0.0
+    unit, size = ("ppm", units.PPM) if c.unit == "1" else units.DISPLAY.get(c.unit, (c.unit, 1.0))
     parts = (c.standard_uncertainty, c.from_noise, c.from_table, *(c.from_table_source[s] for s in sources))
-    label = f"{name} − 1" if zero else name
-    return (label, unit, (c.estimate - zero) / size, *(part / size for part in parts))
+    return (f"{name} − 1" if zero else name, unit, (c.estimate - zero) / size, *(part / size for part in parts))
 
 
 def triad_figures(t: TriadSummary) -> tuple[Figure, ...]:

@@ -6,7 +6,7 @@ from math import sqrt
 from procedures.analysis.allan.read_off import LINES
 from procedures.analysis.launch.results import PROCESSES, ChannelNoise, Coefficient, LaunchNoise, Reading, Stage
 from procedures.analysis.launch.summary import ChannelSummary
-from procedures.core.report import Cell, Figure, Series, Table
+from procedures.core.report import Cell, Figure, Report, Series, Table
 from procedures.core.units import DEVIATION_DISPLAY, HOUR, NOISE_DISPLAY
 
 TITLES = {
@@ -16,6 +16,33 @@ TITLES = {
     "rate_random_walk": "rate random walk K",
     "rate_ramp": "rate ramp R",
 }
+
+
+def noise_report(
+    launches: Sequence[LaunchNoise], channels: Sequence[ChannelSummary], averaging_time_s: float | None
+) -> Report:
+    """Tables 4.1 and 4.2, the three ways, every step's effect, and the plots of every channel."""
+    doubts = disagreements(launches)
+    tables = [
+        side_by_side(channels, launches),
+        *((doubts,) if doubts else ()),
+        averaging_table(channels, launches),
+        steps_table(launches),
+        launch_means_table(channels, launches),
+        *(three_ways(launch) for launch in launches),
+    ]
+    figures = [figure for s in channels for figure in channel_figures(s.channel, launches)]
+    return Report(_summary(launches, averaging_time_s), (*tables, *figures))
+
+
+def _summary(launches: Sequence[LaunchNoise], averaging_time_s: float | None) -> str:
+    hours = sum(launch.duration_s for launch in launches) / HOUR
+    dwell = (
+        "Quantization rules at no averaging time."
+        if averaging_time_s is None
+        else f"Quantization falls below the rest of the noise after {averaging_time_s:.0f} s at the latest."
+    )
+    return f"{len(launches)} launches at rest, {hours:.3g} h in all. {dwell}"
 
 
 def side_by_side(summaries: Sequence[ChannelSummary], launches: Sequence[LaunchNoise]) -> Table:

@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
+from procedures.analysis.navigation.alignment import ThesisPrediction
 from procedures.analysis.repeated_alignment.expected import ANGLES, CALIBRATION, LAUNCH, NOISE, TABLE
-from procedures.analysis.repeated_alignment.observed import Alignment, AngleErrors, ThesisPrediction
+from procedures.analysis.repeated_alignment.observed import Alignment, AngleErrors
 from procedures.core.report import Figure, Series, Table
 
 

@@ -1,30 +1,19 @@
 """Tables and figures of whole turns."""
 
-from procedures.analysis.calibration.summary import Coefficient
 from procedures.analysis.turns.summary import RatePoint, WholeTurns
 from procedures.core import units
 from procedures.core.recording import AXES
 from procedures.core.report import Figure, Series, Table
+from procedures.reports.calibration import coefficient_table
 
 
-def coefficient_table(found: WholeTurns) -> Table:
-    """Estimate ± standard uncertainty in the units people read; scale factors as departures from one [ppm]."""
-    sources = tuple(found.coefficients[0].from_table_source)
-    return Table(
-        "Coefficients of the gyro triad from whole turns",
-        ("coefficient", "unit", "estimate", "± standard uncertainty", "of noise", "of table", *sources),
-        tuple(_row(c, sources) for c in found.coefficients),
+def turns_table(found: WholeTurns) -> Table:
+    """Coefficients of the gyro triad, the terms beyond the linear ones included."""
+    note = (
         f"U = b + a + s/2·|a| + q·a²/a₀ + c·a³/a₀², a = K·ω, a₀ = {found.reference_rate_deg_s:g} deg/s. "
-        f"Condition of the design {found.condition:.3g}.",
+        f"Condition of the design {found.condition:.3g}."
     )
-
-
-def _row(c: Coefficient, sources: tuple[str, ...]) -> tuple[str | float, ...]:
-    name = c.name.split(".")[1]
-    zero = 1.0 if name in ("K11", "K22", "K33") else 0.0
-    unit, size = ("ppm", units.PPM) if c.unit == "1" else units.DISPLAY[c.unit]
-    parts = (c.standard_uncertainty, c.from_noise, c.from_table, *(c.from_table_source[s] for s in sources))
-    return (f"{name} − 1" if zero else name, unit, (c.estimate - zero) / size, *(part / size for part in parts))
+    return coefficient_table("Coefficients of the gyro triad from whole turns", found.coefficients, note)
 
 
 def rate_table(found: WholeTurns) -> Table:

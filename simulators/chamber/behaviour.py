@@ -41,7 +41,7 @@ class Response:
     gyro_added_rad_s: Array
 
     def accelerometer_output(self, bias: Array, through: Array) -> Array:
-        """U (n, 3) of b (3,) and a, (3,) or (n, 3) [m/s²]."""
+        """Outputs U (n, 3) of b (3,) and a, (3,) or (n, 3) [m/s²], in closed form: for tests of what judges a unit."""
         inner = bias + self.sensor_gain * through + self.sensor_added_m_s2
         return self.converter_gain * inner + self.converter_added_m_s2
 

@@ -102,7 +102,7 @@ class SimChamber:
             self.plant.switch_off()
 
     def reset_limiter(self) -> None:
-        """What a person does at the chamber itself after an over-temperature; nothing in the service can."""
+        """Reset by hand after an over-temperature: for tests, in a person's place; nothing in the service can do it."""
         self.plant.state.tripped = False
         self.plant.switch_off()
 

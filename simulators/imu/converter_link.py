@@ -22,7 +22,7 @@ Codes = Callable[[int, Array, Array], Array]
 """(channel, currents (n,) [mA], board temperatures (n,) [°C]) -> codes a cycle (n,), not yet whole."""
 CURRENT_CHANNELS = tuple(Channel(f"converter_{axis}", Quantity.SPECIFIC_FORCE, "count") for axis in AXES)
 FULL_SCALE = 2**15 - 1
-"""The converter has 16 bits (facts: BPS); beyond them it stays at the end."""
+"""The converter has 16 bits; beyond them it stays at the end."""
 
 
 class ConverterLink:

@@ -161,7 +161,7 @@ class ConverterTruth:
     """One channel of the signal converter: ``code = K0·Fc(c)·I + N0 + Fs(c)`` a cycle (thesis 3.8–3.13), c as above."""
 
     codes_a_ma: float = 2184.0
-    """K0: 16 bits over ±15 mA (facts: BPS) [1/mA]."""
+    """K0: 16 bits over ±15 mA [1/mA]."""
     zero_code: float = 12.0
     scale_drift: tuple[float, float] = (1.5e-5, 2.0e-8)
     """Fc − 1: [1/°C] and [1/°C²]. Ours: a voltage reference of 15 ppm/°C."""

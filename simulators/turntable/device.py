@@ -127,7 +127,7 @@ class SimTurntable:
         return not self.locked
 
     def read_rates_deg_s(self) -> Array:
-        """Rates of the axes, (3,): for tests and displays."""
+        """Rates of the axes [deg/s], (3,): for tests; a procedure has no use for them."""
         return self._plant.rates_rad_s / units.DEG
 
     async def make_safe(self) -> None:
@@ -201,7 +201,7 @@ class SimTurntable:
         return rot_enu_b if self._lean is None else rot_enu_b @ small_turn(self._lean[None])
 
     def rest_truth(self) -> tuple[Array, Array]:
-        """True angular rate [rad/s] and specific force [m/s²] in the unit's axes while locked, each (3,)."""
+        """True angular rate [rad/s] and specific force [m/s²] in the unit's axes while locked, each (3,): for tests."""
         return self._rest[0][0], self._rest[1][0]
 
     def advance(self, ticks: int) -> Motion:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from procedures.analysis.allan import band
-from procedures.analysis.allan.band import Band, BandStream, SampledStream
+from procedures.analysis.allan.band import Band, BandStream
 from procedures.core.errors import UnfitRecording
 
 
@@ -59,22 +59,6 @@ def test_a_long_series_keeps_the_band(monkeypatch: pytest.MonkeyPatch) -> None:
         assert (ours.least[i], ours.mean[i], ours.greatest[i]) == pytest.approx(
             (every.min(), every.mean(), every.max()), rel=0.028
         )
-
-
-def test_random_pairs_are_within_their_scatter_of_the_mean() -> None:
-    """4000 pairs of a white rate: relative standard deviation at most 1/√(2·4000·⅔), six of them."""
-    y = np.random.default_rng(5).normal(size=40_000)
-    sampled = SampledStream(10.0, len(y), np.random.default_rng(6), sizes=[1, 8, 50], intervals=4000)
-    for block in np.array_split(y, 5):
-        sampled.add(block)
-    assert sampled.finish() == pytest.approx(1 / np.sqrt([1, 8, 50]), rel=0.08)
-
-
-def test_the_papers_own_rule_is_the_standard_deviation_of_means() -> None:
-    y = 5.0 + np.random.default_rng(5).normal(size=40_000)
-    sampled = SampledStream(10.0, len(y), np.random.default_rng(6), sizes=[1, 8, 50], intervals=4000, pairs=False)
-    sampled.add(y)
-    assert sampled.finish() == pytest.approx(1 / np.sqrt([1, 8, 50]), rel=0.08)
 
 
 def test_gaps_and_constants_are_refused() -> None:

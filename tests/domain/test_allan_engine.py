@@ -18,7 +18,6 @@ from procedures.analysis.allan.statistic import (
     STATISTICS,
     Statistic,
     log_sizes,
-    sizes_of,
 )
 from procedures.core.errors import BadParameter, UnfitRecording
 
@@ -260,8 +259,6 @@ def test_what_cannot_be_analysed_is_refused() -> None:
         deviation(y, 1.0, confidence=1.0)
     with pytest.raises(BadParameter, match="one channel"):
         deviation(np.ones((50, 6)), 1.0)
-    with pytest.raises(BadParameter, match="sample period"):
-        sizes_of([0.001, 1.0], 400.0)
     stream = DeviationStream(1.0, 200)
     stream.add(y)
     with pytest.raises(UnfitRecording, match="100 samples came where 200"):

@@ -32,6 +32,7 @@ VERIFICATION = catalog.discover()["verification_9_orientations"]
 OURS = (
     "calibration_12_orientations",
     "verification_9_orientations",
+    "converter_bench",
     "no_operation",
     "initial_alignment",
     "scale_factor_whole_turns",

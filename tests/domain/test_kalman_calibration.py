@@ -67,7 +67,7 @@ def test_long_enough_says_the_same_before_and_during_the_dwell():
     assert wanted == 16  # 2/√16
     assert bias.enough_at(0.01) is None
     assert bias.sd == np.inf
-    reached = next(k for k in range(1, 101) if (bias.update(1.0), bias.long_enough(0.5))[1])
+    reached = next(k for k in range(1, 101) if (bias.update(1.0), bias.sd <= 0.5)[1])
     assert reached == wanted
     with pytest.raises(BadParameter, match="prior_variance"):
         RecursiveBias(white_covariance(1.0, 2), 0.0, 0.0)

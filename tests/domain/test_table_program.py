@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from procedures.analysis.table_program.dialect import DELAY_MAX_S, DWELLS_MAX, Dwell, read_program
+from procedures.analysis.table_program.dialect import AXES, DELAY_MAX_S, DWELLS_MAX, Dwell, read_program
 from procedures.analysis.table_program.writing import THESIS_POSITIONS, dwells_at, write_program
 from procedures.catalog import discover
 from procedures.core.errors import BadParameter, UnfitRecording
@@ -18,6 +18,7 @@ from procedures.core.limits import Verdict
 from procedures.core.recording import Channel, MemoryRecording, Quantity, Recording, RecordingInfo, Station
 from procedures.core.table_angles import TableAngles
 from procedures.procedure import Context
+from tests.domain.forward_model import turn
 
 PROCEDURE = discover()["table_program"]
 APPENDIX = """\
@@ -89,8 +90,15 @@ def moves(dwells: tuple[Dwell, ...]) -> list[list[float]]:
     return [[d.angles.outer_deg, d.angles.middle_deg, d.angles.inner_deg, d.delay_s] for d in dwells]
 
 
+def printed(dwells: tuple[Dwell, ...]) -> list[list[float]]:
+    """In the order of a program's axes 1, 2, 3."""
+    return [[d.angles.inner_deg, d.angles.middle_deg, d.angles.outer_deg, d.delay_s] for d in dwells]
+
+
 def test_the_appendix_is_read_as_it_is_printed():
     dwells = read_program(APPENDIX)
+    demands = re.findall(r"1, ?([-\d]+); p 2,([-\d]+); p 3,([-\d]+)\ndelay (\d+)", APPENDIX)
+    assert printed(dwells) == [[float(number) for number in demand] for demand in demands]
     assert moves(dwells) == [list(p) for p in THESIS_POSITIONS]
     assert len(dwells) == 16
     assert APPENDIX.split("\n")[dwells[6].line - 1] == "delay 60"
@@ -100,8 +108,32 @@ def test_the_appendix_is_read_as_it_is_printed():
 @pytest.mark.shared_data
 def test_the_appendix_holds_the_facts_moves(shared_data: Path):
     facts = json.loads((shared_data.parent / "facts" / "thesis.json").read_text())["appendix_table_program"]
-    assert moves(read_program(APPENDIX)) == facts["moves"]
-    assert facts["axes"] == {"1": "outer", "2": "middle", "3": "inner"}
+    assert printed(read_program(APPENDIX)) == facts["moves"]
+    assert facts["axes"] == AXES == {"1": "inner", "2": "middle", "3": "outer"}
+
+
+def test_the_appendix_is_a_calibration_only_with_its_axes_in_this_order():
+    """Twelve numbers of a triad from [1, v] at the fourteen rests, v in the unit's axes, by matrices written out here.
+
+    The outer axis is vertical, which is y of the unit at zero; the Earth's rate points north and up at 50°. With axes 1
+    and 3 swapped gravity has rank 3, because turning about the vertical does not change it.
+    """
+
+    def design(rows: list[list[float]], about_up: int, field: list[float]) -> np.ndarray:
+        found: list[np.ndarray] = []
+        for row in rows:
+            attitude = turn("y", row[about_up]) @ turn("z", row[1]) @ turn("x", row[2 - about_up])
+            found.append(np.array([1.0, *(attitude.T @ np.array(field))]))
+        return np.array(found)
+
+    rests = printed(read_program(APPENDIX))[1:-1]
+    assert len(rests) == 14
+    gravity, rate = [0.0, 1.0, 0.0], [np.cos(np.radians(50.0)), np.sin(np.radians(50.0)), 0.0]
+    for field, condition in ((gravity, 1.28), (rate, 1.35)):  # with columns scaled to unit length
+        rows = design(rests, 2, field)
+        assert np.linalg.matrix_rank(rows) == 4
+        assert np.linalg.cond(rows / np.linalg.norm(rows, axis=0)) == pytest.approx(condition, abs=0.005)
+    assert np.linalg.matrix_rank(design(rests, 0, gravity)) == 3
 
 
 angles = st.floats(-3600.0, 3600.0, allow_nan=False)
@@ -119,7 +151,7 @@ def test_axes_that_a_demand_does_not_name_stay_and_small_things_do_not_matter():
     program = (
         HOME + "  :DEMAND:Position  2, -90.5 ; P 1,+.5  % half\n\n:demand:position 3,7.\n\tDelay 1.5\ndelay 2 % on"
     )
-    assert moves(read_program(program)) == [[0, 0, 0, 10], [0.5, -90.5, 7, 1.5], [0.5, -90.5, 7, 2]]
+    assert printed(read_program(program)) == [[0, 0, 0, 10], [0.5, -90.5, 7, 1.5], [0.5, -90.5, 7, 2]]
 
 
 @pytest.mark.parametrize(
@@ -131,7 +163,7 @@ def test_axes_that_a_demand_does_not_name_stay_and_small_things_do_not_matter():
         ("% \x00", "printable text"),  # no database holds it, not even in a comment
         (":mode:position 1", "'all'"),
         (":mode:position", "'all'"),
-        (":demand:position", r"an axis, 1 \(outer\), 2 \(middle\) or 3 \(inner\), not ''"),
+        (":demand:position", r"an axis, 1 \(inner\), 2 \(middle\) or 3 \(outer\), not ''"),
         (":demand:position 4,10", "an axis, .* not '4'"),
         (":demand:position 1", "a comma and degrees after axis 1"),
         (":demand:position 1,ten", r"degrees of axis 1, within ±3600, not 'ten'"),
@@ -189,7 +221,7 @@ def test_a_delay_holds_moving_and_settling_as_on_the_controller(context: Context
     assert [s.angles for s in stations] == [TableAngles(*p[:3]) for p in THESIS_POSITIONS]
     assert [s.record_s for s in stations[:3]] == pytest.approx([10 - 2, 96.7, 60 - 4 - 2])  # 102 − 3.25 − 2 = 96.75
     assert [s.index for s in stations] == list(range(16))
-    assert stations[1].label == "line 8: outer=135 middle=90 inner=-9"
+    assert stations[1].label == "line 8: outer=-9 middle=90 inner=135"
     resting = planned(context, delay_from="rest")
     assert [s.record_s for s in resting] == [p[3] for p in THESIS_POSITIONS]
 
@@ -197,7 +229,7 @@ def test_a_delay_holds_moving_and_settling_as_on_the_controller(context: Context
 def test_positions_are_written_as_a_program(context: Context):
     params = PROCEDURE.resolve(PROCEDURE.params(positions=((10.0, 20.5, -30.0, 40.0),)), context)
     assert params.positions is None
-    assert ":demand:position 1,10; p 2,20.5; p 3,-30\ndelay 40\n" in params.program
+    assert ":demand:position 1,-30; p 2,20.5; p 3,10\ndelay 40\n" in params.program
     assert PROCEDURE.params.model_validate_json(params.model_dump_json()) == params
     assert PROCEDURE.resolve(params, context) == params
     with pytest.raises(BadParameter, match="not beside a program"):
@@ -241,7 +273,7 @@ def test_means_of_every_channel_with_what_is_known_of_their_noise(context: Conte
     assert (gyro.from_noise, temperature.from_noise) == (True, False)
     assert temperature.standard_uncertainty == pytest.approx(0.0, abs=1e-9)  # the ripple has no mean over a batch
     assert any("temperature" in w for w in result.warnings)
-    assert moves(read_program(result.program)) == [[0, 0, 0, 10], [90, 0, 0, 15]]
+    assert printed(read_program(result.program)) == [[0, 0, 0, 10], [90, 0, 0, 15]]
     assert PROCEDURE.result.model_validate_json(result.model_dump_json()) == result
     assert len(PROCEDURE.report(result).sections) == 3
     prediction = PROCEDURE.predict(params, context)

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from procedures.analysis.thermal.converter import converter_model, zero_and_scale
+from procedures.analysis.thermal.converter import zero_and_scale
 from procedures.analysis.thermal.normalised import fit_normalised
 from procedures.core.errors import BadParameter, Undetermined, UnfitRecording
 from simulators.chamber.behaviour import converter_codes
 from simulators.truth.thermal import UnitThermalTruth
+from tests.correction_samples import converter_model
 
 BOARD = np.arange(-40.0, 81.0, 10.0)
 

@@ -6,6 +6,7 @@ from scipy.signal import lfilter
 
 from procedures.analysis.thermal.regime import RegimeIndicator, RegimeSettings, regimes
 from procedures.core.errors import BadParameter, UnfitRecording
+from tests.validation.thermal_rig import switches
 
 SETTINGS = RegimeSettings()
 
@@ -46,7 +47,7 @@ def test_a_step_of_the_second_derivative_is_found_after_the_stated_delay(step_c_
     begin = 3000.0
     trace = regimes(20.0 + 0.5 * step_c_s2 * np.maximum(t - begin, 0.0) ** 2, 1.0)
     assert not trace.dynamic[2999]
-    found = t[trace.switches()[-1]] - begin
+    found = t[switches(trace)[-1]] - begin
     # One sample of rounding up and one by which a second difference is late.
     assert SETTINGS.onset_delay_s(step_c_s2) - 1.0 <= found <= SETTINGS.onset_delay_s(step_c_s2) + 2.0
 
@@ -66,7 +67,7 @@ def test_what_stays_between_the_two_thresholds_switches_nothing() -> None:
     size = 0.9 * SETTINGS.enter_c_s2 / (2 * np.pi / period) ** 2  # the filter takes 18 % off that, both ways
     quiet = np.where(t < 5000.0, 20.0, 20.0 + size * np.sin(2 * np.pi * (t - 5000.0) / period))
     trace = regimes(quiet, 1.0)
-    assert len(trace.switches()) == 1  # the one from the unknown beginning
+    assert len(switches(trace)) == 1  # the one from the unknown beginning
 
 
 def test_what_has_begun_ends_below_the_lower_threshold_only() -> None:
@@ -90,13 +91,13 @@ def test_a_long_ramp_is_dynamic_to_its_end_unless_the_thesis_s_rule_is_asked_for
     assert regimes(case, 1.0).dynamic[middle]
     assert not regimes(case, 1.0, literal).dynamic[middle]
     assert not regimes(case, 1.0).dynamic[-1]
-    assert len(regimes(case, 1.0).switches()) == 3
-    assert len(regimes(case, 1.0, literal).switches()) == 5
+    assert len(switches(regimes(case, 1.0))) == 3
+    assert len(switches(regimes(case, 1.0, literal))) == 5
 
 
 def test_the_beginning_counts_as_dynamic_until_it_was_quiet_long_enough() -> None:
     trace = regimes(np.full(1000, 20.0), 1.0)
-    assert trace.switches().tolist() == [int(SETTINGS.hold_s) - 1]
+    assert switches(trace) == [int(SETTINGS.hold_s) - 1]
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,11 @@ import pytest
 
 from procedures.analysis.calibration.reference import reference_vectors
 from procedures.analysis.calibration.station_noise import mean_covariance
-from procedures.analysis.calibration.verification import chi_square_p, error_covariance, magnitudes, predicted_sd
+from procedures.analysis.calibration.verification import error_covariance, magnitudes, predicted_sd
+from procedures.analysis.least_squares.chi_square import chi_square, tail_probability
 from procedures.core.imu_model import triad_calibration
 from procedures.core.table_angles import TableAngles
+from procedures.core.unit import TriadRecord
 from tests.domain.forward_model import ACCELEROMETER_NOISE, B_ACCELEROMETER, K_ACCELEROMETER, SITE
 
 ANGLES = [TableAngles(20.0 * i, 10.0 * i, 40.0 * i) for i in range(9)]
@@ -38,6 +40,7 @@ def test_the_predicted_covariance_over_many_units():
     rng, n, bias_sd, scale_sd = np.random.default_rng(21), 1000, 2e-5, 3e-6
     spread = np.tile([1e-5, 1e-6, 2e-6, 2e-6], 3)
     calibration_covariance = np.diag(spread**2)
+    record = TriadRecord((ACCELEROMETER_NOISE,) * 3, bias_sd, scale_sd)
     errors, p_values = np.zeros((n, 9)), np.zeros(n)
     for k in range(n):
         launch = [rng.normal(size=3) * bias_sd for _ in range(2)], [rng.normal(size=3) * scale_sd for _ in range(2)]
@@ -47,9 +50,9 @@ def test_the_predicted_covariance_over_many_units():
         calibration = triad_calibration("accelerometer", "m/s^2", "m/s^2", measured, calibration_covariance)
         means = B_ACCELEROMETER + launch[0][1] + VECTORS @ (K_ACCELEROMETER * (1 + launch[1][1])[:, None]).T
         means += np.array([np.linalg.cholesky(c) @ rng.normal(size=9) for c in NOISE]).T
-        covariance = error_covariance(VECTORS, calibration, NOISE, bias_sd, scale_sd)
+        covariance = error_covariance(VECTORS, calibration, NOISE, record)
         errors[k] = magnitudes(means, calibration, SITE.gravity_m_s2, ANGLES_LABELS).errors
-        p_values[k] = chi_square_p(errors[k], covariance)[1]
+        p_values[k] = tail_probability(chi_square(errors[k], covariance), 9)
     # Nine standard deviations of n values each: relative error 1/√(2n); four of them, and a little for nine at once.
     assert errors.std(axis=0) / np.sqrt(np.diagonal(covariance)) == pytest.approx(np.ones(9), abs=4.5 / np.sqrt(2 * n))
     assert p_values.mean() == pytest.approx(0.5, abs=4 * 0.289 / np.sqrt(n))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from procedures.analysis.wavelet_split import Rule, heursure, levels_for, shortest_s, wavelet_split
+from procedures.analysis.wavelet_split import Rule, heursure, shortest_s, wavelet_split
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
 from tests.validation.conditioning_noise import SYNTHETIC, noise_cells
@@ -98,13 +98,6 @@ def test_a_slow_signal_is_kept_to_its_ends() -> None:
     assert np.abs(split.kept - drift).max() < 0.6
 
 
-@pytest.mark.parametrize(
-    ("scale_s", "cell_s", "levels"), [(64.0, 1.0, 6), (64.0, 0.01, 13), (8.0, 1.0, 3), (1.5, 1.0, 1)]
-)
-def test_levels_are_a_time_scale(scale_s: float, cell_s: float, levels: int) -> None:
-    assert levels_for(scale_s, cell_s) == levels
-
-
 def test_what_cannot_be_split_is_refused() -> None:
     cells = np.random.default_rng(7).standard_normal(300)
     with pytest.raises(BadParameter, match="levels = 6: 1 to 4, for 300 cells and sym8"):
@@ -124,10 +117,6 @@ def test_what_cannot_be_split_is_refused() -> None:
         assert refused.value.field == field
     with pytest.raises(UnfitRecording, match="finite"):
         wavelet_split(np.append(cells, np.nan), 1.0, rule="rescaled", levels=4)
-    with pytest.raises(BadParameter, match="scale_s"):
-        levels_for(1.0, 1.0)
-    with pytest.raises(BadParameter, match="cell_s"):
-        levels_for(1.0, -1.0)
 
 
 @pytest.mark.parametrize("levels", [1, 4, 6])

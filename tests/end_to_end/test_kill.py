@@ -1,5 +1,7 @@
 """``kill -9`` of the real service in orientation 7: the job goes on at 7, and what was recorded stays as it was."""
 
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,13 @@ def by_station(service: BenchProcess, job_id: str) -> dict[int, dict[str, Any]]:
 
 def samples(service: BenchProcess, recording: dict[str, Any]) -> bytes:
     return service.client.get(f"/api/v1/recordings/{recording['id']}/data", params={"format": "csv"}).content
+
+
+def begun(database: Path, job_id: str, station: int) -> bool:
+    """Whether a part of a station's recording, and no more, is stored."""
+    part = "SELECT samples FROM recordings WHERE job_id = ? AND station_index = ? AND state = 'open' AND samples > 0"
+    with closing(sqlite3.connect(database)) as connection:
+        return connection.execute(part, (job_id, station)).fetchone() is not None
 
 
 @pytest.mark.timeout(240)
@@ -71,7 +80,7 @@ def test_a_launch_that_is_cut_off_is_kept_and_repeated_whole(tmp_path: Path, fre
         assert service.station_reached(undisturbed, 3)["state"] == "succeeded"
         disturbed = service.client.post("/api/v1/jobs", json=body).json()["id"]
         service.station_reached(disturbed, 1)
-        pause(2.0)  # two thirds into the second launch: more than one chunk of it is committed
+        service.until(lambda: begun(tmp_path / "bench.sqlite", disturbed, 1), 60)
         service.kill()
         service.start()
         job = service.station_reached(disturbed, 3)

@@ -55,6 +55,11 @@ def until(reached: Any, seconds: float = 30.0) -> None:
         pause(0.03)
 
 
+def tried_again(job: dict[str, Any], attempts: int) -> bool:
+    """Whether it waits to be tried again after so many attempts."""
+    return job["attempt"] == attempts + 1 and "tried again" in (job["waiting"] or "")
+
+
 # Before any test that needs the module's service: a process has one job engine at a time.
 
 
@@ -63,11 +68,12 @@ def test_a_pause_before_a_retry_does_not_become_two_hours(wall: JumpingClock, ho
     settings = Settings(database_url=f"sqlite:///{tmp_path / 'bench.sqlite'}", device_faults=json.dumps(NO_MOVE))
     with connect(settings, None, drive=True) as http:
         client = Client(http)
-        job = client.submit(retries=1)["id"]
-        until(lambda: "tried again" in (client.job(job)["waiting"] or ""))
-        wall.jump(hours=hours)
-        done = client.wait(job, "failed", seconds=8.0)  # without a jump the pause would last 10 s
-        assert done["attempt"] == 2
+        job = client.submit(retries=2)["id"]
+        for attempt in (1, 2):
+            until(lambda n=attempt: tried_again(client.job(job), n))
+            wall.jump(hours=hours)
+        done = client.wait(job, "failed", seconds=25.0)  # without a jump the second pause would last 30 s
+        assert done["attempt"] == 3
 
 
 @pytest.mark.parametrize("by", JUMPS, ids=str)

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from bench_service.bench.devices import AT_REST, MOVING
+from bench_service.drivers import device_journal
 from bench_service.drivers.device_cables import DeviceCables
 from bench_service.drivers.device_faults import DeviceFaults, FaultPlan
 from bench_service.drivers.device_journal import KEPT, ROTATE_BYTES
@@ -45,23 +46,34 @@ asyncio.run(go())
 RACER = """
 import sys
 from pathlib import Path
+from bench_service.drivers import device_journal
 from bench_service.drivers.device_register import DeviceRegister
-from bench_service.wall_clock import monotonic_s
+from bench_service.wall_clock import pause
 from procedures.bench.errors import DeviceBusy
+device_journal.ROTATE_BYTES = 10**12
 register = DeviceRegister(Path(sys.argv[1]), "sim")
+print("there", flush=True)
 sys.stdin.readline()
-end, had = monotonic_s() + 1.0, 0
-while monotonic_s() < end:
+had = refused = 0
+while had < 60:
     try:
         link = register.open()
     except DeviceBusy:
+        refused += 1
         continue
     had += 1
     for number in range(20):
         link.note("turntable.move_to", {"number": number})
+        if number == 10:
+            pause(0.0005)
     link.close()
-print(had, flush=True)
+print(refused, flush=True)
 """
+"""Has the link a fixed number of times, however fast the machine, and each time long enough for the others to try. No
+line is lost to rotation."""
+RACER_LINKS = 60
+RACER_LINES = 22
+"""Of one link: it is opened, moves twenty times, is closed."""
 
 
 @contextmanager
@@ -118,17 +130,21 @@ def test_a_table_goes_on_moving_when_its_master_is_killed_and_the_next_master_st
 def test_of_processes_that_race_one_at_a_time_is_the_master(tmp_path: Path) -> None:
     """Seen in the journal, which knows no lock: from a link's opening to its closing all lines are of one process."""
     with process(RACER, tmp_path) as a, process(RACER, tmp_path) as b, process(RACER, tmp_path) as c:
-        for racer in (a, b, c):
+        racers = (a, b, c)
+        assert [said(racer) for racer in racers] == ["there\n"] * 3
+        for racer in racers:
             assert racer.stdin is not None
             racer.stdin.write("go\n")
             racer.stdin.flush()
-        had = [int(said(racer)) for racer in (a, b, c)]
-    assert sum(had) > 10
+        refused = [int(said(racer)) for racer in racers]
+    assert sum(refused) > 0, "nobody met anybody"
     register = DeviceRegister(tmp_path, "sim")
-    entries = [entry for entry in register.journal.entries() if entry["verb"] != "link.refused"]
-    assert len(entries) == 22 * sum(had)
-    for begin in range(0, len(entries), 22):
-        link = entries[begin : begin + 22]
+    journal = register.journal.entries()
+    entries = [entry for entry in journal if entry["verb"] != "link.refused"]
+    assert len(journal) - len(entries) == sum(refused)
+    assert len(entries) == RACER_LINES * RACER_LINKS * len(racers)
+    for begin in range(0, len(entries), RACER_LINES):
+        link = entries[begin : begin + RACER_LINES]
         assert len({entry["pid"] for entry in link}) == 1
         assert [key for key, _ in groupby(entry["verb"] for entry in link)] == [
             "link.opened",
@@ -137,7 +153,20 @@ def test_of_processes_that_race_one_at_a_time_is_the_master(tmp_path: Path) -> N
         ]
     state = register.read()
     assert state is not None
-    assert state.openings == sum(had)
+    assert state.openings == RACER_LINKS * len(racers)
+
+
+def test_a_process_that_was_refused_before_a_rotation_writes_into_the_new_journal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = DeviceRegister(tmp_path, "sim"), DeviceRegister(tmp_path, "sim")
+    monkeypatch.setattr(device_journal, "ROTATE_BYTES", 1)
+    link = first.open()
+    with pytest.raises(DeviceBusy):
+        second.open()
+    link.close()
+    second.open()
+    assert [json.loads(line)["verb"] for line in first.journal.path.read_text().splitlines()] == ["link.opened"]
 
 
 def test_verbs_become_states_and_a_refused_demand_changes_nothing(tmp_path: Path) -> None:

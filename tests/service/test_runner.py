@@ -176,7 +176,7 @@ def test_an_engine_that_does_not_start_is_told_to_whoever_needs_it(stores: Store
     service = BenchService(stores, driver, planner, worker, "test", safety_of(stores, driver))
     service.register()
     service.begin()
-    with pytest.raises(NotReady, match="did not start: no books"):
+    with pytest.raises(NotReady, match="did not start: OSError: no books"):
         service.ready()
     service.stop()
 

@@ -53,7 +53,7 @@ def test_each_dwell_saw_gravity_as_the_table_stood(sqlite_client: Client, job: d
 def test_the_page_shows_the_means(sqlite_client: Client, job: dict[str, Any]) -> None:
     result = sqlite_client.http.get(f"/api/v1/jobs/{job['id']}/result").json()
     page = sqlite_client.http.get(result["page"]).text
-    for text in ("Mean outputs", "Standard uncertainties of the means", "outer=135 middle=90 inner=-189"):
+    for text in ("Mean outputs", "Standard uncertainties of the means", "outer=-189 middle=90 inner=135"):
         assert text in page
 
 
@@ -61,7 +61,7 @@ def test_what_a_program_is_written_as_can_be_sent_back(sqlite_client: Client) ->
     positions = [[10.0, 20.5, -30.0, 12.0], [0.0, 0.0, 0.0, 12.0]]
     written = sqlite_client.preview("table_program", positions=positions).json()
     program = written["parameters"]["program"]
-    assert ":demand:position 1,10; p 2,20.5; p 3,-30" in program
+    assert ":demand:position 1,-30; p 2,20.5; p 3,10" in program
     again = sqlite_client.preview("table_program", program=program).json()
     assert again["stations"] == written["stations"]
     assert written["duration_s"] == pytest.approx(24.0, abs=0.2)

@@ -5,6 +5,7 @@ from scipy.linalg import block_diag
 
 from procedures.analysis.calibration.estimator import estimator
 from procedures.analysis.calibration.table_errors import TableErrors
+from procedures.analysis.least_squares.inverse import scaled_pinv
 from procedures.analysis.least_squares.whitening import whitener
 from procedures.core.arrays import Array
 
@@ -36,6 +37,5 @@ def bayesian_bound(
         flaws.append(errors.of_outputs(matrix).transpose(1, 0, 2).reshape(3 * len(v), -1))
     total = block_diag(*noise) + np.vstack(flaws) @ np.vstack(flaws).T
     whitened = whitener(total) @ block_diag(*designs)
-    scale = np.linalg.norm(whitened, axis=0)
-    inverse = np.linalg.pinv(whitened / scale) / scale[:, None]
+    inverse = scaled_pinv(whitened)
     return inverse @ inverse.T

@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import lfilter
 
-from procedures.analysis.thermal.converter import converter_model
-from procedures.analysis.thermal.regime import RegimeSettings
+from procedures.analysis.thermal.regime import RegimeSettings, RegimeTrace
 from procedures.analysis.thermal.runs import ThermalRun, thermal_run, without_lag
 from procedures.core import units
 from procedures.core.converter import ConverterModel
@@ -20,6 +19,7 @@ from simulators.chamber.plant import ChamberPlant
 from simulators.chamber.thermometers import Thermometers
 from simulators.truth import Array, keyed_generator
 from simulators.truth.thermal import REFERENCE_C, ChamberTruth, UnitThermalTruth
+from tests.correction_samples import converter_model
 
 G = 9.810553
 SCALE = np.array([0.8148, 0.85883, 0.85306])
@@ -176,3 +176,8 @@ def with_block(truth: UnitThermalTruth, share: float) -> UnitThermalTruth:
     """The same unit, its static terms acting through the accelerometer block by so much."""
     x, y, z = (replace(a, block_share=share) for a in truth.accelerometers)
     return replace(truth, accelerometers=(x, y, z))
+
+
+def switches(trace: RegimeTrace) -> list[int]:
+    """Indices of the first samples of a new regime."""
+    return (np.flatnonzero(np.diff(trace.dynamic)) + 1).tolist()

@@ -16,7 +16,7 @@ from procedures.bench import Bench
 from procedures.bench.errors import BenchError
 from procedures.bench.imu import Stream
 from procedures.core.arrays import Array
-from procedures.core.recording import INCREMENTS, Channel, RawArray, Station
+from procedures.core.recording import Channel, NominalScale, RawArray, Station
 
 LOOK_S = 0.1
 """A block is looked at not sooner than this after the one before [s, real time]."""
@@ -108,14 +108,14 @@ class LiveTap:
             return None
         starts, stops, found = zip(*self._stretches, strict=True)
         raw = np.array(found)  # (stretches, 3, channels)
-        channels = tuple(_channel(c, self._rate_hz, raw[:, :, k]) for k, c in enumerate(self._channels))
+        rates = NominalScale.of(self._channels, self._rate_hz).rates(raw)
+        channels = tuple(_channel(c, rates[:, :, k]) for k, c in enumerate(self._channels))
         return LiveSamples(starts, stops, channels)
 
 
-def _channel(channel: Channel, rate_hz: float, raw: Array) -> LiveChannel:
-    """``scale·(raw − offset)``, an increment times the rate; `raw` is (stretches, 3): minimum, mean, maximum."""
-    per_s = rate_hz if channel.quantity in INCREMENTS else 1.0
-    low, mean, high = (channel.scale * (raw - channel.offset) * per_s).T
+def _channel(channel: Channel, rates: Array) -> LiveChannel:
+    """`rates` is (stretches, 3): those of the least, the mean and the greatest count."""
+    low, mean, high = rates.T
     if channel.scale < 0.0:
         low, high = high, low
     return LiveChannel(channel.name, channel.rate_unit, tuple(low.tolist()), tuple(mean.tolist()), tuple(high.tolist()))

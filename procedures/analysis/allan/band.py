@@ -1,4 +1,4 @@
-"""The band of Allan deviations over every start, and its cheap approximation by random intervals (paper A).
+"""The band of Allan deviations over every start (paper A).
 
 A. A. Aviev, V. N. Enin, I. V. Saneev, "Experimental research of the dithering ring laser gyro triad by Allan variations
 method", Science and Education of the Bauman MSTU, 2016, no. 6: the non-overlapping deviation of cluster size m depends
@@ -12,14 +12,12 @@ from math import ceil, log2
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
-from numpy.random import Generator
 from numpy.typing import NDArray
 
 from procedures.analysis.allan.differences import squared
 from procedures.analysis.allan.integral import Integral
 from procedures.analysis.allan.statistic import ALLAN, Sizes, checked_sizes, decade_sizes
 from procedures.core.arrays import Array
-from procedures.core.errors import BadParameter
 
 WHOLE = 1 << 21
 """A series up to this length is held whole, and every start of every size is used."""
@@ -192,57 +190,3 @@ class _Near:
             self._add(x[self._row * self.m - first :], 1, more)
             terms[:more] += 1
         return self._sums, terms
-
-
-class SampledStream:
-    """Allan deviation from random intervals ("random sampling of time intervals", paper A), from blocks.
-
-    At each size `intervals` pairs of adjacent clusters, or single clusters, start at random. Pairs give
-    ``√(⟨(ȳ₂ − ȳ₁)²⟩/2)``, the Allan deviation; single clusters give what the paper prints, the standard deviation of
-    their means, which is the same for a white rate only and grows with the record where the rate wanders. Either has a
-    relative standard deviation of at least ``1/√(2·intervals)``: 4 % with the paper's 300, not its 1 %.
-    """
-
-    def __init__(
-        self,
-        rate_hz: float,
-        count: int,
-        rng: Generator,
-        *,
-        sizes: Sequence[int] | Sizes | None = None,
-        intervals: int = 300,
-        pairs: bool = True,
-        increments: bool = False,
-    ) -> None:
-        if intervals < 2:
-            raise BadParameter("intervals", intervals, "at least 2")
-        self._integral = Integral(rate_hz, increments=increments)
-        self._count, self._pairs = count, pairs
-        self.sizes = checked_sizes(sizes, count, ALLAN)
-        self.tau_s = self.sizes / rate_hz
-        clusters = np.arange(2 + pairs)
-        m = self.sizes[:, None, None]
-        starts = rng.integers(0, count - (1 + pairs) * m + 1, size=(len(self.sizes), intervals, 1))
-        self._shape = (len(self.sizes), intervals, len(clusters))
-        wanted = (starts + m * clusters).ravel()
-        self._order = np.argsort(wanted, kind="stable")
-        self._wanted = wanted[self._order]
-        self._found = np.zeros(len(wanted))
-        self._at, self._index = int(np.searchsorted(self._wanted, 1)), 1
-
-    def add(self, block: Array | NDArray[np.int32]) -> None:
-        """The next samples of the channel, (n,). Raises `UnfitRecording`."""
-        for piece in self._integral.add(block):
-            end = int(np.searchsorted(self._wanted, self._index + len(piece.x)))
-            self._found[self._at : end] = piece.x[self._wanted[self._at : end] - self._index]
-            self._at, self._index = end, self._index + len(piece.x)
-
-    def finish(self) -> Array:
-        """The deviation at each of `sizes`, (k,), once all samples came."""
-        self._integral.check_end(self._count)
-        x = np.empty(len(self._found))
-        x[self._order] = self._found
-        means = np.diff(x.reshape(self._shape), axis=2) / self.sizes[:, None, None]
-        if self._pairs:
-            return np.sqrt(np.mean(np.diff(means, axis=2)[:, :, 0] ** 2, axis=1) / 2.0)
-        return np.std(means[:, :, 0], axis=1, ddof=1)

@@ -98,11 +98,3 @@ def checked_sizes(sizes: Sequence[int] | Sizes | None, count: int, statistic: St
         bad = wanted[0] if wanted[0] < 1 else wanted[-1]
         raise BadParameter("sizes", int(bad), f"1 to {largest} samples, for {statistic.name} of {count} samples")
     return wanted.astype(np.int64)
-
-
-def sizes_of(tau_s: Sequence[float] | Array, rate_hz: float) -> Sizes:
-    """Cluster sizes nearest to averaging times [s]. Raises `BadParameter` where one is shorter than half a sample."""
-    sizes = np.round(np.asarray(tau_s, dtype=np.float64) * rate_hz)
-    if not np.all(np.isfinite(sizes)) or np.any(sizes < 1):
-        raise BadParameter("tau_s", float(np.min(np.asarray(tau_s))), f"at least one sample period, {1 / rate_hz:g} s")
-    return np.unique(sizes.astype(np.int64))

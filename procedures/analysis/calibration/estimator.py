@@ -13,6 +13,7 @@ from scipy.linalg import qr, solve_triangular
 
 from procedures.analysis.calibration.table_errors import SOURCES, TableErrors
 from procedures.analysis.least_squares.determination import require_full_rank
+from procedures.analysis.least_squares.inverse import scaled_pinv
 from procedures.analysis.least_squares.whitening import whitener
 from procedures.core.arrays import Array
 
@@ -92,10 +93,9 @@ def estimator(what: str, vectors: Array, noise_covariance: Array, of_table: Arra
 
 def _by_channel(design: Array, whiteners: Array) -> tuple[Array, Array]:
     """Gain (12, 3, n) and covariance (12, 12) of three separate fits, whiteners (3, n, n)."""
-    scale = np.linalg.norm(design, axis=0)
     gain, covariance = np.zeros((3, 4, 3, len(design))), np.zeros((3, 4, 3, 4))
     for channel, weights in enumerate(whiteners):
-        pseudo_inverse = np.linalg.pinv(weights @ design / scale) / scale[:, None]
+        pseudo_inverse = scaled_pinv(weights @ design)
         gain[channel, :, channel] = pseudo_inverse @ weights
         covariance[channel, :, channel] = pseudo_inverse @ pseudo_inverse.T
     return gain.reshape(12, 3, -1), covariance.reshape(12, 12)
@@ -124,9 +124,3 @@ def _with_flaws(design: Array, whiteners: Array, flaws: Array) -> Array:
 def table_share(plan: Estimator, of_table: Array, table: TableErrors) -> TableShare:
     """The table's flaws carried through the outputs `of_table` F (n, 3, P) and the estimator into the coefficients."""
     return TableShare(np.einsum("kcn,ncp->kp", plan.gain, of_table, optimize=True), table.source)
-
-
-def joint_table_covariance(gyro: TableShare, accelerometer: TableShare) -> Array:
-    """Covariance of all twenty-four coefficients from the table's flaws, which both triads share, shape (24, 24)."""
-    both = np.vstack([gyro.per_sd, accelerometer.per_sd])
-    return both @ both.T

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag, null_space
-from scipy.special import chdtrc
 
 from procedures.analysis.calibration.estimator import Estimator, TableShare, Weighting, estimator, table_share
+from procedures.analysis.calibration.magnitude import magnitude_gradient
 from procedures.analysis.calibration.noise_scale import noise_factor
 from procedures.analysis.calibration.table_errors import TableErrors
-from procedures.analysis.least_squares.whitening import whitener
+from procedures.analysis.least_squares.chi_square import chi_square, judged_p_value
 from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration, triad_calibration
 
@@ -43,6 +43,7 @@ class TriadFit:
     magnitude_sd: Array
     """Expected standard deviations of |v̂| − |v| at the same stations, SI, shape (n,)."""
     chi_square: float
+    """Of what no coefficient can explain, against noise and table together."""
     degrees_of_freedom: int
     noise_known: bool
     """False where the noise was estimated from the recordings themselves: then chi-square proves nothing."""
@@ -70,9 +71,7 @@ class TriadFit:
     @property
     def p_value(self) -> float | None:
         """Chance of a chi-square at least as large, where it can be judged."""
-        if not self.noise_known or self.degrees_of_freedom == 0:
-            return None
-        return float(chdtrc(self.degrees_of_freedom, self.chi_square))
+        return judged_p_value(self.chi_square, self.degrees_of_freedom, self.noise_known)
 
     def calibration(self) -> TriadCalibration:
         """The coefficients with their total covariance, ready to correct with."""
@@ -122,7 +121,7 @@ def fit_triad(
         outputs - plan.modelled(coefficients),
         residual_sd,
         magnitude_sd,
-        _chi_square(free, of_noise + of_flaws),
+        chi_square(free, of_noise + of_flaws),
         len(free),
         noise_known,
     )
@@ -142,14 +141,6 @@ def _free_of_coefficients(
     return (basis.T @ outputs).T.ravel(), of_noise, flaws @ flaws.T
 
 
-def _chi_square(free: Array, covariance: Array) -> float:
-    """``χ² = yᵀ·cov(y)⁻¹·y`` against noise and table together, as many degrees of freedom as y has components."""
-    if len(free) == 0:
-        return 0.0
-    whitened = whitener(covariance) @ free
-    return float(whitened @ whitened)
-
-
 def _expected(
     plan: Estimator, vectors: Array, matrix: Array, noise_covariance: Array, of_table: Array
 ) -> tuple[Array, Array]:
@@ -157,15 +148,11 @@ def _expected(
     n = len(vectors)
     flaws = of_table.transpose(1, 0, 2).reshape(3 * n, -1)
     remaining = plan.remaining()
-    along = np.einsum("nc,cnj->nj", _direction(vectors, matrix), remaining.reshape(3, n, 3 * n))
+    gradient = magnitude_gradient(vectors, np.linalg.inv(matrix))
+    along = np.einsum("nc,cnj->nj", gradient, remaining.reshape(3, n, 3 * n))
 
     def sd(rows: Array) -> Array:
         noise = np.einsum("kci,cij,kcj->k", rows.reshape(-1, 3, n), noise_covariance, rows.reshape(-1, 3, n))
         return np.sqrt(np.maximum(noise, 0.0) + np.sum((rows @ flaws) ** 2, axis=1))
 
     return sd(remaining).reshape(3, n).T, sd(along)
-
-
-def _direction(vectors: Array, matrix: Array) -> Array:
-    """``∂|v̂|/∂U = K⁻ᵀ·v/|v|``, shape (n, 3)."""
-    return vectors / np.linalg.norm(vectors, axis=1)[:, None] @ np.linalg.inv(matrix)

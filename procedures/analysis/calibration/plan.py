@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from procedures.analysis.calibration.estimator import Estimator, TableShare, Weighting, estimator, table_share
+from procedures.analysis.calibration.magnitude import magnitude_covariance, magnitude_gradient
 from procedures.analysis.calibration.reference import reference_vectors
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.station_plan import dwell_for, windows
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
-from procedures.analysis.calibration.verification import magnitude_sensitivity, predicted_sd
+from procedures.analysis.calibration.verification import predicted_sd
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.recording import Station
@@ -84,10 +85,9 @@ def triad_plan(
     angles = [s.angles for s in stations if s.angles is not None]
     vectors = reference_vectors(triad, angles, site)
     table = table_errors(angles, vectors, uncertainty, of_gravity=triad == "accelerometer")
-    known = unit.calibration(triad)
-    calibrated = known is not None and known.output_unit != "count"
-    matrix = known.matrix_array if known is not None and calibrated else np.eye(3)
-    return TriadPlan(triad, unit, tuple(stations), tuple(axes), vectors, table, matrix, calibrated, weighting)
+    known = unit.known_matrix(triad)
+    matrix = np.eye(3) if known is None else known
+    return TriadPlan(triad, unit, tuple(stations), tuple(axes), vectors, table, matrix, known is not None, weighting)
 
 
 def predicted_parts(plan: TriadPlan) -> tuple[Array, Array] | None:
@@ -99,7 +99,12 @@ def predicted_parts(plan: TriadPlan) -> tuple[Array, Array] | None:
     if noise is None:
         estimator(f"the {plan.triad} coefficients", plan.vectors, np.array([np.eye(len(plan.stations))] * 3))
         return None
-    gls = plan.estimator(noise)
+    return parts_by_noise(plan, noise)
+
+
+def parts_by_noise(plan: TriadPlan, noise_covariance: Array) -> tuple[Array, Array]:
+    """`predicted_parts` for a known covariance of the station means (3, n, n). Raises `Undetermined`."""
+    gls = plan.estimator(noise_covariance)
     return np.sqrt(np.diagonal(gls.noise_covariance)), np.sqrt(np.diagonal(plan.share(gls).covariance))
 
 
@@ -168,8 +173,8 @@ def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size:
     noise = plan.noise_covariance()
     if noise is None:
         return None
-    weights, _ = magnitude_sensitivity(plan.vectors, plan.matrix)
-    expected = predicted_sd(np.einsum("ic,cij,jc->ij", weights, noise, weights)) / float(np.sqrt(3.0))
+    gradient = magnitude_gradient(plan.vectors, np.linalg.inv(plan.matrix))
+    expected = predicted_sd(magnitude_covariance(gradient, noise)) / float(np.sqrt(3.0))
     if expected <= limit:
         return None
     return (

@@ -104,8 +104,6 @@ def station_temperatures(recordings: Sequence[Recording], lag_s: tuple[float, fl
         count = cells.rates.shape[1]
         about = (np.arange(count) - 0.5 * (count - 1)) * cells.cell_s
         mean = cells.rates.mean(axis=1)
-        if not np.all(np.isfinite(mean)):
-            raise UnfitRecording(f"recording {info.id}: a temperature is not a number")
         slope = cells.rates @ about / np.sum(about**2)
         left = cells.rates - mean[:, None] - slope[:, None] * about
         variance = np.sum(left**2, axis=1) / (count - 2)

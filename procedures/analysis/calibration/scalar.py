@@ -11,9 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.special import chdtrc
 
+from procedures.analysis.calibration.magnitude import magnitude_covariance, magnitude_gradient
+from procedures.analysis.least_squares.chi_square import judged_p_value, residual_factor
 from procedures.analysis.least_squares.determination import RANK_TOLERANCE, require_full_rank
+from procedures.analysis.least_squares.inverse import scaled_pinv
 from procedures.analysis.least_squares.whitening import whitener
 from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration, triad_calibration
@@ -68,9 +70,7 @@ class ScalarFit:
     @property
     def p_value(self) -> float | None:
         """Chance of a chi-square at least as large, where it can be judged."""
-        if not self.noise_known or self.degrees_of_freedom == 0:
-            return None
-        return float(chdtrc(self.degrees_of_freedom, self.chi_square))
+        return judged_p_value(self.chi_square, self.degrees_of_freedom, self.noise_known)
 
     def calibration(self, triad: str, output_unit: str, input_unit: str) -> TriadCalibration:
         """As ``U = b + K·v`` with K upper triangular; its lower triangle is fixed and has no variance."""
@@ -158,13 +158,12 @@ def fit_scalar(
     covariance_f = _magnitude_covariance(parameters, outputs, noise_covariance)
     weights = whitener(covariance_f)
     jacobian = _jacobian(parameters, outputs)
-    units = _steps(parameters, reference)
-    inverse = units[:, None] * np.linalg.pinv(weights @ jacobian * units)
+    inverse = scaled_pinv(weights @ jacobian)
     solve = inverse @ weights
     residuals = _magnitudes(parameters, outputs) - reference
     whitened = weights @ residuals
     chi_square, degrees = float(whitened @ whitened), len(outputs) - 9
-    factor = 1.0 if noise_known or degrees == 0 else max(1.0, chi_square / degrees)
+    factor = residual_factor(chi_square, degrees, noise_known)
     remaining = np.eye(len(outputs)) - jacobian @ solve
     expected = np.diagonal(remaining @ covariance_f @ remaining.T) * factor
     gain = -np.einsum("pn,nc->pnc", solve, _output_weights(parameters, outputs))
@@ -220,8 +219,7 @@ def _magnitudes(parameters: Array, outputs: Array) -> Array:
 def _output_weights(parameters: Array, outputs: Array) -> Array:
     """∂|v̂|/∂U, shape (n, 3): direction cosines through the correction."""
     correction = correction_matrix(parameters)
-    corrected = (outputs - parameters[:3]) @ correction.T
-    return corrected / np.linalg.norm(corrected, axis=1)[:, None] @ correction
+    return magnitude_gradient((outputs - parameters[:3]) @ correction.T, correction)
 
 
 def _jacobian(parameters: Array, outputs: Array) -> Array:
@@ -237,5 +235,4 @@ def _jacobian(parameters: Array, outputs: Array) -> Array:
 
 
 def _magnitude_covariance(parameters: Array, outputs: Array, noise_covariance: Array) -> Array:
-    weights = _output_weights(parameters, outputs)
-    return np.einsum("ic,cij,jc->ij", weights, noise_covariance, weights)
+    return magnitude_covariance(_output_weights(parameters, outputs), noise_covariance)

@@ -7,7 +7,16 @@ import numpy as np
 
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
-from procedures.core.recording import INCREMENTS, TRIADS, Recording, RecordingInfo
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.recording import (
+    INCREMENTS,
+    TRIADS,
+    NominalScale,
+    Recording,
+    RecordingInfo,
+    require_complete,
+    require_finite,
+)
 from procedures.core.table_angles import TableAngles
 
 BATCHES = 20
@@ -71,6 +80,14 @@ def station_means(recordings: Sequence[Recording], triad: str) -> StationMeans:
     )
 
 
+def require_unit_of(calibration: TriadCalibration, means: StationMeans) -> None:
+    """Refuse means that are not in the unit that a calibration is for. Raises `UnfitRecording`."""
+    if means.output_unit != calibration.output_unit:
+        raise UnfitRecording(
+            f"the {means.triad} channels are in {means.output_unit}, the calibration is for {calibration.output_unit}"
+        )
+
+
 def launch_warnings(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """A sentence where the recordings are of several launches of the unit, which an analysis takes for one."""
     launches = {r.info.launched_s for r in recordings if r.info.launched_s is not None}
@@ -94,7 +111,8 @@ def _summary(recording: Recording, triad: str) -> _Summary:
     sample on.
     """
     info = recording.info
-    columns = [info.column(name) for name in TRIADS[triad]]
+    names = TRIADS[triad]
+    columns = [info.column(name) for name in names]
     if info.count < BATCHES:
         raise UnfitRecording(f"recording {info.id}: {info.count} samples are too few, at least {BATCHES} are needed")
     sums, squares = np.zeros((BATCHES, 3)), np.zeros((BATCHES, 3))
@@ -104,33 +122,35 @@ def _summary(recording: Recording, triad: str) -> _Summary:
         raw = np.asarray(block)[:, columns].astype(np.float64)
         if not len(raw):
             continue
-        _require_finite(raw, info, triad)
+        require_finite(info, names, raw)
         first = raw[0] if first is None else first
         low, high = np.minimum(low, raw.min(axis=0)), np.maximum(high, raw.max(axis=0))
         edges, batches = _batch_edges(seen, len(raw), info.count)
         sums[batches] += np.add.reduceat(raw - first, edges, axis=0)
         squares[batches] += np.add.reduceat((raw - first) ** 2, edges, axis=0)
         seen += len(raw)
-    if first is None or seen != info.count:
-        raise UnfitRecording(f"recording {info.id}: {seen} samples where {info.count} are announced")
+    require_complete(info, seen)
+    first = np.zeros(3) if first is None else first
     frozen = tuple(float(v) if a == b else None for v, a, b in zip(first, low, high, strict=True))
-    return _in_units(info, columns, sums, squares, first, frozen)
+    return _in_units(info, info.nominal_scale(names), sums, squares, first, frozen)
 
 
 def _in_units(
-    info: RecordingInfo, columns: list[int], sums: Array, squares: Array, first: Array, frozen: tuple[float | None, ...]
+    info: RecordingInfo,
+    scale: NominalScale,
+    sums: Array,
+    squares: Array,
+    first: Array,
+    frozen: tuple[float | None, ...],
 ) -> _Summary:
-    channels = [info.channels[c] for c in columns]
-    gain = np.array([c.scale * (info.rate_hz if c.quantity in INCREMENTS else 1.0) for c in channels])
-    offset = np.array([c.offset for c in channels])
     sizes = np.diff(np.ceil(np.arange(BATCHES + 1) * info.count / BATCHES))[:, None]
     mean = sums.sum(axis=0) / info.count
     variance = np.maximum(squares.sum(axis=0) / info.count - mean**2, 0.0) * info.count / (info.count - 1)
     batch_sd = np.std(sums / sizes, axis=0, ddof=1)
     return _Summary(
-        (first + mean - offset) * gain,
-        np.sqrt(variance) * np.abs(gain),
-        batch_sd / np.sqrt(BATCHES) * np.abs(gain),
+        scale.rates(first + mean),
+        np.sqrt(variance) * np.abs(scale.gain),
+        batch_sd / np.sqrt(BATCHES) * np.abs(scale.gain),
         frozen,
     )
 
@@ -141,12 +161,6 @@ def _batch_edges(seen: int, length: int, count: int) -> tuple[list[int], list[in
     current = int(np.searchsorted(starts, 0, side="right")) - 1
     batches = [current, *(b for b in range(current + 1, BATCHES) if starts[b] < length)]
     return [0, *(int(starts[b]) for b in batches[1:])], batches
-
-
-def _require_finite(raw: Array, info: RecordingInfo, triad: str) -> None:
-    bad = np.flatnonzero(~np.all(np.isfinite(raw), axis=0))
-    if bad.size:
-        raise UnfitRecording(f"recording {info.id}: channel {TRIADS[triad][bad[0]]} holds samples that are not numbers")
 
 
 def _refuse_frozen(recordings: Sequence[Recording], summaries: Sequence[_Summary], triad: str) -> None:

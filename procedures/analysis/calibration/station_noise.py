@@ -45,6 +45,11 @@ def triad_covariance(record: TriadRecord | None, windows: ArrayLike) -> Array | 
     return covariance if np.all(np.diagonal(covariance, axis1=1, axis2=2) > 0.0) else None
 
 
+def outputs_covariance(record: TriadRecord | None, output_unit: str, windows: ArrayLike) -> Array | None:
+    """`triad_covariance` of outputs in their unit; None for counts too: a record has no noise in them."""
+    return None if output_unit == "count" else triad_covariance(record, windows)
+
+
 def flicker_covariance(noise: NoiseCoefficients, windows: ArrayLike) -> Array:
     """The bias instability's part, shape (n, n) [rate²].
 

@@ -18,7 +18,16 @@ LONGEST_DWELL_S = 10.0 * 365.25 * 86_400.0
 """Ten years at one station: a dwell that would have to be longer counts as none at all."""
 
 
-def move_time_s(degrees: float, rate_deg_s: float, acceleration_deg_s2: float) -> float:
+def move_time_s(start: TableAngles, stop: TableAngles, axes: Sequence[tuple[float, float]]) -> float:
+    """Least time to move the table from rest to rest [s]; its axes turn together, the slowest counts.
+
+    `axes` are (rate_deg_s, acceleration_deg_s2) of outer, middle, inner.
+    """
+    turns = (stop.outer_deg - start.outer_deg, stop.middle_deg - start.middle_deg, stop.inner_deg - start.inner_deg)
+    return max(_turn_time_s(turn, *axis) for turn, axis in zip(turns, axes, strict=True))
+
+
+def _turn_time_s(degrees: float, rate_deg_s: float, acceleration_deg_s2: float) -> float:
     """Least time to turn an axis from rest to rest: triangular or trapezoidal rate [s]."""
     distance = abs(degrees)
     if distance * acceleration_deg_s2 < rate_deg_s**2:
@@ -29,14 +38,13 @@ def move_time_s(degrees: float, rate_deg_s: float, acceleration_deg_s2: float) -
 def windows(stations: Sequence[Station], axes: Sequence[tuple[float, float]]) -> Array:
     """[start, stop] of each station's record in bench time [s], shape (n, 2), the table starting from its zero.
 
-    `axes` are (rate_deg_s, acceleration_deg_s2) of outer, middle, inner, which turn together.
+    `axes` are (rate_deg_s, acceleration_deg_s2) of outer, middle, inner.
     """
     now, at = 0.0, TableAngles()
     spans: list[tuple[float, float]] = []
     for station in stations:
         to = station.angles or at
-        turns = (to.outer_deg - at.outer_deg, to.middle_deg - at.middle_deg, to.inner_deg - at.inner_deg)
-        now += max(move_time_s(turn, *axis) for turn, axis in zip(turns, axes, strict=True)) + station.settle_s
+        now += move_time_s(at, to, axes) + station.settle_s
         now += station.power_off_s
         spans.append((now, now + station.record_s))
         now, at = spans[-1][1], to

@@ -16,7 +16,7 @@ from procedures.analysis.calibration.reference_temperature import (
 )
 from procedures.analysis.calibration.scalar import fit_scalar, nominal_start, start_from_data
 from procedures.analysis.calibration.station_means import StationMeans, station_means
-from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.station_noise import outputs_covariance
 from procedures.analysis.calibration.summary import (
     ScalarCheck,
     TriadSummary,
@@ -112,12 +112,19 @@ def noise_of_means(means: StationMeans, record: TriadRecord | None) -> tuple[Arr
 
     Outputs in counts have no record in their unit. Without one the scatter of batch means within each dwell stands in.
     """
-    known = None if means.output_unit == "count" else triad_covariance(record, means.windows)
+    known = outputs_covariance(record, means.output_unit, means.windows)
     if known is not None:
         return known, True
-    floor = 1e-9 * float(np.abs(means.outputs).max())
-    sd = np.maximum(means.mean_sd, floor if floor > 0.0 else 1.0)
-    return np.array([np.diag(column**2) for column in sd.T]), False
+    return scatter_covariance(means.outputs, means.mean_sd), False
+
+
+def scatter_covariance(outputs: Array, sd: Array) -> Array:
+    """Covariance (3, n, n) of means (n, 3) whose noise nobody knows, from their scatter (n, 3).
+
+    Where nothing scatters, a part in 10⁹ of the greatest output stands in, so that it can be weighed.
+    """
+    floor = 1e-9 * float(np.abs(outputs).max())
+    return np.array([np.diag(column**2) for column in np.maximum(sd, floor if floor > 0.0 else 1.0).T])
 
 
 def station_angles(means: StationMeans) -> list[TableAngles]:

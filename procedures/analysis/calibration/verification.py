@@ -8,12 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag
-from scipy.special import chdtrc
 
-from procedures.analysis.least_squares.whitening import whitener
+from procedures.analysis.calibration.magnitude import magnitude_covariance, magnitude_gradient
 from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration, correct
+from procedures.core.unit import TriadRecord
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ def magnitude_sensitivity(vectors: Array, matrix: Array) -> tuple[Array, Array]:
 
     ``w = K⁻ᵀ·v/|v|``; an error of a coefficient of channel c acts as ``−w_c·[1 v_x v_y v_z]``.
     """
-    weights = vectors / np.linalg.norm(vectors, axis=1)[:, None] @ np.linalg.inv(matrix)
+    weights = magnitude_gradient(vectors, np.linalg.inv(matrix))
     design = np.column_stack([np.ones(len(vectors)), vectors])
     return weights, -np.einsum("nc,na->nca", weights, design).reshape(len(vectors), 12)
 
@@ -91,29 +90,21 @@ def error_covariance(
     vectors: Array,
     calibration: TriadCalibration,
     noise_covariance: Array,
-    bias_run_to_run_sd: float,
-    scale_factor_run_to_run_sd: float,
+    record: TriadRecord | None,
 ) -> Array:
     """Covariance (n, n) [SI²] of the errors of |v̂| to expect when the unit is switched on anew and verified.
 
     Three parts: the calibration's own covariance; the noise of the verification's dwells, `noise_covariance` (3, n, n);
-    and the change of bias and scale factor between two launches, each of which departs from the unit's mean by the
-    run-to-run standard deviation (hence twice the variance).
+    and the change of bias and scale factor between two launches by the unit's record, each of which departs from the
+    unit's mean by the run-to-run standard deviation (hence twice the variance).
     """
     matrix = calibration.matrix_array
     weights, of_coefficients = magnitude_sensitivity(vectors, matrix)
-    noise = np.einsum("ic,cij,jc->ij", weights, noise_covariance, weights)
-    launch = block_diag(
-        *[_launch_variance(c, matrix, bias_run_to_run_sd, scale_factor_run_to_run_sd) for c in range(3)]
-    )
-    coefficients = calibration.covariance_array + 2.0 * launch
-    return of_coefficients @ coefficients @ of_coefficients.T + noise
-
-
-def _launch_variance(channel: int, matrix: Array, bias_sd: float, scale_sd: float) -> Array:
-    """Of [b, K_i1, K_i2, K_i3] of a channel from launch to launch, (4, 4): its scale factor carries its whole row."""
-    row = np.concatenate([[0.0], matrix[channel]])
-    return np.diag([bias_sd**2, 0.0, 0.0, 0.0]) + scale_sd**2 * np.outer(row, row)
+    outputs = noise_covariance
+    if record is not None:
+        outputs = outputs + 2.0 * record.launch_covariance(vectors @ matrix.T)
+    of_calibration = of_coefficients @ calibration.covariance_array @ of_coefficients.T
+    return of_calibration + magnitude_covariance(weights, outputs)
 
 
 def predicted_sd(covariance: Array) -> float:
@@ -123,10 +114,3 @@ def predicted_sd(covariance: Array) -> float:
     """
     n = len(covariance)
     return float(np.sqrt(max(0.0, (np.trace(covariance) - covariance.sum() / n) / (n - 1)))) if n > 1 else 0.0
-
-
-def chi_square_p(errors: Array, covariance: Array) -> tuple[float, float]:
-    """``χ² = eᵀC⁻¹e`` with n degrees of freedom, and the chance of one at least as large."""
-    whitened = whitener(covariance) @ errors
-    statistic = float(whitened @ whitened)
-    return statistic, float(chdtrc(len(errors), statistic))

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.special import chdtrc
 
 from procedures.analysis.field.positions import Tilt, field_vectors, of_azimuth, of_settings, of_tilt
+from procedures.analysis.least_squares.chi_square import judged_p_value, residual_factor
 from procedures.analysis.least_squares.determination import require_full_rank
+from procedures.analysis.least_squares.inverse import scaled_pinv
 from procedures.analysis.least_squares.whitening import whitener
 from procedures.core.arrays import Array
 from procedures.core.errors import Undetermined
@@ -80,9 +81,7 @@ class FieldFit:
     @property
     def p_value(self) -> float | None:
         """Chance of a chi-square at least as large, where it can be judged."""
-        if not self.noise_known or self.degrees_of_freedom == 0:
-            return None
-        return float(chdtrc(self.degrees_of_freedom, self.chi_square))
+        return judged_p_value(self.chi_square, self.degrees_of_freedom, self.noise_known)
 
     @property
     def scale_relative_sd(self) -> Array:
@@ -152,10 +151,10 @@ def fit_field(
         if np.all(np.abs(step) <= _SETTLED * sizes):
             break
     residuals = _residuals(theta, outputs, model)
-    inverse = np.linalg.pinv(whitened @ jacobian)
+    inverse = scaled_pinv(whitened @ jacobian)
     chi_square = float(np.sum((whitened @ residuals) ** 2))
     degrees = 3 * len(outputs) - len(asked)
-    factor = 1.0 if noise_known or degrees == 0 else max(1.0, chi_square / degrees)
+    factor = residual_factor(chi_square, degrees, noise_known)
     covariance = np.zeros((8, 8))
     covariance[np.ix_(asked, asked)] = inverse @ inverse.T * factor
     if not model.estimate_scale:

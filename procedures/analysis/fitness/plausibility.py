@@ -7,7 +7,7 @@ import numpy as np
 from procedures.analysis.fitness.findings import FitnessSettings
 from procedures.analysis.fitness.pieces import Samples
 from procedures.core import units
-from procedures.core.recording import ACCELEROMETER, GYRO, INCREMENTS, TRIADS, Channel, Quantity
+from procedures.core.recording import ACCELEROMETER, GYRO, TRIADS, Channel, NominalScale, Quantity
 
 BURST = 128
 """Samples that are averaged before a magnitude is taken, so that noise does not pass for a reading."""
@@ -25,8 +25,7 @@ class Readings:
 
     def __init__(self, channels: Sequence[Channel], rate_hz: float) -> None:
         self._rate_hz = rate_hz
-        self._offset = np.array([c.offset for c in channels])
-        self._gain = np.array([c.scale * (rate_hz if c.quantity in INCREMENTS else 1.0) for c in channels])
+        self._scale = NominalScale.of(channels, rate_hz)
         self._channels = tuple(channels)
         self._names = [c.name for c in channels]
         self._sums = np.zeros(len(channels))
@@ -42,7 +41,7 @@ class Readings:
         length = min(BURST, x.shape[1])
         bursts = min(BURSTS, x.shape[1] // length)
         means = x[:, : length * bursts].astype(np.float64).reshape(len(x), bursts, length).mean(axis=2)
-        means = (means - self._offset[:, None]) * self._gain[:, None]
+        self._scale.convert_rows(means)
         self._sums += np.sort(means, axis=1)[:, bursts // 2]
         for name, rows in self._triads.items():
             self._magnitudes[name] += float(np.sort(np.linalg.norm(means[rows], axis=0))[bursts // 2])

@@ -12,6 +12,8 @@ from scipy.spatial.transform import Rotation
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, Undetermined
+from procedures.core.site import Site
+from procedures.core.unit import Unit
 
 LATITUDE_MAX_DEG = 89.0
 """At the poles the Earth turns about the vertical: no direction is north (S 3.5). At 89° its horizontal part is 1.7 %,
@@ -114,6 +116,33 @@ def azimuth_error(
         ]
     )
     return float(parts.sum()), float(np.sqrt(np.sum(parts**2)))
+
+
+@dataclass(frozen=True)
+class ThesisPrediction:
+    """Azimuth error of one alignment by thesis 1.1: in-run noise alone, no calibration, launch or table in it."""
+
+    added_deg: float
+    """The parts' magnitudes added, as printed."""
+    independent_deg: float
+    """Root of the sum of their squares."""
+
+
+def thesis_prediction(unit: Unit, site: Site, base_turn_arcsec: float, alignment_s: float) -> ThesisPrediction | None:
+    """Thesis 1.1 with the noisiest channel of each triad, since any may look east; None where noise is not known."""
+    if unit.gyro is None or unit.accelerometer is None:
+        return None
+    added, independent = azimuth_error(
+        site.latitude_deg,
+        site.gravity_m_s2,
+        max(n.bias_instability for n in unit.accelerometer.noise),
+        max(n.bias_instability for n in unit.gyro.noise),
+        max(n.random_walk for n in unit.gyro.noise),
+        base_turn_arcsec * units.ARCSEC,
+        alignment_s,
+        site.earth_rate_rad_s,
+    )
+    return ThesisPrediction(added / units.DEG, independent / units.DEG)
 
 
 def _angles(force: Array, rate: Array) -> Array:

@@ -16,7 +16,8 @@ from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 
 STATES = ("tilt north", "heading", "tilt east", "v north", "v up", "v east", "latitude", "longitude", "height")
-"""χ, α, β [rad], velocity errors [m/s], errors of latitude and longitude [rad] and height [m]."""
+"""Order of all states, for readers and tests: χ, α, β [rad], velocity errors [m/s], errors of latitude
+and longitude [rad] and height [m]."""
 TILT_NORTH, HEADING, TILT_EAST, V_NORTH, V_UP, V_EAST, LATITUDE, LONGITUDE, HEIGHT = range(9)
 
 EARTH_RADIUS_M = 6_371_000.0

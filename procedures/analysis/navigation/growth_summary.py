@@ -1,6 +1,5 @@
 """What a person is told of an error growth: curves, shares, one sentence, and what it does not hold for."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,12 +18,7 @@ from procedures.analysis.navigation.error_model import (
     Place,
 )
 from procedures.analysis.navigation.instrument_errors import TriadErrors
-from procedures.core import units
 from procedures.core.arrays import Array
-from procedures.core.report import Figure, Series
-
-INTERVAL = 1.959964
-"""Half-length of the 95 % interval of a Gaussian, in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -86,22 +80,3 @@ def warnings(gyro: TriadErrors, accelerometer: TriadErrors, has_launch: bool) ->
     if not has_launch:
         found.append("the change from launch to launch is not known: the figures hold for the calibration's own launch")
     return tuple(found)
-
-
-def figures(time_s: Sequence[float], told: Sequence[Curve]) -> tuple[Figure, ...]:
-    """Position, velocity and attitude over time, half-lengths of the 95 % intervals."""
-    hours = tuple(t / units.HOUR for t in time_s)
-    kinds = (("Position", "m", "m", 1.0), ("Velocity", "m/s", "m/s", 1.0), ("Attitude", "rad", "arcsec", units.ARCSEC))
-    return tuple(
-        Figure(
-            f"{title}, 95 % interval",
-            "time, h",
-            f"± {unit}",
-            tuple(
-                Series(c.name, hours, tuple(INTERVAL * v / size for v in c.sd), style="line")
-                for c in told
-                if c.unit == si
-            ),
-        )
-        for title, si, unit, size in kinds
-    )

@@ -42,8 +42,7 @@ def calibrated_triad(calibration: TriadCalibration, record: TriadRecord | None, 
     constant = {CALIBRATION: of_coefficients @ calibration.covariance_array @ of_coefficients.T}
     in_counts = calibration.output_unit == "count"
     if record is not None and not in_counts:
-        of_scale = record.scale_factor_run_to_run_sd * (matrix @ vector_b)
-        launch = 2.0 * (record.bias_run_to_run_sd**2 + of_scale**2)
+        launch = 2.0 * record.launch_covariance((matrix @ vector_b)[None])[:, 0, 0]
         if np.any(launch > 0.0):
             constant[LAUNCH] = inverse @ np.diag(launch) @ inverse.T
     noise = () if record is None else record.noise

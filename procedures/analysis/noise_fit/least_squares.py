@@ -14,6 +14,7 @@ from scipy.optimize import nnls
 from scipy.special import ndtri
 
 from procedures.analysis.allan.deviation import Deviation
+from procedures.analysis.least_squares.inverse import scaled_pinv
 from procedures.analysis.noise_fit.columns import allan_columns
 from procedures.analysis.noise_fit.estimate import PROCESSES, Estimate, NoiseFit
 from procedures.core.arrays import Array
@@ -93,8 +94,7 @@ class _Fit:
         """Of the present elements of v, (p, p); the sandwich at the model that v makes."""
         weight = np.sqrt(0.5 * self._edf) / (self._columns @ v)
         columns = self._columns[:, present] * weight[:, None]
-        norm = np.sqrt(np.sum(columns**2, axis=0))
-        inverse = np.linalg.pinv(columns / norm) / norm[:, None]
+        inverse = scaled_pinv(columns)
         return inverse @ correlation @ inverse.T
 
 

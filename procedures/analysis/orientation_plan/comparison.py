@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from procedures.analysis.calibration.plan import TriadPlan, predicted_parts, triad_plan
+from procedures.analysis.calibration.plan import TriadPlan, parts_by_noise, triad_plan
 from procedures.analysis.calibration.reference import reference_magnitude, reference_vectors
 from procedures.analysis.calibration.scalar import fit_scalar, scalar_parameters
-from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.station_plan import move_time_s, windows
 from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.orientation_plan.information import Model, TriadDesign
@@ -100,13 +100,8 @@ def total_time_s(angles: Sequence[TableAngles], dwell_s: float, setting: Setting
 def in_short_order(angles: Sequence[TableAngles], setting: Setting) -> tuple[TableAngles, ...]:
     """Always the nearest orientation next, beginning from the table's zero."""
     left, at, ordered = list(angles), TableAngles(), list[TableAngles]()
-
-    def move(to: TableAngles) -> float:
-        turns = (to.outer_deg - at.outer_deg, to.middle_deg - at.middle_deg, to.inner_deg - at.inner_deg)
-        return max(move_time_s(turn, *axis) for turn, axis in zip(turns, setting.axes, strict=True))
-
     while left:
-        at = min(left, key=move)
+        at = min(left, key=partial(move_time_s, at, axes=setting.axes))
         left.remove(at)
         ordered.append(at)
     return tuple(ordered)
@@ -137,9 +132,7 @@ def design(triad: str, count: int, dwell_s: float, setting: Setting) -> TriadDes
     """A triad for a search of `count` orientations: the noise of a dwell, split in what stations share and what not."""
     record = stations([TableAngles()] * count, dwell_s, setting.settle_s)
     plan = triad_plan(triad, setting.unit, record, setting.axes, setting.site, setting.table)
-    covariance = triad_covariance(setting.unit.triad(triad), windows(record, setting.axes))
-    if covariance is None:
-        raise BadParameter("unit", setting.unit.serial, f"the noise of its {triad} triad is not known")
+    covariance = _known_noise(plan)
     off = ~np.eye(count, dtype=bool)
     shared = np.maximum(np.array([c[off].mean() for c in covariance]), 0.0)
     own = np.array([np.diagonal(c).mean() for c in covariance]) - shared
@@ -160,9 +153,7 @@ def worst_bound(triad: str, count: int, total_s: float, setting: Setting) -> flo
     dwell = (total_s - count * setting.settle_s) / count
     record = stations([TableAngles()] * count, dwell, setting.settle_s)
     plan = triad_plan(triad, setting.unit, record, setting.axes, setting.site, setting.table)
-    covariance = plan.noise_covariance()
-    if covariance is None:
-        raise BadParameter("unit", setting.unit.serial, f"the noise of its {triad} triad is not known")
+    covariance = _known_noise(plan)
     required = setting.requirements[triad]
     least = np.array([np.linalg.eigvalsh(c)[0] for c in covariance]) / np.diagonal(plan.matrix) ** 2
     scale = np.sqrt(least.sum() / count) / np.linalg.norm(plan.vectors[0])
@@ -175,18 +166,21 @@ def worst_by_triad(plan: ScoredPlan) -> dict[str, float]:
     return {triad: plan.worst(triad) for triad in plan.relative}
 
 
-def _linear_sd(plan: TriadPlan) -> Array:
-    parts = predicted_parts(plan)
-    if parts is None:
+def _known_noise(plan: TriadPlan) -> Array:
+    """Covariance of the station means, (3, n, n). Raises `BadParameter` where the unit's record has none."""
+    covariance = plan.noise_covariance()
+    if covariance is None:
         raise BadParameter("unit", plan.unit.serial, f"the noise of its {plan.triad} triad is not known")
-    return np.hypot(*parts)
+    return covariance
+
+
+def _linear_sd(plan: TriadPlan) -> Array:
+    return np.hypot(*parts_by_noise(plan, _known_noise(plan)))
 
 
 def _scalar_sd(plan: TriadPlan, setting: Setting) -> Array:
     """Of `fit_scalar` at the very outputs that the plan would give without noise."""
-    noise = plan.noise_covariance()
-    if noise is None:
-        raise BadParameter("unit", plan.unit.serial, f"the noise of its {plan.triad} triad is not known")
+    noise = _known_noise(plan)
     angles = [s.angles for s in plan.stations if s.angles is not None]
     vectors = reference_vectors(plan.triad, angles, setting.site)
     start = scalar_parameters(np.column_stack([np.zeros(3), plan.matrix]).ravel())

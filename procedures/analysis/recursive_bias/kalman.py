@@ -80,10 +80,6 @@ class RecursiveBias:
         self.count = k + 1
         return self.estimate
 
-    def long_enough(self, target_sd: float) -> bool:
-        """Whether the estimate is as sure as asked for: the signal to end a dwell."""
-        return self.sd <= target_sd
-
     def enough_at(self, target_sd: float) -> int | None:
         """Number of measurements that will be enough, known before the first; None where all n are too few."""
         reached = np.flatnonzero(self.variances <= target_sd**2)

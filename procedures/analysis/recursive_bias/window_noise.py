@@ -8,16 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import toeplitz
-from scipy.special import chdtrc
 
 from procedures.analysis.calibration.station_noise import mean_covariance
 from procedures.analysis.calibration.station_plan import dwell_for
+from procedures.analysis.cells import cell_means
+from procedures.analysis.least_squares.chi_square import tail_probability
 from procedures.analysis.least_squares.whitening import whitener
 from procedures.analysis.recursive_bias.kalman import RecursiveBias
 from procedures.core.arrays import Array
 from procedures.core.errors import MissingChannel, UnfitRecording
 from procedures.core.noise import NoiseCoefficients
-from procedures.core.recording import INCREMENTS, Recording
+from procedures.core.recording import Recording
 
 WINDOWS_MAX = 300
 """Windows a recording is cut into at the most: their covariance is a full matrix."""
@@ -40,10 +41,9 @@ def window_means(recording: Recording, names: tuple[str, ...], window_s: float) 
     """Block by block; the window is lengthened so that there are at most `WINDOWS_MAX`, what is left over is cut off.
 
     Raises `MissingChannel`, and `UnfitRecording` where there are fewer than `WINDOWS_MIN` windows or samples that are
-    not numbers.
+    not numbers or not as many as announced.
     """
     info = recording.info
-    columns = [info.column(name) for name in names]
     size = max(1, round(window_s * info.rate_hz), -(-info.count // WINDOWS_MAX))
     count = info.count // size
     if count < WINDOWS_MIN:
@@ -51,23 +51,11 @@ def window_means(recording: Recording, names: tuple[str, ...], window_s: float) 
             f"recording {info.id}: {info.duration_s:g} s give {count} windows of {size / info.rate_hz:g} s, "
             f"at least {WINDOWS_MIN} are needed"
         )
-    sums, seen = np.zeros((count, len(columns))), 0
-    for block in recording.blocks():
-        raw = np.asarray(block)[: max(0, count * size - seen), columns].astype(np.float64)
-        if not np.all(np.isfinite(raw)):
-            raise UnfitRecording(f"recording {info.id} holds samples that are not numbers")
-        if len(raw):
-            first = seen // size
-            edges = [0, *range((first + 1) * size - seen, len(raw), size)]
-            sums[first : first + len(edges)] += np.add.reduceat(raw, edges, axis=0)
-        seen += len(raw)
-    channels = [info.channels[c] for c in columns]
-    gain = np.array([c.scale * (info.rate_hz if c.quantity in INCREMENTS else 1.0) for c in channels])
-    offset = np.array([c.offset for c in channels])
     length = size / info.rate_hz
+    means = cell_means(recording, names, length).rates.T
     edges_s = np.linspace(info.start_s, info.start_s + length * count, count + 1)
     windows = np.column_stack([edges_s[:-1], edges_s[1:]])
-    return WindowMeans(length, (sums / size - offset) * gain, windows)
+    return WindowMeans(length, means, windows)
 
 
 def contiguous_covariance(noise: NoiseCoefficients, windows: Array) -> Array:
@@ -116,7 +104,7 @@ def slow_noise_p(means: Array, covariance: Array) -> float:
     weights = whitener(averaging @ covariance @ averaging.T)
     values, ones = weights @ averaging @ means, weights @ np.ones(BATCHES)
     residuals = values - ones * float(ones @ values) / float(ones @ ones)
-    return float(chdtrc(BATCHES - 1, float(residuals @ residuals)))
+    return tail_probability(float(residuals @ residuals), BATCHES - 1)
 
 
 def predicted_sd(noise: NoiseCoefficients, dwell_s: float, start_s: float, prior_variance: float | None) -> float:

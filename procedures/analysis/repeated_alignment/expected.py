@@ -17,7 +17,7 @@ from procedures.analysis.calibration.table_errors import TableUncertainty, table
 from procedures.analysis.navigation.alignment import InitialAttitude, initial_attitude, require_alignable
 from procedures.core import units
 from procedures.core.arrays import Array
-from procedures.core.errors import BadParameter, DomainError, Undetermined
+from procedures.core.errors import BadParameter, Undetermined
 from procedures.core.frames import reference_rotation, table_rotation
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Station
@@ -93,11 +93,8 @@ def reference_attitudes(angles: Sequence[TableAngles], site: Site) -> Array:
 
 
 def calibration_in_use(unit: Unit, triad: str) -> TriadCalibration:
-    """The unit's current calibration of a triad, or a refusal that says what to do."""
-    calibration = unit.calibration(triad)
-    if calibration is None:
-        raise DomainError(f"unit {unit.serial} has no calibration of its {triad} triad to align with: calibrate it")
-    return calibration
+    """The unit's current calibration of a triad, which is aligned with. Raises `DomainError` without one."""
+    return unit.required_calibration(triad, "align with")
 
 
 def expected_errors(plan: Alignments) -> ExpectedErrors:
@@ -178,10 +175,7 @@ def _launch_to_launch(plan: Alignments, triad: str, outputs: Array) -> Array:
     n, launches = len(plan.angles), np.array(plan.launches)
     if record is None:
         return np.zeros((3, n, n))
-    change = record.bias_run_to_run_sd**2 + record.scale_factor_run_to_run_sd**2 * np.einsum(
-        "ic,jc->cij", outputs, outputs
-    )
-    return change * (1.0 + (launches[:, None] == launches[None, :]))
+    return record.launch_covariance(outputs) * (1.0 + (launches[:, None] == launches[None, :]))
 
 
 def _spread(per_channel: Array, covariance: Array) -> Array:

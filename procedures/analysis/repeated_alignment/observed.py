@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from procedures.analysis.calibration.station_means import station_means
+from procedures.analysis.calibration.station_means import require_unit_of, station_means
 from procedures.analysis.calibration.table_errors import TableUncertainty
-from procedures.analysis.calibration.verification import chi_square_p, predicted_sd
-from procedures.analysis.navigation.alignment import azimuth_error, initial_attitude
+from procedures.analysis.calibration.verification import predicted_sd
+from procedures.analysis.least_squares.chi_square import chi_square, tail_probability
+from procedures.analysis.navigation.alignment import initial_attitude
 from procedures.analysis.repeated_alignment.expected import (
     ANGLES,
     TRIADS,
@@ -62,16 +63,6 @@ class AngleErrors:
     """Chance of one at least as large."""
 
 
-@dataclass(frozen=True)
-class ThesisPrediction:
-    """Azimuth error of one alignment by thesis 1.1: in-run noise alone, no calibration, launch or table in it."""
-
-    added_deg: float
-    """The parts' magnitudes added, as printed."""
-    independent_deg: float
-    """Root of the sum of their squares."""
-
-
 def recorded_alignments(recordings: Sequence[Recording], unit: Unit, site: Site, table: TableUncertainty) -> Alignments:
     """When and where the recordings were made. Raises `UnfitRecording` where one has no table angles."""
     infos = [r.info for r in recordings]
@@ -92,10 +83,7 @@ def found_attitudes(recordings: Sequence[Recording], plan: Alignments) -> Array:
     labels: tuple[str, ...] = ()
     for triad in TRIADS:
         calibration, means = calibration_in_use(plan.unit, triad), station_means(recordings, triad)
-        if means.output_unit != calibration.output_unit:
-            raise UnfitRecording(
-                f"the {triad} channels are in {means.output_unit}, the calibration is for {calibration.output_unit}"
-            )
+        require_unit_of(calibration, means)
         vectors[triad], labels = correct(means.outputs, calibration), means.labels
     site = (plan.site.latitude_deg, plan.site.gravity_m_s2, plan.site.earth_rate_rad_s)
     found = np.empty((len(recordings), 3))
@@ -139,7 +127,7 @@ def judged_angle(angle: int, errors: Array, expected: ExpectedErrors) -> AngleEr
     """Errors (n, 3) [rad] of one of `ANGLES`, by index, against their covariance."""
     e, covariance = errors[:, angle], expected.of_angle(angle)
     n = len(e)
-    chi_square, p_value = chi_square_p(e, covariance) if expected.noise_known else (None, None)
+    statistic = chi_square(e, covariance) if expected.noise_known else None
     return AngleErrors(
         ANGLES[angle],
         float(e.mean()) / units.DEG,
@@ -148,26 +136,9 @@ def judged_angle(angle: int, errors: Array, expected: ExpectedErrors) -> AngleEr
         predicted_sd(covariance) / units.DEG if n > 1 else None,
         rms_deg(covariance),
         {source: rms_deg(expected.part(source, angle)) for source in expected.by_source},
-        chi_square,
-        p_value,
+        statistic,
+        None if statistic is None else tail_probability(statistic, n),
     )
-
-
-def thesis_prediction(unit: Unit, site: Site, base_turn_arcsec: float, alignment_s: float) -> ThesisPrediction | None:
-    """Thesis 1.1 with the noisiest channel of each triad, since any may look east; None where noise is not known."""
-    if unit.gyro is None or unit.accelerometer is None:
-        return None
-    added, independent = azimuth_error(
-        site.latitude_deg,
-        site.gravity_m_s2,
-        max(n.bias_instability for n in unit.accelerometer.noise),
-        max(n.bias_instability for n in unit.gyro.noise),
-        max(n.random_walk for n in unit.gyro.noise),
-        base_turn_arcsec * units.ARCSEC,
-        alignment_s,
-        site.earth_rate_rad_s,
-    )
-    return ThesisPrediction(added / units.DEG, independent / units.DEG)
 
 
 def _triple(values: Array) -> Triple:

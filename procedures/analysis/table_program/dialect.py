@@ -7,9 +7,12 @@ The thesis shows one program and no grammar; this is the least grammar that has 
     :demand:position axis,degrees; p axis,degrees; p axis,degrees
     delay seconds
 
-Axis 1 is the outer one, 2 the middle, 3 the inner. Letters may be large or small, blanks stand where they like between
-words. A demand sets the axes that it names, and the others stay; a delay is a dwell at what was demanded. Nothing else
-is understood, and nothing is skipped: a line outside the dialect is refused with its number and what was expected.
+Axis 1 is the inner one, 2 the middle, 3 the outer. The thesis does not name them; the other way round its program would
+be no calibration: the accelerometers' design would have rank 3 of 4.
+
+Letters may be large or small, blanks stand where they like between words. A demand sets the axes that it names, and the
+others stay; a delay is a dwell at what was demanded. Nothing else is understood, and nothing is skipped: a line outside
+the dialect is refused with its number and what was expected.
 """
 
 import re
@@ -19,7 +22,7 @@ from procedures.core.errors import BadParameter
 from procedures.core.table_angles import TableAngles
 
 MODE, DEMAND, DELAY = ":mode:position", ":demand:position", "delay"
-AXES = {"1": "outer", "2": "middle", "3": "inner"}
+AXES = {"1": "inner", "2": "middle", "3": "outer"}
 DEGREES_MAX = 3600.0
 """Ours: ten turns. What an axis can reach is for the bench to say."""
 DELAY_MAX_S = 86_400.0
@@ -72,7 +75,7 @@ class _Reader:
                     raise refusal(line, code, f"'p axis,degrees' after ';', not {part.strip()!r}")
             axis, comma, degrees = (piece.strip() for piece in named.partition(","))
             if axis not in AXES:
-                raise refusal(line, code, f"an axis, 1 (outer), 2 (middle) or 3 (inner), not {axis!r}")
+                raise refusal(line, code, f"an axis, 1 (inner), 2 (middle) or 3 (outer), not {axis!r}")
             if not comma:
                 raise refusal(line, code, f"a comma and degrees after axis {axis}")
             if axis in self.pending:
@@ -91,8 +94,12 @@ class _Reader:
             raise refusal(line, code, f"'{DEMAND}' of axis {', '.join(missing)} first: nobody knows where it stands")
         if len(self.dwells) == DWELLS_MAX:
             raise refusal(line, code, f"no more: {DWELLS_MAX} delays are the most")
-        self.dwells.append(Dwell(TableAngles(self.at["1"], self.at["2"], self.at["3"]), delay_s, line))
+        self.dwells.append(Dwell(self._angles(), delay_s, line))
         self.pending.clear()
+
+    def _angles(self) -> TableAngles:
+        degrees = {name: self.at[axis] for axis, name in AXES.items()}
+        return TableAngles(degrees["outer"], degrees["middle"], degrees["inner"])
 
 
 def read_program(text: str) -> tuple[Dwell, ...]:

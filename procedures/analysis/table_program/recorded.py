@@ -11,7 +11,7 @@ from procedures.analysis.cells import CellStream, channel_rows
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.noise import NoiseCoefficients
-from procedures.core.recording import TRIADS, Recording, Station
+from procedures.core.recording import Recording, Station, require_complete, require_finite
 from procedures.core.unit import Unit
 
 
@@ -43,15 +43,6 @@ class DwellRecord:
     means: tuple[ChannelMean, ...]
 
 
-def channel_noise(unit: Unit, channel: str) -> NoiseCoefficients | None:
-    """Noise of a channel of the two triads by name; None where it is not known."""
-    for triad, names in TRIADS.items():
-        record = unit.triad(triad)
-        if channel in names and record is not None:
-            return record.noise[names.index(channel)]
-    return None
-
-
 def mean_sd(noise: NoiseCoefficients, start_s: float, stop_s: float) -> float:
     """Standard uncertainty of a mean over [start, stop] since launch as the channel's output of that launch [rate]."""
     return float(np.sqrt(mean_covariance(noise, [[start_s, stop_s]])[0, 0]))
@@ -77,7 +68,7 @@ def _record(recording: Recording, station: Station, unit: Unit) -> DwellRecord:
     means, scatter = _means(recording, names)
     found: list[ChannelMean] = []
     for k, channel in enumerate(info.channels):
-        noise = None if channel.rate_unit == "count" else channel_noise(unit, channel.name)
+        noise = unit.channel_noise(channel)
         start = info.since_launch_s
         sd = None if scatter is None else float(scatter[k])
         known = None if noise is None else mean_sd(noise, start, start + info.duration_s)
@@ -94,14 +85,12 @@ def _means(recording: Recording, names: tuple[str, ...]) -> tuple[Array, Array |
     stream = CellStream(info, names, batch_s) if batch_s > 0.0 else None
     total, seen = np.zeros(len(names)), 0
     for rows in channel_rows(info, names, recording.blocks()):
-        if not np.all(np.isfinite(rows)):
-            raise UnfitRecording(f"recording {info.id} holds samples that are not numbers")
+        require_finite(info, names, rows.T)
         total += rows.sum(axis=1)
         seen += rows.shape[1]
         if stream is not None:
             stream.add(rows)
-    if seen != info.count or not seen:
-        raise UnfitRecording(f"recording {info.id}: {seen} samples where {info.count} are announced")
+    require_complete(info, seen)
     if stream is None:
         return total / seen, None
     batches = stream.finish().rates

@@ -8,11 +8,11 @@ from procedures.analysis.table_program.dialect import DEMAND, MODE, Dwell
 from procedures.core.table_angles import TableAngles
 
 THESIS_POSITIONS = (
-    *((0.0, 0.0, 0.0, 10.0), (135.0, 90.0, -9.0, 102.0), (135.0, 90.0, -189.0, 60.0), (-45.0, 90.0, -189.0, 60.0)),
-    *((-45.0, -90.0, -189.0, 60.0), (-135.0, -90.0, -189.0, 60.0), (-135.0, -90.0, -9.0, 60.0)),
-    *((45.0, -90.0, -9.0, 60.0), (45.0, 90.0, -9.0, 60.0), (45.0, 0.0, -9.0, 60.0), (45.0, 0.0, -189.0, 60.0)),
-    *((45.0, 180.0, -189.0, 60.0), (-45.0, 180.0, -189.0, 60.0), (-45.0, 0.0, -189.0, 60.0)),
-    *((-45.0, -90.0, -189.0, 60.0), (0.0, 0.0, 0.0, 100.0)),
+    *((0.0, 0.0, 0.0, 10.0), (-9.0, 90.0, 135.0, 102.0), (-189.0, 90.0, 135.0, 60.0), (-189.0, 90.0, -45.0, 60.0)),
+    *((-189.0, -90.0, -45.0, 60.0), (-189.0, -90.0, -135.0, 60.0), (-9.0, -90.0, -135.0, 60.0)),
+    *((-9.0, -90.0, 45.0, 60.0), (-9.0, 90.0, 45.0, 60.0), (-9.0, 0.0, 45.0, 60.0), (-189.0, 0.0, 45.0, 60.0)),
+    *((-189.0, 180.0, 45.0, 60.0), (-189.0, 180.0, -45.0, 60.0), (-189.0, 0.0, -45.0, 60.0)),
+    *((-189.0, -90.0, -45.0, 60.0), (0.0, 0.0, 0.0, 100.0)),
 )
 """(outer, middle, inner) [deg] and delay [s] of the calibration program in the thesis's appendix Д."""
 
@@ -23,11 +23,11 @@ def write_program(dwells: Iterable[Dwell]) -> str:
     Every demand names all three axes, so that a program can be cut in two anywhere. Numbers have as many digits as they
     need to be read back exactly.
     """
-    lines = ["% axis 1 outer, 2 middle, 3 inner [deg]; a delay [s] counts from the demand before it", f"{MODE} all"]
+    lines = ["% axis 1 inner, 2 middle, 3 outer [deg]; a delay [s] counts from the demand before it", f"{MODE} all"]
     for dwell in dwells:
         a = dwell.angles
         outer, middle, inner = (_number(angle) for angle in (a.outer_deg, a.middle_deg, a.inner_deg))
-        lines += ["", f"{DEMAND} 1,{outer}; p 2,{middle}; p 3,{inner}", f"delay {_number(dwell.delay_s)}"]
+        lines += ["", f"{DEMAND} 1,{inner}; p 2,{middle}; p 3,{outer}", f"delay {_number(dwell.delay_s)}"]
     return "\n".join(lines) + "\n"
 
 

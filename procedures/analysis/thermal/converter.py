@@ -8,9 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from procedures.analysis.thermal.normalised import fit_normalised
 from procedures.core.arrays import Array
-from procedures.core.converter import ConverterModel
 from procedures.core.errors import BadParameter, UnfitRecording
 
 
@@ -37,17 +35,3 @@ def zero_and_scale(current_ma: float, plus_code: Array, minus_code: Array) -> Ze
         raise UnfitRecording("the converter answers opposite currents with the same code")
     scale = centred / current_ma
     return ZeroAndScale(zero, scale, zero / scale)
-
-
-def converter_model(
-    current_ma: float, plus_code: Array, minus_code: Array, sensor_c: Array, reference_c: float = 20.0, order: int = 2
-) -> ConverterModel:
-    """Model of a channel from mean codes at ±current, one pair a soak, and what its sensor read there, all (n,).
-
-    Raises as `zero_and_scale` and `fit_normalised`.
-    """
-    found = zero_and_scale(current_ma, plus_code, minus_code)
-    return ConverterModel(
-        fit_normalised(sensor_c, found.scale_code_per_ma, reference_c, order, relative=True),
-        fit_normalised(sensor_c, found.zero_code, reference_c, order, relative=False),
-    )

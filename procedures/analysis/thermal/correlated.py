@@ -13,6 +13,7 @@ import numpy as np
 from scipy.fft import dct
 
 from procedures.analysis.coloured_noise import FEWEST, cosines, fit_noise, unit_variances
+from procedures.analysis.least_squares.inverse import scaled_pinv
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.noise import NoiseCoefficients
@@ -105,7 +106,7 @@ def fit_linear(
     if count <= wanted:
         raise UnfitRecording(f"{count} cells cannot determine {wanted} coefficients")
     scaled = [(w[:, None] * a, w * y) for a, y, w in zip(designs, values, weights, strict=True)]
-    inverse = _inverse(np.concatenate([a for a, _ in scaled]))
+    inverse = scaled_pinv(np.concatenate([a for a, _ in scaled]))
     solution = inverse @ np.concatenate([y for _, y in scaled])
     found: Spectrum | None = None
     covariance = np.zeros((wanted, wanted))
@@ -116,7 +117,7 @@ def fit_linear(
         found = spectrum(left, cell_s)
         if generalised:
             whitened = [(whiten(a, v), whiten(y, v)) for (a, y), v in zip(scaled, found.variances, strict=True)]
-            inverse = _inverse(np.concatenate([a for a, _ in whitened]))
+            inverse = scaled_pinv(np.concatenate([a for a, _ in whitened]))
             solution = inverse @ np.concatenate([y for _, y in whitened])
             covariance = inverse @ inverse.T
         else:
@@ -129,13 +130,6 @@ def fit_linear(
         count / (found.inflation if found else 1.0),
         generalised,
     )
-
-
-def _inverse(design: Array) -> Array:
-    """Pseudo-inverse (k, m) of a design whose columns may differ by orders of magnitude."""
-    scale = np.linalg.norm(design, axis=0)
-    scale[scale == 0.0] = 1.0
-    return np.linalg.pinv(design / scale) / scale[:, None]
 
 
 def _sandwich(inverse: Array, found: Spectrum) -> Array:

@@ -34,12 +34,6 @@ class Correlation:
     p_value: float
     """How often noise alone would give as steep a slope, either way."""
 
-    def consistent_with_zero(self, level: float = 0.01) -> bool:
-        """Whether the test at this level finds nothing. Raises `BadParameter`."""
-        if not 0.0 < level < 1.0:
-            raise BadParameter("level", level, "above 0 and below 1")
-        return self.p_value >= level
-
 
 def correlation(
     signal: Array, temperature_c: Array, cell_s: float, noise: NoiseCoefficients | None = None

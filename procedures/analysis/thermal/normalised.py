@@ -8,6 +8,7 @@ departure from it. C writes the zero's change as its largest in the range times 
 import numpy as np
 
 from procedures.analysis.least_squares.determination import require_full_rank
+from procedures.analysis.least_squares.inverse import scaled_pinv
 from procedures.core.arrays import Array
 from procedures.core.converter import Normalised
 from procedures.core.errors import BadParameter, UnfitRecording
@@ -28,8 +29,7 @@ def fit_normalised(temperature_c: Array, values: Array, reference_c: float, orde
     design = np.vander(temperature_c - reference_c, order + 1, increasing=True)
     names = ["value at the reference", *(f"a_{k}" for k in range(1, order + 1))]
     require_full_rank("the temperature function", design, names)
-    scale = np.linalg.norm(design, axis=0)
-    inverse = np.linalg.pinv(design / scale) / scale[:, None]
+    inverse = scaled_pinv(design)
     c = inverse @ values
     left = values - design @ c
     variance = float(left @ left) / (len(values) - order - 1)

@@ -27,9 +27,19 @@ STUCK_C = 5.0
 """A sensor whose code stays the same while all others but one move by more than this is stuck."""
 
 
-def check_samples(rate_hz: float) -> int:
-    """Samples between two readings that are judged, at least one."""
-    return max(1, round(CHECK_S * rate_hz))
+class CheckedSamples:
+    """Picks the samples of a stream that are judged: the last of every `CHECK_S`, counted through its blocks."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._step = max(1, round(CHECK_S * rate_hz))
+        self._taken = 0
+
+    def of_block(self, length: int) -> list[tuple[int, float]]:
+        """Row in the stream's next block of `length` samples, and time since its beginning [s], of each of them."""
+        before, step = self._taken, self._step
+        self._taken += length
+        due = range((before // step + 1) * step, self._taken + 1, step)
+        return [(sample - before - 1, sample / step * CHECK_S) for sample in due]
 
 
 class Standing(StrEnum):

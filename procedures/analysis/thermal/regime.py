@@ -138,10 +138,6 @@ class RegimeTrace:
     rate_c_s: Array
     acceleration_c_s2: Array
 
-    def switches(self) -> NDArray[np.intp]:
-        """Indices of the first samples of a new regime."""
-        return np.flatnonzero(np.diff(self.dynamic.astype(np.int8))) + 1
-
 
 def regimes(temperature_c: Array, sample_s: float, settings: RegimeSettings | None = None) -> RegimeTrace:
     """The regime of a record of the case temperature (n,) [°C]: the very steps of `RegimeIndicator`, one after another.

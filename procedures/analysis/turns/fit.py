@@ -20,10 +20,11 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.special import chdtrc
 
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
+from procedures.analysis.least_squares.chi_square import judged_p_value
 from procedures.analysis.least_squares.determination import require_full_rank
+from procedures.analysis.least_squares.inverse import scaled_pinv
 from procedures.analysis.least_squares.whitening import whitener
 from procedures.core import units
 from procedures.core.arrays import Array
@@ -218,9 +219,7 @@ def turn_estimator(
         weights = whitener(own)
     else:
         weights = whitener(own + of_table @ of_table.T)
-    whole = block_diag(*columns)
-    scale = np.linalg.norm(whole, axis=0)
-    gain = np.linalg.pinv(weights @ whole / scale) @ weights / scale[:, None]
+    gain = scaled_pinv(weights @ block_diag(*columns)) @ weights
     return TurnEstimator(columns, gain, weights, gain @ own @ gain.T, gain @ of_table, flaws.source, condition)
 
 
@@ -266,6 +265,6 @@ def fit_turns(
     factor = 1.0 if noise is not None or freedom == 0 else chi_square / freedom
     noise_covariance = factor * plan.noise_covariance
     output_sd = np.sqrt(factor * np.diagonal(np.linalg.inv(plan.weights.T @ plan.weights))).reshape(3, -1).T
-    p_value = float(chdtrc(freedom, chi_square)) if noise is not None and freedom > 0 else None
+    p_value = judged_p_value(chi_square, freedom, noise is not None)
     covariance = noise_covariance + plan.table_per_sd @ plan.table_per_sd.T
     return TurnFit(plan, parameters, covariance, noise_covariance, residuals, output_sd, chi_square, freedom, p_value)

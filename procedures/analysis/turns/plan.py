@@ -81,8 +81,8 @@ class TurnPlan:
         spans = windows(stations, self.axes)
         motion = turning(stations, spans[:, 1] - spans[:, 0], self.site)
         noise = triad_covariance(self.unit.gyro, spans)
-        known = self.unit.calibration("gyro")
-        matrix = np.eye(3) if known is None or known.output_unit == "count" else known.matrix_array
+        known = self.unit.known_matrix("gyro")
+        matrix = np.eye(3) if known is None else known
         flaws = turn_flaws(motion, self.uncertainty)
         slopes = motion.axis_b @ matrix.T
         made = turn_estimator(motion, slopes, self.terms, self.reference_rad_s, noise, flaws, matrix)

@@ -44,24 +44,11 @@ class SelfHeating:
         """Of the five parameters, (5,)."""
         return np.sqrt(np.diagonal(np.array(self.covariance)))
 
-    @property
-    def time_constants_s(self) -> tuple[float, ...]:
-        """−1/p₂ and −1/p₄ of those that are there [s]."""
-        return tuple(-1.0 / self.parameters[i] for i in (1, 3)[: self.exponentials])
-
     def curve(self, t_s: Array) -> Array:
         """F at times since power-up [s], shape of `t_s` [rate]."""
         p1, p2, p3, p4, p5 = self.parameters
         x = np.asarray(t_s, dtype=np.float64) - self.start_s
         return p1 * np.exp(p2 * x) + p3 * np.exp(p4 * x) + p5
-
-    def curve_sd(self, t_s: Array) -> Array:
-        """Standard uncertainty of the heating ``F(t) − p₅`` at times since power-up, shape of `t_s` [rate]."""
-        p1, p2, p3, p4, _ = self.parameters
-        x = np.asarray(t_s, dtype=np.float64) - self.start_s
-        first, second = np.exp(p2 * x), np.exp(p4 * x)
-        gradient = np.array([first, p1 * x * first, second, p3 * x * second])
-        return np.sqrt(np.einsum("i...,ij,j...->...", gradient, np.array(self.covariance)[:4, :4], gradient))
 
     def removed(self, cells: Array, cell_s: float) -> Array:
         """The cells it was fitted to, (n,), without F(t) − F(t₀) (thesis 3.4), each F its cell's mean."""

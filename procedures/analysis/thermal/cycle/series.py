@@ -12,15 +12,14 @@ from procedures.analysis.cells import CellStream, channel_rows
 from procedures.analysis.thermal.profile_progress import (
     AIR,
     CASE,
-    CHECK_S,
     CONVERTER,
     DISCONNECTED_CODE,
     SENSORS,
     SET_POINT,
+    CheckedSamples,
     LegEvidence,
     ProfileProgress,
     Standing,
-    check_samples,
 )
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
@@ -117,23 +116,22 @@ class _Replay:
         self._id = info.id
         self._columns = [info.column(name) for name in (*SENSORS, AIR)]
         self._channels = [info.channels[c] for c in self._columns]
-        self._step, self._taken = check_samples(info.rate_hz), 0
+        self._checked = CheckedSamples(info.rate_hz)
 
     def watched(self, blocks: Iterator[RawArray]) -> Iterator[RawArray]:
         """The blocks as they are, judged in passing."""
         for block in blocks:
             self._require_connected(block)
-            first, self._taken = self._taken, self._taken + len(block)
-            for sample in range((first // self._step + 1) * self._step, self._taken + 1, self._step):
+            for row, t_s in self._checked.of_block(len(block)):
                 if self.progress.leg is not None:
-                    self._judge(block[sample - first - 1], sample)
+                    self._judge(block[row], t_s)
             yield block
 
-    def _judge(self, row: RawArray, sample: int) -> None:
+    def _judge(self, row: RawArray, t_s: float) -> None:
         codes = row[self._columns].tolist()
-        readings = [c.scale * (code - c.offset) for c, code in zip(self._channels, codes, strict=True)]
+        readings = [c.value(code) for c, code in zip(self._channels, codes, strict=True)]
         case, converter = readings[SENSORS.index(CASE)], readings[SENSORS.index(CONVERTER)]
-        if self.progress.step(sample / self._step * CHECK_S, case, converter, readings[-1]) is Standing.LATE:
+        if self.progress.step(t_s, case, converter, readings[-1]) is Standing.LATE:
             raise UnfitRecording(f"recording {self._id}: {self.progress.why_late(readings[-1])}")
 
     def _require_connected(self, block: RawArray) -> None:
