@@ -21,8 +21,8 @@ SHOWN_CHARACTERS = 80
 class Bounds:
     """What an import may take; grows with the size of the files beyond 100 MB."""
 
-    cells: int = 200_000_000
-    """Numbers that are read."""
+    cells: int = 100_000_000
+    """Numbers that are read: six channels at 400 Hz for 11 h."""
     unpacked_bytes: int = 4_000 * MEGABYTE
     """Text after unpacking, or columns of a columnar file."""
     memory_bytes: int = 250 * MEGABYTE

@@ -101,9 +101,9 @@ BOMBS: dict[str, Bomb] = {
     "500,000 names, text": Bomb(lambda: ",".join(f"c{i}" for i in range(500_000)).encode() + b"\n1\n", {}),
     "500,000 columns, Arrow": Bomb(lambda: _many_columns(500_000), {}),
     "Parquet of 2 GB of zeros": Bomb(lambda: _parquet(250_000_000, MB, 25), {}),
-    "Parquet with a page of 1 GB": Bomb(lambda: _parquet(125_000_000, 2000 * MB), {}),
-    "Parquet of 64 columns of zeros": Bomb(lambda: _parquet(3_000_000, MB, 1, 64), {}),
-    "Arrow with a batch of 1 GB": Bomb(lambda: _arrow(125_000_000), {}),
+    "Parquet with pages without a bound": Bomb(lambda: _parquet(90_000_000, 2000 * MB), {}),
+    "Parquet of 64 columns of zeros": Bomb(lambda: _parquet(1_500_000, MB, 1, 64), {}),
+    "Arrow with a batch of 800 MB": Bomb(lambda: _arrow(100_000_000), {}),
     "a gap of a million years": Bomb(lambda: b"t,x\n0,1\n1,1\n2,1\n3e13,1\n", {"time_column": "t", "gaps": "mark"}),
     "100 MB of falling time": Bomb(
         lambda: b"t,x\n" + b"9,1\n1,1\n" * 12_500_000, {"time_column": "t", "unwrap_clock": True}
