@@ -29,7 +29,7 @@ WRAP_STEPS = 50.0
 REPEATS_KEPT = 4_000_000
 FALLS_KEPT = 100
 FALLS_LOOKED_AT = 20_000
-"""Of a block: more are no wraps."""
+"""More falls are counted, and none of them is taken as a wrap."""
 
 Stamps = NDArray[np.int64] | Array
 
@@ -84,8 +84,7 @@ class ClockColumn:
             self.typical_s = float(np.median(steps[steps > 0.0]))
         falls = np.flatnonzero(steps < 0.0)
         if len(falls):
-            raw = [self._last_raw, *stamps.tolist()] if self.count else stamps.tolist()
-            self._fall(falls, steps, raw, row, time_s)
+            self._fall(falls, steps, stamps, row, time_s)
         still = np.flatnonzero(steps == 0.0)
         if len(still):
             self.still += len(still)
@@ -111,12 +110,14 @@ class ClockColumn:
         self.resolution.add(units + np.rint(self._carried_s / self.scale_s), error)
         return units * self.scale_s + self._carried_s
 
-    def _fall(self, falls: NDArray[np.intp], steps: Array, raw: Sequence[int | float], row: int, time_s: Array) -> None:
+    def _fall(self, falls: NDArray[np.intp], steps: Array, stamps: Stamps, row: int, time_s: Array) -> None:
         """Note falls; those that are wraps are carried on where that is wanted, in place."""
         shift = len(steps) - len(time_s)  # −1 in the first block, whose first stamp has no step
         carried = np.zeros(len(time_s))
-        for at in falls[:FALLS_LOOKED_AT]:
-            before, after = raw[at], raw[at + 1]
+        looked_at = falls[: max(0, FALLS_LOOKED_AT - self.fall_count)]
+        for at in looked_at:
+            before = stamps[at - shift - 1].item() if at > shift else self._last_raw
+            after = stamps[at - shift].item()
             wrap = self._wrap(float(steps[at]), before * self.scale_s, after * self.scale_s)
             fall = Fall(row + int(at), before, after, wrap)
             if wrap is not None and self.unwrap:
@@ -126,10 +127,7 @@ class ClockColumn:
             self.fall_count += 1
             if len(self.falls) < FALLS_KEPT:
                 self.falls.append(fall)
-        if len(falls) > FALLS_LOOKED_AT:
-            at = int(falls[FALLS_LOOKED_AT])
-            self.falls.append(Fall(row + at, raw[at], raw[at + 1], None))
-            self.fall_count += len(falls) - FALLS_LOOKED_AT
+        self.fall_count += len(falls) - len(looked_at)
         time_s += np.cumsum(carried)
         self._carried_s += float(carried.sum())
 

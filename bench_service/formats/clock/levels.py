@@ -13,6 +13,8 @@ LEAST = 0.45
 """Of a period: the change of the level that is looked at."""
 EARLY = 8
 """Rows within which a level that fell is back again where single stamps are early."""
+EVEN = 0.1
+"""Of their mean: by how much the distances of slips may differ."""
 MOST_LOST = 1e12
 """Samples in one place: what a stamp of nonsense says is cut off there."""
 MADE_UP_FOR = 10_000
@@ -48,9 +50,9 @@ class Places:
         return total[np.searchsorted(self.rows, rows, side="left")]
 
 
-def ahead_of(batch: int) -> int:
+def ahead_of(span: int) -> int:
     """Rows to look ahead, a power of two: several batches, so that each window has a row that is on time."""
-    return AHEAD if batch <= AHEAD // 4 else 1 << int(np.ceil(np.log2(4 * batch)))
+    return AHEAD if span <= AHEAD // 4 else 1 << int(np.ceil(np.log2(4 * min(span, 1 << 16))))
 
 
 def level(late: Array, ahead: int) -> Array:
@@ -105,6 +107,17 @@ def in_order(rows: NDArray[np.int64], samples: NDArray[np.int64], ahead: int) ->
                 rises.pop()
     kept, late = left != 0, (samples > 0) & (left != samples)
     return Places(rows[kept], left[kept], rows[late], (samples - left)[late])
+
+
+def without_slips(places: Places) -> Places:
+    """Without single samples that are lost, or too many, at equal distances: a coarse clock a little off its rate."""
+    apart = np.diff(places.rows)
+    if len(apart) < 2 or np.any(places.samples != places.samples[0]) or abs(int(places.samples[0])) != 1:
+        return places
+    if np.ptp(apart) > max(2.0, EVEN * float(np.mean(apart))):
+        return places
+    none = np.empty(0, np.int64)
+    return Places(none, none, places.late_rows, places.late)
 
 
 def _make_up(left: NDArray[np.int64], fall: int, rise: int) -> None:

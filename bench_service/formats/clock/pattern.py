@@ -26,6 +26,10 @@ SINGLE = 0.4
 """Share of the steps that are that one itself."""
 DENSE = 0.6
 """The smallest ratio of the shortest step to the mean one that speaks for lost rows, where the order is regular."""
+LONG_AND_SHORT = 0.004
+"""By so much the period of long chunks may differ from that of short ones where no row is lost in most of them."""
+SHARED = 1.5
+"""Of the period: a resolution beyond it makes rows share stamps, and in regular batches is taken as those."""
 CLEAN = 0.002
 """Share of shorter steps that speaks against lost rows where the clock resolves only a step or two of its own."""
 REGULAR = 0.9
@@ -43,6 +47,8 @@ class Pattern:
     """By how much stamps lie off their places, largest less smallest, over rows without a loss."""
     batch: int = 1
     """Rows that come together."""
+    span: int = 1
+    """Rows within which one is on time."""
 
 
 def find_pattern(
@@ -57,21 +63,26 @@ def find_pattern(
     mean_s = _mean_step(stretches)
     base_s = _shortest_usual(steps)
     steady = Pattern("steady", _refined(stretches, base_s, tolerance), 2.0 * tolerance * base_s)
-    near = abs(base_s / mean_s - 1.0) <= tolerance and _share_near(steps, base_s, tolerance) >= ON_LATTICE
-    if near or len(steps) < FEW or _expected(base_s, mean_s, declared_s):
+    if len(steps) < FEW or _expected(base_s, mean_s, declared_s):
         return steady
     by_mean = _expected(mean_s, base_s, declared_s)
-    if _is_coarse(stretches, resolution_s):
-        return Pattern("coarse", mean_s, 2.0 * (tolerance * mean_s + resolution_s))
     batch = _batch(steps, mean_s)
+    near = abs(base_s / mean_s - 1.0) <= tolerance and _share_near(steps, base_s, tolerance) >= ON_LATTICE
+    if near and resolution_s <= tolerance * base_s:
+        return steady
+    coarse_s = _coarse_period(stretches, resolution_s, mean_s)
+    if coarse_s is not None and not (batch > 1 and resolution_s > SHARED * coarse_s):
+        band_s = 2.0 * (tolerance * coarse_s + resolution_s)
+        return Pattern("coarse", coarse_s, band_s, span=int(np.ceil(resolution_s / coarse_s)))
     regular = batch > 1 and base_s < DENSE * mean_s
-    if _is_lattice(steps, base_s, tolerance, resolution_s) and not by_mean and not regular:
+    lattice = _is_lattice(steps, base_s, tolerance, resolution_s) and not by_mean and not regular
+    if near or lattice:
         return steady
     if batch > 1:
         mean_s = _batch_period(stretches, mean_s)
     chunks = _chunks(stretches, max(CHUNK, 4 * batch))
     band_s = max(float(np.ptp(t - mean_s * np.arange(len(t)))) for t in chunks)
-    return Pattern("batches" if batch > 1 else "jitter", mean_s, band_s, batch)
+    return Pattern("batches" if batch > 1 else "jitter", mean_s, band_s, batch, span=batch)
 
 
 def _expected(one_s: float, other_s: float, declared_s: float | None) -> bool:
@@ -116,20 +127,37 @@ def _refined(stretches: Sequence[Array], base_s: float, tolerance: float) -> flo
     return float(np.median(periods)) if periods else base_s
 
 
-def _is_coarse(stretches: Sequence[Array], resolution_s: float) -> bool:
-    """Whether most chunks are uniform up to the clock's resolution."""
+def _coarse_period(stretches: Sequence[Array], resolution_s: float, mean_s: float) -> float | None:
+    """The period where most chunks are uniform up to the clock's resolution, and show it; else None.
+
+    Rounding makes the steps of a uniform clock two neighbours. Steps that are all equal say nothing of the resolution:
+    that of stamps at whole multiples of the period is their period, for all that can be seen.
+    """
     chunks = _chunks(stretches, CHUNK)
-    if len(chunks[0]) < 3:
-        return False
-    within = 0
-    for t in chunks:
-        if np.ptp(np.diff(t)) > 1.01 * resolution_s:  # rounding makes the steps of a uniform clock two neighbours
-            continue
-        k = np.arange(len(t)) - 0.5 * (len(t) - 1)
-        centred = t - t.mean()
-        slope = float(k @ centred) / float(k @ k)
-        within += bool(np.max(np.abs(centred - slope * k)) <= COARSE * resolution_s)
-    return 2 * within > len(chunks)
+    rows = min(len(t) for t in chunks)
+    if rows < 3:
+        return None
+    times = np.array([t[:rows] for t in chunks])
+    ranges = np.ptp(np.diff(times, axis=1), axis=1)
+    slopes, residuals = _lines(times)
+    within = (ranges <= 1.01 * resolution_s) & (np.max(np.abs(residuals), axis=1) <= COARSE * resolution_s)
+    shown = within & (ranges >= 0.5 * resolution_s)
+    if 2 * np.count_nonzero(within) <= len(chunks) or 2 * np.count_nonzero(shown) <= np.count_nonzero(within):
+        return None
+    short_s = float(np.median(slopes[within]))  # lost rows are in few of the chunks, but each is short
+    if abs(mean_s / short_s - 1.0) < LONG_AND_SHORT or resolution_s < short_s:
+        return mean_s if abs(mean_s / short_s - 1.0) < LONG_AND_SHORT else short_s
+    long = _chunks(stretches, LONG_CHUNK)
+    slopes, _ = _lines(np.array([t[: min(len(t) for t in long)] for t in long]))
+    return float(np.median(slopes))
+
+
+def _lines(times: Array) -> tuple[Array, Array]:
+    """Slope (m,) and residuals (m, n) of a straight line through each row of stamps (m, n)."""
+    k = np.arange(times.shape[1]) - 0.5 * (times.shape[1] - 1)
+    centred = times - times.mean(axis=1, keepdims=True)
+    slopes = centred @ k / float(k @ k)
+    return slopes, centred - slopes[:, None] * k
 
 
 def _is_lattice(steps: Array, base_s: float, tolerance: float, resolution_s: float) -> bool:

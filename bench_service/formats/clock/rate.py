@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench_service.formats.clock.column import ClockColumn, windows
-from bench_service.formats.clock.levels import Places, ahead_of, changes, in_order
+from bench_service.formats.clock.levels import LEAST, Places, ahead_of, changes, in_order, without_slips
 from bench_service.formats.clock.pattern import Pattern
 from procedures.core.arrays import Array
 
@@ -14,6 +14,8 @@ STRETCH = 256
 """Steps of time whose mean is compared with that of all: jitter of a fifth of a step is 0.2 % of it."""
 WINDOW = 1 << 18
 """Rows that are looked at together."""
+SLIPS = 0.4
+"""Of the period: with a resolution beyond it a clock that is a little fast or slow slips by a step now and then."""
 PAUSE = 8
 """More samples lost in one place are a pause."""
 MOST_RUNS = 1000
@@ -81,9 +83,11 @@ def mean_rate(
 
     `tolerances` are of a step and of a rate, relative; `resolutions_s` the finest and the coarsest of the clock.
     """
-    ahead = ahead_of(pattern.batch)
+    ahead = ahead_of(pattern.span)
     walk = _walked(rows, pattern, ahead, tolerances[0], resolutions_s)
     places = in_order(np.concatenate(walk.rows), np.concatenate(walk.samples), ahead)
+    if resolutions_s[0] > SLIPS * pattern.period_s:
+        places = without_slips(places)
     rate_hz = _rate(rows, pattern, walk, places)
     worst, off = _worst(rows, walk, places, rate_hz, tolerances[1], pattern.band_s, pattern.batch)
     return MeanRate(rate_hz, places, worst, off)
@@ -94,7 +98,10 @@ def _walked(
 ) -> _Walk:
     walk = _Walk()
     finest, coarsest = resolutions_s
-    tolerances = tolerance, coarsest / pattern.period_s if coarsest > finest else 0.0
+    unsure = coarsest / pattern.period_s if coarsest > finest else 0.0
+    if pattern.kind == "coarse":  # the level of rounded stamps beats by the resolution
+        unsure = max(unsure, coarsest / pattern.period_s + 0.05 - LEAST)
+    tolerances = tolerance, unsure
     # Where rows come late as a rule, the last ones say nothing: none after them shows what is on time.
     on_time = pattern.kind == "steady" or (pattern.kind == "coarse" and 2.0 * coarsest < pattern.period_s)
     open_end = 0 if on_time else ahead
