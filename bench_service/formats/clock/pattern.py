@@ -28,6 +28,8 @@ DENSE = 0.6
 """The smallest ratio of the shortest step to the mean one that speaks for lost rows, where the order is regular."""
 LONG_AND_SHORT = 0.004
 """By so much the period of long chunks may differ from that of short ones where no row is lost in most of them."""
+MOST = 0.75
+"""Quantile of the chunks' bands that is taken as the usual one."""
 SHARED = 1.5
 """Of the period: a resolution beyond it makes rows share stamps, and in regular batches is taken as those."""
 CLEAN = 0.002
@@ -49,6 +51,8 @@ class Pattern:
     """Rows that come together."""
     span: int = 1
     """Rows within which one is on time."""
+    usual_band_s: float = 0.0
+    """The same as `band_s` over most rows, where stamps come as they arrived."""
 
 
 def find_pattern(
@@ -81,8 +85,9 @@ def find_pattern(
     if batch > 1:
         mean_s = _batch_period(stretches, mean_s)
     chunks = _chunks(stretches, max(CHUNK, 4 * batch))
-    band_s = max(float(np.ptp(t - mean_s * np.arange(len(t)))) for t in chunks)
-    return Pattern("batches" if batch > 1 else "jitter", mean_s, band_s, batch, span=batch)
+    bands = [float(np.ptp(t - mean_s * np.arange(len(t)))) for t in chunks]
+    usual_s = float(np.quantile(bands, MOST))  # of those without a loss
+    return Pattern("batches" if batch > 1 else "jitter", mean_s, max(bands), batch, batch, usual_s)
 
 
 def _expected(one_s: float, other_s: float, declared_s: float | None) -> bool:

@@ -16,6 +16,8 @@ WINDOW = 1 << 18
 """Rows that are looked at together."""
 SLIPS = 0.4
 """Of the period: with a resolution beyond it a clock that is a little fast or slow slips by a step now and then."""
+WHOLE = 0.9
+"""Of the period: with a resolution beyond it a slip cannot be told from a lost sample."""
 PAUSE = 8
 """More samples lost in one place are a pause."""
 MOST_RUNS = 1000
@@ -99,11 +101,15 @@ def _walked(
     walk = _Walk()
     finest, coarsest = resolutions_s
     unsure = coarsest / pattern.period_s if coarsest > finest else 0.0
+    ticks = finest / pattern.period_s
     if pattern.kind == "coarse":  # the level of rounded stamps beats by the resolution
-        unsure = max(unsure, coarsest / pattern.period_s + 0.05 - LEAST)
+        unsure = max(unsure, ticks + 0.05 - LEAST)
+    if pattern.kind in ("coarse", "steady") and SLIPS < ticks < WHOLE:  # a slip by one tick is less than a period
+        unsure = max(unsure, 1.1 * ticks - LEAST)
     tolerances = tolerance, unsure
     # Where rows come late as a rule, the last ones say nothing: none after them shows what is on time.
     on_time = pattern.kind == "steady" or (pattern.kind == "coarse" and 2.0 * coarsest < pattern.period_s)
+    on_time = on_time or (pattern.kind == "jitter" and pattern.usual_band_s < LEAST * pattern.period_s)
     open_end = 0 if on_time else ahead
     for start in range(0, rows.count, WINDOW):
         time_s = rows.read(start, start + WINDOW + ahead + 1)
