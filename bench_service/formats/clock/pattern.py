@@ -82,8 +82,7 @@ def find_pattern(
     lattice = _is_lattice(steps, base_s, tolerance, resolution_s) and not by_mean and not regular
     if near or lattice:
         return steady
-    if batch > 1:
-        mean_s = _batch_period(stretches, mean_s)
+    mean_s = _batch_period(stretches, mean_s) if batch > 1 else _jitter_period(stretches, mean_s)
     chunks = _chunks(stretches, max(CHUNK, 4 * batch))
     bands = [float(np.ptp(t - mean_s * np.arange(len(t)))) for t in chunks]
     usual_s = float(np.quantile(bands, MOST))  # of those without a loss
@@ -155,6 +154,16 @@ def _coarse_period(stretches: Sequence[Array], resolution_s: float, mean_s: floa
     long = _chunks(stretches, LONG_CHUNK)
     slopes, _ = _lines(np.array([t[: min(len(t) for t in long)] for t in long]))
     return float(np.median(slopes))
+
+
+def _jitter_period(stretches: Sequence[Array], mean_s: float) -> float:
+    """The period of short chunks, where the mean step of long ones is longer for the rows that are lost in most."""
+    chunks = _chunks(stretches, CHUNK)
+    rows = min(len(t) for t in chunks)
+    slopes, _ = _lines(np.array([t[:rows] for t in chunks]))
+    short_s = float(np.median(slopes))
+    scatter = 1.5 * float(np.median(np.abs(slopes - short_s))) / np.sqrt(len(slopes))
+    return short_s if mean_s - short_s > max(LONG_AND_SHORT * short_s, 3.0 * scatter) else mean_s
 
 
 def _lines(times: Array) -> tuple[Array, Array]:
