@@ -6,7 +6,7 @@ VALIDATIONS := calibration allan noise conditioning whole_turns alignment withou
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test bench chaos check validate lock clean
+.PHONY: help run test bench chaos format check validate lock clean
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -27,6 +27,9 @@ test: $(VENV)/.ready  ## the whole test suite
 
 chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books
 	@$(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both
+
+format: $(VENV)/.ready  ## format the code, put imports in order, mend what ruff can mend safely
+	@$(BIN)/ruff check --fix-only --quiet . ; $(BIN)/ruff format --quiet .
 
 check: $(VENV)/.ready  ## format, lint, types, import contracts
 	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/lint-imports --no-cache && $(BIN)/basedpyright

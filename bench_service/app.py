@@ -10,10 +10,11 @@ from fastapi import Depends, FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
-from bench_service.api import audit, benches, health, metrics, procedures, recordings, reservations, results, trends
+from bench_service.api import audit, health, metrics, procedures, recordings, reservations, results, trends
+from bench_service.api.benches import routes as benches
 from bench_service.api.campaigns import routes as campaigns
 from bench_service.api.campaigns import schedules
-from bench_service.api.http import bodies, errors, request_id
+from bench_service.api.http import bodies, door, errors, headers, request_id
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs import routes as jobs
 from bench_service.api.units import routes as units
@@ -34,7 +35,7 @@ from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.worker import Worker
-from bench_service.pages import campaign_pages, figures
+from bench_service.pages import campaign_pages, docs, figures, images, static_files
 from bench_service.pages import routes as pages
 from bench_service.persistence import BenchLease, acquire_lease, engine_database, lease_holder, open_stores
 from bench_service.persistence.bench.host_files import HostFiles
@@ -134,8 +135,11 @@ def _dispatcher(
     return Dispatcher(settings.bench_id, stores, runner, engine, lease, settings.poll_s)
 
 
-def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[], None]) -> FastAPI:
-    """The application around a service that is open; `at_end` is called when the server shuts down."""
+def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[], None], rules: door.Door) -> FastAPI:
+    """The application around a service that is open; `at_end` is called when the server shuts down.
+
+    `rules`: which requests are let in.
+    """
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncGenerator[None]:
@@ -152,6 +156,8 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         lifespan=lifespan,
         generate_unique_id_function=lambda route: route.name,
         dependencies=[Depends(bodies.only_plain_json)],
+        docs_url=None,  # the framework's own pages load scripts from another host
+        redoc_url=None,
     )
     app.state.service = service
     app.state.hub = EventHub(service.stores.jobs, service.live, event_stream.FRAMES)
@@ -159,12 +165,14 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
     app.state.import_threads = CapacityLimiter(IMPORT_THREADS)
     for module in ROUTERS:
         app.include_router(module.router)
-    app.include_router(pages.router)
-    app.include_router(campaign_pages.router)
+    for page in (static_files, docs, images, pages, campaign_pages):
+        app.include_router(page.router)
     app.add_middleware(bodies.Bounded)
     errors.install(app)
+    app.add_middleware(door.Doorkeeper, door=rules)
     metrics.install(app, service)
     app.add_middleware(audit.Audited, trail=service.stores.audit)
+    app.add_middleware(headers.SecurityHeaders)
     app.add_middleware(request_id.RequestId)
     service.traces.instrument(app)
     _declare_problem(app)

@@ -16,6 +16,7 @@ from bench_service.jobs.service import JobService
 from bench_service.jobs.stops import StopService
 from bench_service.jobs.worker import Worker
 from bench_service.model.errors import NotDriving, NotReady
+from bench_service.model.records import reasons_of
 from bench_service.telemetry.tracing import Traces
 
 LEAST_FREE_BYTES = 200_000_000
@@ -109,8 +110,9 @@ class BenchService:
             reasons += self._worker.troubles()
         if reasons:
             raise NotReady(reasons)
-        stops = (self.stores.benches.bench_stop(bench) for bench in self.benches.ids())
-        return tuple(f"bench {stop.bench} is stopped: {stop.reason}" for stop in stops if stop is not None)
+        standing = ((bench, self.stores.benches.standing_stops(bench)) for bench in self.benches.ids())
+        stopped = (f"bench {bench} is stopped: {reasons_of(stops)}" for bench, stops in standing if stops)
+        return (*stopped, *self.catalogue.notes())
 
     def stop(self) -> None:
         """End the service: the running job is left for the next start, the bench made safe."""

@@ -2,14 +2,25 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 from urllib.parse import urlsplit
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+LEAST_TOKEN = 20
+"""Characters of the shortest token that is taken."""
 
 
 class BadSettings(Exception):
     """A setting from the environment is not usable; the message names it."""
+
+
+def _listed(given: object) -> object:
+    """The parts of a list that is written with commas."""
+    return tuple(part for part in map(str.strip, given.split(",")) if part) if isinstance(given, str) else given
+
+
+HostName = Annotated[str, Field(pattern=r"^(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(:[0-9]{1,5})?$")]
 
 
 class Settings(BaseModel):
@@ -20,6 +31,18 @@ class Settings(BaseModel):
     database_url: str = "sqlite:///.bench/bench.sqlite"
     """`sqlite:///file` (embedded, one machine) or `postgresql+psycopg://…`."""
     host: str = "127.0.0.1"
+    """An address other than a loopback one needs `token_file` or `published`."""
+    hosts: Annotated[tuple[HostName, ...], BeforeValidator(_listed)] = ()
+    """Names beside the loopback ones that requests may speak to, separated by commas: those of a proxy, of a container.
+
+    With a port (`bench.example:8443`) only that port."""
+    token_file: Path | None = None
+    """File with the token that programs send from elsewhere than this host, as `Authorization: Bearer …`.
+
+    The service asks for it, and commands with `--server` send it."""
+    published: Literal["loopback"] | None = None
+    """`loopback`: the service's address is reached only through a port published on a loopback address (a container's),
+    or through a proxy there that lets in only people it knows; then every peer counts as one of this host."""
     port: int = Field(8000, ge=0, le=65535)
     bench_id: str = Field("sim", pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")
     """The one bench that this process drives."""
@@ -53,6 +76,21 @@ class Settings(BaseModel):
     """Where traces go (OTLP over HTTP, protobuf); None: nowhere, unless OTEL_EXPORTER_OTLP_ENDPOINT names a place."""
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported."""
+
+    def token(self) -> str | None:
+        """The token of `token_file`; None where the settings name none. Raises `BadSettings`."""
+        if self.token_file is None:
+            return None
+        try:
+            words = self.token_file.read_text(encoding="utf-8").split()
+        except OSError as error:
+            raise BadSettings(f"BENCH_TOKEN_FILE {self.token_file} cannot be read: {error.strerror}") from error
+        except UnicodeDecodeError as error:
+            raise BadSettings(f"BENCH_TOKEN_FILE {self.token_file} is not UTF-8 text") from error
+        if len(words) != 1 or len(words[0]) < LEAST_TOKEN or not words[0].isascii():
+            text = f"must hold one token of at least {LEAST_TOKEN} letters, digits or signs"
+            raise BadSettings(f"BENCH_TOKEN_FILE {self.token_file} {text}")
+        return words[0]
 
     def devices_in(self) -> Path:
         """The folder of the devices' registers."""

@@ -2,9 +2,9 @@
 
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Self, TypeVar
+from typing import Annotated, Any, Generic, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from procedures.bench import Bench, BenchDescription
 from procedures.bench.imu import Stream
@@ -36,6 +36,16 @@ class Outcome(BaseModel):
     warnings: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class Estimate:
+    """A named number of a result. Limits and trends of campaigns may be about it, as about a check."""
+
+    name: str
+    unit: str
+    estimate: float
+    standard_uncertainty: float
+
+
 P = TypeVar("P", bound=Parameters)
 R = TypeVar("R", bound=Outcome)
 
@@ -57,6 +67,12 @@ class PredictedUncertainty:
     standard_uncertainty: float
     from_noise: float
     from_table: float = 0.0
+    quantity: Annotated[str, Field(exclude=True)] = ""
+    """The check or named estimate of the result that this is about, where its name is not `name`; kept out of JSON."""
+
+    def about(self, quantity: str) -> bool:
+        """Whether this is the uncertainty of a quantity of the result."""
+        return quantity == (self.quantity or self.name)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from bench_service.api.http.bodies import is_json
 from bench_service.api.http.dependencies import NO_CONTROL_CHARACTERS, REQUESTED_BY, WHO_LENGTH, After, Limit, Service
 from bench_service.api.http.errors import FieldError, problems, respond
 from bench_service.formats.plain_json import faults, mended, shown
+from bench_service.mapping import copied
 from bench_service.telemetry.audit import AuditEntry, AuditTrail, record
 from bench_service.telemetry.log_context import request_id
 
@@ -37,7 +38,7 @@ class AuditView(BaseModel):
     @classmethod
     def of(cls, entry: AuditEntry) -> "AuditView":
         said = mended(entry.detail)  # of an older service's entry, a thousand brackets would close the whole trail
-        return cls(**{**vars(entry), "detail": said})
+        return copied(cls, entry, detail=said)
 
 
 class AuditPage(BaseModel):

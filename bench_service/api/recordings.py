@@ -16,6 +16,7 @@ from bench_service.formats.description import ImportDescription
 from bench_service.formats.export import ExportFormat, export, extract
 from bench_service.formats.import_file import ImportFile
 from bench_service.formats.plain_json import shown
+from bench_service.mapping import copied
 from bench_service.model.records import RecordingState, StoredRecording
 from bench_service.service import BenchService
 from procedures.core.errors import BadParameter
@@ -50,29 +51,8 @@ class RecordingView(BaseModel):
 
     @classmethod
     def of(cls, stored: StoredRecording, results: tuple[str, ...] | None = None) -> "RecordingView":
-        info = stored.info
-        return cls(
-            id=info.id,
-            unit=info.unit,
-            job=stored.job_id,
-            bench=stored.bench,
-            station=info.station,
-            state=stored.state,
-            channels=list(info.channels),
-            rate_hz=info.rate_hz,
-            count=info.count,
-            duration_s=info.duration_s,
-            start_s=info.start_s,
-            launched_s=info.launched_s,
-            content_hash=info.content_hash,
-            simulated=info.simulated,
-            stored_bytes=stored.stored_bytes,
-            chunks=stored.chunks,
-            created_at=stored.created_at,
-            source=stored.source,
-            warnings=[str(warning) for warning in stored.source.get("warnings", ())],
-            results=None if results is None else list(results),
-        )
+        warnings = [str(warning) for warning in stored.source.get("warnings", ())]
+        return copied(cls, stored, stored.info, job=stored.job_id, warnings=warnings, results=results)
 
 
 class RecordingPage(BaseModel):

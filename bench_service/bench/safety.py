@@ -63,7 +63,7 @@ class SafetyService:
         worker = driving.process if driving is not None and driving.alive else None
         supervisor = watch.supervisor()
         if state is None:
-            safe, explanation = _elsewhere(bench_id, self._benches.bench_stop(bench_id))
+            safe, explanation = _elsewhere(bench_id, self._benches.standing_stops(bench_id))
         else:
             safe, explanation = state.safe, _here(bench_id, state, worker, supervisor)
         return Safety(safe, explanation, state, worker, supervisor)
@@ -120,7 +120,7 @@ class SafetyService:
     def stop_unsafe(self, bench_id: str, why: str) -> None:
         """Nothing may run on a bench that could not be made safe, until a person releases it."""
         log.error("bench %s: %s", bench_id, why)
-        self._benches.stop_bench(BenchStop(bench_id, now(), why))
+        self._benches.stop_bench_once(BenchStop(bench_id, now(), why, by=self._by))
 
     def _try(self, bench_id: str) -> str | None:
         """Make the devices safe over their own link; why not, in a sentence."""
@@ -159,9 +159,11 @@ def _here(bench_id: str, state: DeviceState, worker: ProcessIdentity | None, sup
     )
 
 
-def _elsewhere(bench_id: str, stop: BenchStop | None) -> tuple[bool | None, str]:
-    if stop is not None and stop.safe_at is not None:
-        return True, f"Seen safe on the bench's host at {stop.safe_at.isoformat()}, last commanded by {stop.safe_by}."
+def _elsewhere(bench_id: str, stops: tuple[BenchStop, ...]) -> tuple[bool | None, str]:
+    """Known safe where that was seen after the last stop: a bench that works in between may be anything."""
+    if stops and all(stop.safe_at is not None for stop in stops):
+        stop, seen = stops[-1], max(stop.safe_at for stop in stops if stop.safe_at is not None)
+        return True, f"Seen safe on the bench's host at {seen.isoformat()}, last commanded by {stop.safe_by}."
     return None, (
         f"The devices of bench {bench_id!r} are not on this host, and nobody on theirs has said that they are safe: "
         "whether a worker or a supervisor is alive there is not known here."

@@ -12,6 +12,7 @@ from bench_service.background import NonBlockingQuery
 from bench_service.bench.live.tap import LiveTap
 from bench_service.bench.live.values import PUBLISH_S
 from bench_service.bench.observed import ObservedBench
+from bench_service.bench.streams import require_end, stream_of
 from bench_service.bench.watchdog import Patience, Watchdog
 from bench_service.evidence.recordings import RecordingStore
 from bench_service.model.errors import StorageFailure
@@ -19,7 +20,7 @@ from bench_service.model.job import Job
 from bench_service.model.records import NewRecording
 from bench_service.wall_clock import monotonic_s
 from procedures.bench import Bench
-from procedures.bench.errors import BenchError, Disconnected, Stopped
+from procedures.bench.errors import Disconnected, Stopped
 from procedures.bench.imu import Stream
 from procedures.core.recording import RecordingInfo, Station
 from procedures.procedure import Outcome, Parameters, Procedure
@@ -79,7 +80,8 @@ class BenchSession:
         self._told: asyncio.Task[None] | None = None
 
     def record(self, index: int) -> RecordingInfo:
-        """Record one station and store it. Raises `BenchError`, `StorageFull`, `StorageFailure`, `ShuttingDown`.
+        """Record one station and store it. Raises `BenchError`, `ProcedureDefect`, `StorageFull`,
+        `StorageFailure`, `ShuttingDown`.
 
         A device that does not answer is `Disconnected`, whatever its driver does about it.
         """
@@ -175,11 +177,11 @@ class BenchSession:
         if self._streams is None or self._next != index:
             await self._close_streams()
             self._streams = self._procedure.acquire(self._bench, self.job.stations[index:])
-        stream = await anext(self._streams)
-        if stream.station != station:
-            raise BenchError(f"procedure {self._procedure.name} gave {stream.station} where station {station} was due")
+        stream = await stream_of(self._streams, self._procedure.name, station)
         info = await self._store(stream, station)
         self._next = index + 1
+        if self._next == len(self.job.stations):
+            await require_end(self._streams, self._procedure.name, self.job.stations)
         return info
 
     async def _store(self, stream: Stream, station: Station) -> RecordingInfo:

@@ -49,10 +49,10 @@ class SafetyBooks(Protocol):
         ...
 
     def confirm_safe(self, by: str) -> None:
-        """A stopped bench is safe."""
+        """A stopped bench is safe. Said again and again, it is noted once in each stop that stands."""
         ...
 
-    def stop(self, reason: str) -> None:
+    def stop(self, reason: str, by: str) -> None:
         """Stop the bench until a person releases it."""
         ...
 
@@ -86,7 +86,6 @@ class Supervisor:
         self._unsaid: list[tuple[str, str | None]] = []
         self._unsaid_stop: str | None = None
         self._stopped = False
-        self._confirmed = False
         self._told_not_safe = False
         self._next_stop_look_s = 0.0
         self._next_try_s = 0.0
@@ -146,13 +145,10 @@ class Supervisor:
         """In a thread of its own: all that goes to the database."""
         self._stopped = self._books.stopped()
         state = self._devices.device_state()
-        if not self._stopped:
-            self._confirmed = False
-        elif not self._confirmed and state is not None and state.safe:
+        if self._stopped and state is not None and state.safe:
             self._books.confirm_safe(state.by)
-            self._confirmed = True
         if self._unsaid_stop is not None:
-            self._books.stop(self._unsaid_stop)
+            self._books.stop(self._unsaid_stop, self._by)
             self._unsaid_stop = None
         while self._unsaid:
             self._books.note(self._by, *self._unsaid[0])

@@ -3,15 +3,14 @@
 It has a composition of its own, because that of the service loads what a supervisor must do without.
 """
 
-import signal
-import threading
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
-from types import FrameType
 
 from bench_service.bench.supervisor import Supervisor
+from bench_service.cli.ending import ending_on_signals
 from bench_service.cli.logs import set_up
+from bench_service.cli.private_files import protect
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.model.errors import BenchBusy
@@ -35,13 +34,8 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
     that drives the bench.
     """
     set_up(settings, "info")
-    ending = threading.Event()
-
-    def end(_signal: int, _frame: FrameType | None) -> None:
-        ending.set()
-
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, end)
+    protect(settings)
+    ending = ending_on_signals()
     folder, bench = settings.devices_in(), settings.bench_id
     files = HostFiles(folder, bench)
     with ExitStack() as closing:

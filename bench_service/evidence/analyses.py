@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.documents import document_of, require_storable
 from bench_service.evidence.job_analysis import analysed, recordings_of
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.model.job import Job
@@ -49,8 +50,6 @@ class AnalysisService:
             return self._stores.results.get(known)
         job = self._read_job(job_id)
         recordings = recordings_of(self._stores, job_id)
-        if len(recordings) < len(job.stations):
-            raise UnfitRecording(f"job {job_id} has {len(recordings)} of its {len(job.stations)} recordings")
         merged = {**job.requested_parameters, **parameters}
         result = analysed(job, self._catalogue.procedure(job.procedure), merged, recordings, self._code_version)
         return self._stores.results.add(result.stored, result.calibrations, False, idempotency, result.corrections)
@@ -79,7 +78,7 @@ class AnalysisService:
             name=method.name,
             version=method.version,
             parameters=params.model_dump(mode="json"),
-            document=outcome.model_dump(mode="json"),
+            document=document_of(outcome),
             verdict=outcome.verdict,
             recordings=tuple((r.info.id, r.info.content_hash) for r in evidence.recordings),
             calibrations=request.calibrations,
@@ -89,6 +88,7 @@ class AnalysisService:
             unit=serial,
         )
         gives = method.calibrations(outcome), method.corrections(outcome)
+        require_storable(*gives)
         return self._stores.results.add(stored, gives[0], False, idempotency, gives[1])
 
     def _complete(self, ids: Sequence[str]) -> tuple[Recording, ...]:

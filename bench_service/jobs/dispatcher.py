@@ -20,7 +20,7 @@ from typing import Protocol
 
 from bench_service.bench.driver import Lease
 from bench_service.bench.session import ShuttingDown
-from bench_service.jobs.queue import BenchQueue, QueueEntry, RunningJob
+from bench_service.jobs.queue import BenchQueue, QueueEntry
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.stores import JobStores
 from bench_service.model.errors import NotFound, NotUnderstood, ServiceError
@@ -54,7 +54,7 @@ class JobEngine(Protocol):
         """Run a claimed job to its end. Raises `ShuttingDown`, and whatever keeps it from running."""
         ...
 
-    def unfinished(self, job: RunningJob) -> Unfinished:
+    def unfinished(self, job: QueueEntry) -> Unfinished:
         """What became of a running job's workflow."""
         ...
 
@@ -128,7 +128,7 @@ class Dispatcher:
         try:
             job = self._runner.claim(entry)
         except (NotUnderstood, NotFound) as error:  # its unit is not known, or its words are not
-            self._interrupt(entry.job, Failure(type(error).__name__, str(error)))
+            self._interrupt(entry.id, Failure(type(error).__name__, str(error)))
             return True
         if job is None:
             return False
@@ -166,8 +166,8 @@ class Dispatcher:
     def _tell(self, queue: BenchQueue) -> None:
         """Note in the events of the queue's first job why it does not start, once for each reason."""
         head: QueueEntry | None = queue.entries[0] if queue.entries else None
-        why = None if head is None or (queue.stop is None and not queue.reservations) else queue.hold(head)
-        if head is None or why is None or self._told == (head.job, why):
+        why = None if head is None or (not queue.stops and not queue.reservations) else queue.hold(head)
+        if head is None or why is None or self._told == (head.id, why):
             return
-        self._stores.jobs.note(head.job, "note", now(), {"text": why})
-        self._told = (head.job, why)
+        self._stores.jobs.note(head.id, "note", now(), {"text": why})
+        self._told = (head.id, why)

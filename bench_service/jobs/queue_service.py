@@ -8,6 +8,7 @@ from bench_service.bench.directory import BenchDirectory
 from bench_service.jobs.queue import BenchQueue, Place
 from bench_service.jobs.reservation import Reservation, Reserved
 from bench_service.jobs.stores import JobStores
+from bench_service.mapping import copied
 from bench_service.model.errors import NotFound
 from bench_service.model.job import Job, JobState
 from bench_service.model.records import Idempotency
@@ -71,7 +72,7 @@ class QueueService:
             self._benches.description(request.name)
         else:
             self._stores.units.unit(request.name)
-        made = Reservation(new_id(), request.kind, request.name, request.holder, at, until, request.note)
+        made = copied(Reservation, request, id=new_id(), created_at=at, until=until)
         key = None if idempotency_key is None else Idempotency(f"reservations:{idempotency_key}", fingerprint(request))
         return self._stores.reservations.add(made, key)
 

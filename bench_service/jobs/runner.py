@@ -71,7 +71,7 @@ class JobRunner:
 
     def claim(self, entry: QueueEntry) -> Job | None:
         """Begin a queued job, with what is known of its unit now; None where it cannot begin any more."""
-        job = self._stores.jobs.get(entry.job)
+        job = self._stores.jobs.get(entry.id)
         context = self._planner.refreshed(context_of(job))
         return self._stores.queue.claim(entry, CONTEXT.dump_python(context, mode="json"), now())
 
@@ -220,7 +220,8 @@ class JobRunner:
 
     def _not_safe(self, job_id: str, why: str) -> StepOutcome:
         text = f"the bench could not be made safe: {why}"
-        self._stores.benches.stop_bench(BenchStop(self._driver.description.id, now(), f"could not be made safe: {why}"))
+        by, reason = f"the worker, {ProcessIdentity.own()}", f"could not be made safe: {why}"
+        self._stores.benches.stop_bench_once(BenchStop(self._driver.description.id, now(), reason, by=by))
         self._stores.jobs.note(job_id, "note", now(), {"text": text})
         return StepOutcome(Failure("NotSafe", text))
 

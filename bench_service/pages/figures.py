@@ -7,6 +7,7 @@ what takes matplotlib most of its time, and a static run has twenty plots.
 from functools import lru_cache
 from io import StringIO
 from math import ceil, floor, log10
+from threading import Lock
 from typing import TYPE_CHECKING
 
 from procedures.core.report import Figure, Series
@@ -28,14 +29,25 @@ def warm_up() -> None:
     svg(Figure("", "", "", (Series("", (0.0, 1.0), (0.0, 1.0)),)))
 
 
+SALT = "bench"
+"""Of the names inside a drawing: drawn again, a figure is the same to the byte."""
+_DRAWING = Lock()
+"""matplotlib's settings are global: two drawings at once would take each other's."""
+
+
 @lru_cache(maxsize=200)
 def svg(figure: Figure) -> str:
-    """The figure as an inline `<svg>` element; drawn once, because a result never changes."""
+    """The figure as an SVG document; drawn once, because a result never changes."""
+    with _DRAWING:
+        return _drawn(figure)
+
+
+def _drawn(figure: Figure) -> str:
     from matplotlib import rc_context
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure as Canvas
 
-    with rc_context({"svg.fonttype": "none", "font.size": 9, "axes.formatter.useoffset": False}):
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": SALT, "font.size": 9, "axes.formatter.useoffset": False}):
         canvas = Canvas(figsize=SIZE_IN)
         canvas.subplots_adjust(**MARGINS)
         FigureCanvasSVG(canvas)

@@ -88,7 +88,13 @@ def predict(params: Params, context: Context) -> Prediction:
             continue
         for name, noise in zip(names, record.noise, strict=True):
             found += [
-                PredictedUncertainty(f"{name}.{p.process}", p.unit, p.standard_uncertainty, p.standard_uncertainty)
+                PredictedUncertainty(
+                    f"{name}.{p.process}",
+                    p.unit,
+                    p.standard_uncertainty,
+                    p.standard_uncertainty,
+                    quantity=f"{name} {p.process.replace('_', ' ')}",
+                )
                 for p in predicted_noise(name, noise, params.duration_s, params.launches)
             ]
             warnings += unresolved_noise(name, noise, params.duration_s)

@@ -10,6 +10,7 @@ import pytest
 import typer
 import yaml
 
+from bench_service.api.http.door import may_listen
 from bench_service.cli.commands import app, run_command_line
 from bench_service.jobs.engine import SHUT_DOWN_S
 from bench_service.settings import Settings
@@ -73,5 +74,9 @@ def test_the_api_drives_nothing_and_listens_on_this_host_only() -> None:
     api = OURS["api"]
     assert parsed(api["command"])[1]["no_worker"] is True
     assert all(port.startswith("127.0.0.1:") for port in api["ports"])
+    settings = Settings.from_environ({name: str(value) for name, value in api["environment"].items()})
+    assert may_listen(settings), "else the service does not start"
+    assert settings.published == "loopback", "which is true as long as the line above is"
+    assert all("ports" not in service for name, service in OURS.items() if name != "api")
     assert "/readyz" in api["healthcheck"]["test"][-1]
     compile(api["healthcheck"]["test"][-1], "healthcheck", "exec")

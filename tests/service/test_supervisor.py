@@ -45,7 +45,7 @@ class Books:
         self._ask()
         self.confirmed = by
 
-    def stop(self, reason: str) -> None:
+    def stop(self, reason: str, by: str) -> None:
         self._ask()
         self.is_stopped = True
         self.said.append(f"stopped: {reason}")

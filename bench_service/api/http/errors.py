@@ -12,6 +12,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from bench_service.api.http.headers import SECURITY_HEADERS
 from bench_service.formats.plain_json import A_NUMBER, NOT_SO_DEEP, is_finite, shown
 from bench_service.model.errors import (
     AlreadyReserved,
@@ -26,6 +27,7 @@ from bench_service.model.errors import (
     NotSafe,
     NotUnderstood,
     ServiceError,
+    SeveralStops,
     StorageFailure,
     StorageFull,
 )
@@ -43,6 +45,7 @@ STATUS: dict[type[Exception], int] = {
     NotReady: 503,
     NotMounted: 422,
     NotSafe: 409,
+    SeveralStops: 409,
     NotUnderstood: 409,
     DomainError: 422,
     BenchError: 502,
@@ -85,8 +88,10 @@ _UNREAD: dict[type, str] = {RecursionError: NOT_SO_DEEP, ValueError: A_NUMBER}
 
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """The `responses` of a route: these statuses answer with a problem document; 400, 422 and 503 always can."""
-    wanted = sorted({*statuses, 400, 422, 503})
+    """The `responses` of a route: these statuses answer with a problem document. Those of the door (401, 403, 421), of
+    a body or an address that is not understood, and of a service that is not ready are possible everywhere.
+    """
+    wanted = sorted({*statuses, 400, 401, 403, 421, 422, 503})
     return {
         status: {
             "description": HTTPStatus(status).phrase,
@@ -169,6 +174,8 @@ def _on_known(request: Request, error: Exception) -> Response:
         fields = [FieldError(field=error.field, message=error.allowed, value=_jsonable(error.value))]
     if isinstance(error, NotReady):
         fields = [FieldError(field="service", message=reason) for reason in error.reasons]
+    if isinstance(error, SeveralStops):
+        fields = [FieldError(field="stop_id", message=text, value=stop) for stop, text in error.stops]
     lost = list(error.lost) if isinstance(error, Undetermined) else []
     return respond(request, status_of(error), str(error), type(error).__name__, fields, lost)
 
@@ -219,7 +226,9 @@ def _on_http(request: Request, error: Exception) -> Response:
 
 
 def _on_unknown(request: Request, error: Exception) -> Response:
-    return respond(request, 500, "a defect of the service; its log has the details", "InternalError")
+    response = respond(request, 500, "a defect of the service; its log has the details", "InternalError")
+    response.headers.update(SECURITY_HEADERS)  # this answer is made outside of all that adds to answers
+    return response
 
 
 def respond(

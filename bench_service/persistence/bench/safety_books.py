@@ -6,7 +6,7 @@ supervisor works without one that does not answer.
 
 from functools import cached_property
 
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, select
 
 from bench_service import wall_clock
 from bench_service.model.errors import NotFound
@@ -30,15 +30,15 @@ class SqlSafetyBooks:
         return connect(self._url)
 
     def stopped(self) -> bool:
-        with self._database.read() as session:
-            query = select(BenchStopRow.bench).where(BenchStopRow.bench == self._bench_id)
-            return session.scalar(query) is not None
+        return self._stands(BenchStopRow.released_at.is_(None))
 
     def confirm_safe(self, by: str) -> None:
-        SqlBenchRegistry(self._database).confirm_safe(self._bench_id, wall_clock.now(), by)
+        if self._stands(BenchStopRow.released_at.is_(None), BenchStopRow.safe_at.is_(None)):
+            SqlBenchRegistry(self._database).confirm_safe(self._bench_id, wall_clock.now(), by)
 
-    def stop(self, reason: str) -> None:
-        SqlBenchRegistry(self._database).stop_bench(BenchStop(self._bench_id, wall_clock.now(), reason))
+    def stop(self, reason: str, by: str) -> None:
+        stop = BenchStop(self._bench_id, wall_clock.now(), reason, by=by)
+        SqlBenchRegistry(self._database).stop_bench_once(stop)
 
     def note(self, by: str, text: str, job: str | None) -> None:
         at = wall_clock.now()
@@ -59,6 +59,12 @@ class SqlSafetyBooks:
                 SqlJobStore(self._database).note(job, "note", at, {"text": text, "by": by})
             except NotFound:
                 return
+
+    def _stands(self, *conditions: ColumnElement[bool]) -> bool:
+        """Whether the bench has a stop of which all this is true."""
+        query = select(BenchStopRow.id).where(BenchStopRow.bench == self._bench_id, *conditions).limit(1)
+        with self._database.read() as session:
+            return session.scalar(query) is not None
 
     def close(self) -> None:
         """Close the database's connections."""
