@@ -19,14 +19,14 @@ SHOWN_CHARACTERS = 80
 
 @dataclass(frozen=True)
 class Bounds:
-    """What an import may take; grows with the size of the files beyond 100 MB."""
+    """Most that an import may take; grows with the size of the files beyond 100 MB."""
 
     cells: int = 100_000_000
     """Numbers that are read: six channels at 400 Hz for 11 h."""
     unpacked_bytes: int = 4_000 * MEGABYTE
     """Text after unpacking, or columns of a columnar file."""
     memory_bytes: int = 250 * MEGABYTE
-    """Of the process that reads, above what it takes idle."""
+    """Memory of the process that reads, above what it takes idle."""
     time_s: float = 25.0
     """For which the reading process may be waited for."""
 

@@ -36,7 +36,7 @@ _DAMAGES = (
     ("page header", _PACKED),
 )
 _THRIFT_BYTES = 64 * MEGABYTE
-"""Of the description in a Parquet file's footer."""
+"""Largest description in a Parquet file's footer."""
 
 
 def is_columnar(stream: BinaryIO) -> bool:
@@ -71,7 +71,7 @@ def columnar_columns(
 
 
 def _in_words(error: Exception) -> str:
-    """What Arrow says, shortened, after what it means where that is known."""
+    """Arrow's message, shortened, after its meaning where that is known."""
     said = " ".join(str(error).split())[:120]
     known = next((words for sign, words in _DAMAGES if sign in said), None)
     return said if known is None else f"{known} ({said})"

@@ -25,7 +25,7 @@ from procedures.core.arrays import Array
 _BLOCK_BYTES = 4 * 1024 * 1024
 _BLANKS = re.compile(rb"[ \t]+")
 _MARGINS = re.compile(rb"(?m)^\t|\t(?=\r?$)")
-"""Of a text whose blanks are single tabs already: of blanks themselves it would take their square."""
+"""Tabs at the ends of lines, in a text whose blanks are single tabs: on blanks it would take their square."""
 
 
 class _NotANumber(Exception):

@@ -22,7 +22,7 @@ SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 class Accumulated(StrEnum):
-    """What a column adds up to since some beginning; its steps from row to row are stored as increments."""
+    """Quantity that a column adds up since some beginning; its steps from row to row are stored as increments."""
 
     ANGLE = "angle"
     VELOCITY = "velocity"

@@ -53,7 +53,7 @@ class Rebuild:
         self._begun = False
 
     def rows(self, values: Array) -> Iterator[Array]:
-        """What becomes of the next rows, (n, channels)."""
+        """The recording's rows made of the next ones, (n, channels)."""
         for block in self._whole(values):
             stepped = self._increments.steps(block)
             if self._increments.columns and not self._begun and len(stepped):

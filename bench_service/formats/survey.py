@@ -21,7 +21,7 @@ _INT32 = np.iinfo(np.int32)
 
 @dataclass(frozen=True)
 class Findings:
-    """What the whole of the files says."""
+    """Findings of the first pass over all files."""
 
     rate_hz: float
     count: int
@@ -125,7 +125,7 @@ class Survey:
             )
 
     def findings(self) -> Findings:
-        """What the rows say together. Raises `BadParameter`, `UnreadableFile`, `UnfitRecording`."""
+        """Findings of all rows together. Raises `BadParameter`, `UnreadableFile`, `UnfitRecording`."""
         description = self._description
         if not self._count:
             first = description.rows.first

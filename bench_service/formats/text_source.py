@@ -87,7 +87,7 @@ class TextSource:
         self._buffer = b"".join(parts)
 
     def glance(self) -> bytes:
-        """What is at hand, without taking it."""
+        """The text at hand, without taking it."""
         return self._buffer
 
     @property

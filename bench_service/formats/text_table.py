@@ -17,7 +17,7 @@ from bench_service.formats.text_source import TextSource, too_long
 
 SAMPLE_LINES = 200
 MARKERS = "#%"
-"""What a comment begins with, and the names of columns in some files."""
+"""Marks at the beginning of a comment, and of the names of columns in some files."""
 
 
 class TextTable:

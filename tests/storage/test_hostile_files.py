@@ -1,4 +1,4 @@
-"""Whatever a file holds, it becomes a recording or a refusal of bounded length."""
+"""Any file becomes a recording or a refusal of bounded length."""
 
 import io
 from typing import Any

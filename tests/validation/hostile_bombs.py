@@ -118,7 +118,7 @@ BOMBS: dict[str, Bomb] = {
 
 @dataclass(frozen=True)
 class Cost:
-    """What an import cost the service."""
+    """Time, memory and delay that an import cost the service."""
 
     sent_mb: float
     status: int

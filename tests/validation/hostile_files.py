@@ -53,7 +53,7 @@ FITTING: tuple[dict[str, Any], ...] = (
     | {"channels": [{"name": "gyro_x", "column": 1, "quantity": "angular_rate", "unit": "count"}]},
     *(_TABLE for _ in range(8)),
 )
-"""What fits each of the whole files; the rest of a description is by chance."""
+"""Fields that fit each of the whole files; the rest of a description is by chance."""
 
 
 class HostileFiles:

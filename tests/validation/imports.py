@@ -37,7 +37,7 @@ console = Console()
 
 @dataclass
 class Tally:
-    """What came of many files."""
+    """Outcomes of many files."""
 
     recordings: int = 0
     refusals: Counter[str] = field(default_factory=Counter)
@@ -52,7 +52,7 @@ def kind_of(message: str) -> str:
 
 
 def read_one(number: int, files: HostileFiles) -> tuple[str, str]:
-    """What became of a file in this process: "ok", "refused" or "fault", and the words."""
+    """Outcome of a file read in this process: "ok", "refused" or "fault", and the words."""
     data, description = files.file(number)
     begun = monotonic_s()
     try:
@@ -92,7 +92,7 @@ def parsers(count: int) -> Tally:
 
 
 def _forked(begin: int, end: int) -> list[tuple[str, str]]:
-    """What became of some files, up to the one at which the process ended."""
+    """Outcomes of some files, up to the one at which the process ended."""
     reading, writing = os.pipe()
     child = os.fork()
     if not child:

@@ -1,4 +1,4 @@
-"""What a time column says: the rate, what was lost or written twice, and what is refused or only worth a warning."""
+"""Judgement of a time column: its rate, lost and doubled rows, and which of that is refused or only a warning."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -10,11 +10,11 @@ from procedures.core.arrays import Array
 AHEAD = 64
 """Rows that are looked ahead for one that is on time."""
 LEAST = 0.45
-"""Of a period: the change of the level that is looked at."""
+"""Smallest change of the level that is looked at, in periods."""
 EARLY = 8
 """Rows within which a level that fell is back again where single stamps are early."""
 EVEN = 0.1
-"""Of their mean: by how much the distances of slips may differ."""
+"""Part of their mean by which the distances of slips may differ."""
 MOST_LOST = 1e12
 """Samples in one place: what a stamp of nonsense says is cut off there."""
 MADE_UP_FOR = 10_000

@@ -19,7 +19,7 @@ LONG_CHUNK = 1024
 FEW = 16
 """Fewer steps show no order: they are taken as steps of one length, and what differs as a loss."""
 COARSE = 0.9
-"""Of the resolution: by how much a stamp may be off its place on a coarse clock. Rounding is half of it."""
+"""Part of the resolution by which a stamp may be off its place on a coarse clock. Rounding is half of it."""
 ON_LATTICE = 0.9
 """Share of the steps that are whole multiples of one where rows are lost from a uniform clock."""
 SINGLE = 0.4
@@ -31,7 +31,7 @@ LONG_AND_SHORT = 0.004
 MOST = 0.75
 """Quantile of the chunks' bands that is taken as the usual one."""
 SHARED = 1.5
-"""Of the period: a resolution beyond it makes rows share stamps, and in regular batches is taken as those."""
+"""Periods: a resolution beyond them makes rows share stamps, and in regular batches is taken as those."""
 CLEAN = 0.002
 """Share of shorter steps that speaks against lost rows where the clock resolves only a step or two of its own."""
 REGULAR = 0.9

@@ -15,9 +15,9 @@ STRETCH = 256
 WINDOW = 1 << 18
 """Rows that are looked at together."""
 SLIPS = 0.4
-"""Of the period: with a resolution beyond it a clock that is a little fast or slow slips by a step now and then."""
+"""Periods: with a resolution beyond them a clock that is a little fast or slow slips by a tick now and then."""
 WHOLE = 0.9
-"""Of the period: with a resolution beyond it a slip cannot be told from a lost sample."""
+"""Periods: with a resolution beyond them a slip looks as a lost sample does."""
 PAUSE = 8
 """More samples lost in one place are a pause."""
 MOST_RUNS = 1000
@@ -54,7 +54,7 @@ class KeptRows:
 
 @dataclass
 class _Walk:
-    """What one pass over the rows collects."""
+    """Sums and marks that one pass over the rows collects."""
 
     rows: list[NDArray[np.int64]] = field(default_factory=list[NDArray[np.int64]])
     samples: list[NDArray[np.int64]] = field(default_factory=list[NDArray[np.int64]])
@@ -75,7 +75,7 @@ class MeanRate:
     worst: tuple[int, int, float, float]
     """First kept row from 0, samples, duration [s], and what is allowed, relative."""
     off: float
-    """Of the worst stretch, in parts of what is allowed."""
+    """Deviation of the worst stretch, in parts of what is allowed."""
 
 
 def mean_rate(

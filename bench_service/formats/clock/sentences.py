@@ -1,4 +1,4 @@
-"""What was found in a time column, in sentences: counted, with the rows as people count them, and the way out."""
+"""Sentences on a time column: what was found is counted, with the rows as people count them, and the way out."""
 
 from dataclasses import dataclass
 

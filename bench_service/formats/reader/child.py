@@ -19,7 +19,7 @@ from bench_service.formats.reader.frames import CHILD, END, FOUND, REFUSED, SAMP
 from procedures.core.errors import BadParameter, DomainError, UnfitRecording
 
 SENT_BYTES = 1024 * 1024
-"""Of samples in a frame."""
+"""Most bytes of samples in a frame."""
 MOST_FILES = 64
 SPOOLED_BYTES = 2_000 * MEGABYTE
 """Largest file that a reader may write: stamps that do not fit into its memory."""
