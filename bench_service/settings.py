@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
-from urllib.parse import urlsplit
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from bench_service.device_folder import BENCH_ID, DATABASE_URL, device_folder
 
 LEAST_TOKEN = 20
 """Characters of the shortest token that is taken."""
@@ -28,7 +29,7 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    database_url: str = "sqlite:///.bench/bench.sqlite"
+    database_url: str = DATABASE_URL
     """`sqlite:///file` (embedded, one machine) or `postgresql+psycopg://…`."""
     host: str = "127.0.0.1"
     """An address other than a loopback one needs `token_file` or `published`."""
@@ -44,7 +45,7 @@ class Settings(BaseModel):
     """`loopback`: the service's address is reached only through a port published on a loopback address (a container's),
     or through a proxy there that lets in only people it knows; then every peer counts as one of this host."""
     port: int = Field(8000, ge=0, le=65535)
-    bench_id: str = Field("sim", pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")
+    bench_id: str = Field(BENCH_ID, pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")
     """The one bench that this process drives."""
     unit_truth: Path | None = None
     """Truth file of the simulated unit; None: the one that ships."""
@@ -56,6 +57,12 @@ class Settings(BaseModel):
     """Where a simulated bench's devices keep their state; None: beside an SQLite file, in .bench/ for Postgres.
 
     A folder of the bench's own host, the same for every process of that bench."""
+    stop_listen: str = Field("127.0.0.1:0", pattern=r"^(|\S+:\d{1,5})$")
+    """Where a bench's supervisor takes stops from an API on another host, `host:port`, port 0 for any; empty: nowhere.
+
+    The name is also what the API is told to connect to; over a network it is one that the API's host can resolve."""
+    stop_secret_file: Path | None = None
+    """Secret that supervisors and APIs of a deployment share, 16 bytes or more; None: the device folder's own."""
     device_faults: str | None = None
     """For exercises: faults put into a simulated bench's devices (see `bench_service.drivers.device_faults`)."""
     ask_operator: bool = False
@@ -77,6 +84,10 @@ class Settings(BaseModel):
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported."""
 
+    def stop_secret_in(self) -> Path:
+        """The file of the secret under which a stop goes to another host."""
+        return self.stop_secret_file or self.devices_in() / "bench-stop.secret"
+
     def token(self) -> str | None:
         """The token of `token_file`; None where the settings name none. Raises `BadSettings`."""
         if self.token_file is None:
@@ -94,12 +105,7 @@ class Settings(BaseModel):
 
     def devices_in(self) -> Path:
         """The folder of the devices' registers."""
-        if self.device_folder is not None:
-            return self.device_folder
-        address = urlsplit(self.database_url)
-        if address.scheme.startswith("sqlite"):
-            return Path(self.database_url.partition(":///")[2] or "bench.sqlite").parent
-        return Path(".bench") / (address.path.strip("/") or "postgres")
+        return device_folder(self.database_url, self.device_folder)
 
     @classmethod
     def from_environ(cls, environ: Mapping[str, str]) -> "Settings":

@@ -1,7 +1,9 @@
 """The audit trail: every request that may change something and reached a route, with its outcome."""
 
+import asyncio
 import json
 from datetime import datetime
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
@@ -12,6 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from bench_service.api.http.bodies import is_json
 from bench_service.api.http.dependencies import NO_CONTROL_CHARACTERS, REQUESTED_BY, WHO_LENGTH, After, Limit, Service
 from bench_service.api.http.errors import FieldError, problems, respond
+from bench_service.background import in_background
 from bench_service.formats.plain_json import faults, mended, shown
 from bench_service.mapping import copied
 from bench_service.telemetry.audit import AuditEntry, AuditTrail, record
@@ -61,6 +64,12 @@ def list_audit(
     return AuditPage(items=[AuditView.of(entry) for entry in page.items], next=page.next)
 
 
+STOP = "stop"
+"""Name of the route that stops a bench."""
+STOP_S = 0.3
+"""How long the answer to a stop waits for its entry; one that comes later is written all the same [s]."""
+
+
 class Audited:
     """Pure ASGI. The order is: the act, its entry, the answer. See `bench_service.telemetry.audit`."""
 
@@ -102,7 +111,12 @@ class Audited:
             return
         act.noted = True
         target = headers.get(b"location", b"").decode() or shown(act.request.scope["path"])
-        await run_in_threadpool(record, self._trail, act.who, route.name, target, str(status), **act.detail())
+        work = partial(record, self._trail, act.who, route.name, target, str(status), **act.detail())
+        if route.name != STOP:
+            await run_in_threadpool(work)
+            return
+        # in a thread of its own, and not waited for for long: a stop is answered while the database is not
+        await asyncio.wait((asyncio.wrap_future(in_background("audit of a stop", work)),), timeout=STOP_S)
 
 
 class _Act:

@@ -4,7 +4,7 @@ import asyncio
 import logging
 import threading
 from collections.abc import AsyncIterator, Callable
-from concurrent.futures import Future
+from concurrent.futures import CancelledError, Future
 from contextlib import aclosing
 from typing import Any, TypeVar
 
@@ -30,8 +30,9 @@ log = logging.getLogger(__name__)
 
 PATIENCE = Patience()
 """For how long a device may say nothing."""
-UNWIND_S = 2.0
+UNWIND_S = 1.0
 """How long a procedure may take to leave a verb that was cancelled [s, real time]."""
+STOPPED = "stopped by an operator"
 STOP_CHECK_S = 0.2
 """How long a move, a settle or a recording may go on before a stop that was asked for is seen [s, real time]."""
 HANGS_S = 10.0
@@ -70,6 +71,13 @@ class BenchSession:
         self._streams: AsyncIterator[Stream] | None = None
         self._next = -1
         self._shutting_down = threading.Event()
+        self._stopped = threading.Event()
+        self._under_way: Future[Any] | None = None
+        """What the procedure is asked for now."""
+        self._safety = threading.Lock()
+        """Held by who makes the bench safe, or ends the session: the job's own thread, or who stops it."""
+        self._is_safe = False
+        self._closed = False
         self._lost: str | None = None
         """Why the thread that drives the bench does not come back, if it does not."""
         self._loop = asyncio.new_event_loop()
@@ -85,7 +93,26 @@ class BenchSession:
 
         A device that does not answer is `Disconnected`, whatever its driver does about it.
         """
-        return self._wait(asyncio.run_coroutine_threadsafe(self._record(index), self._loop))
+        if self._stopped.is_set():
+            raise Stopped(STOPPED)
+        self._under_way = asyncio.run_coroutine_threadsafe(self._record(index), self._loop)
+        try:
+            return self._wait(self._under_way)
+        except CancelledError:  # by `stop`
+            raise Stopped(STOPPED) from None
+        finally:
+            self._under_way = None
+
+    def stop(self) -> None:
+        """Leave whatever is under way, with `Stopped` for who waits for it; nothing more is recorded. From any thread.
+
+        It waits for nothing but the procedure's leaving, for `UNWIND_S`: neither for a database nor for the job's own
+        thread, which may hang in one.
+        """
+        self._stopped.set()
+        under_way = self._under_way
+        if under_way is not None:
+            self._cancel(under_way, "a stop came while a device or the database did not answer")
 
     def shut_down(self) -> None:
         """Ask whoever waits in `record` to leave with `ShuttingDown`; called from another thread."""
@@ -93,17 +120,27 @@ class BenchSession:
 
     def make_safe(self) -> None:
         """Close the procedure, then stop the table and switch the unit off. Raises an `ExceptionGroup` of failures,
-        and `Disconnected` where a device does not answer.
+        and `Disconnected` where a device does not answer. Once it is safe a second time does nothing.
         """
-        if self._lost is not None:
-            raise Disconnected(self._lost)
-        self._wait(asyncio.run_coroutine_threadsafe(self._make_safe(), self._loop), stoppable=False)
+        with self._safety:
+            if self._is_safe or self._closed:
+                return
+            if self._lost is not None:
+                raise Disconnected(self._lost)
+            self._wait(asyncio.run_coroutine_threadsafe(self._make_safe(), self._loop), stoppable=False)
+            self._is_safe = True
 
     def close(self) -> None:
         """End the thread, and give the devices' links back: whatever is still asked of them after is refused.
 
-        A thread that does not come back is left alone; it holds nothing that anybody needs.
+        A thread that does not come back is left alone; it holds nothing that anybody needs. A second time does nothing.
         """
+        with self._safety:
+            if not self._closed:
+                self._closed = True
+                self._close()
+
+    def _close(self) -> None:
         if self._tap is not None and self._lost is None:
             asyncio.run_coroutine_threadsafe(self._stop_telling(self._tap), self._loop).result()
         self._bench.close()
@@ -137,6 +174,9 @@ class BenchSession:
             if silence is not None:
                 self._cancel(future, silence)
                 raise Disconnected(silence)
+            if stoppable and self._stopped.is_set():
+                self._cancel(future, "a stop came while a device or the database did not answer")
+                raise Stopped(STOPPED)
             if stoppable and self._shutting_down.is_set():
                 self._cancel(future, "the service ended while a device did not answer")
                 raise ShuttingDown
@@ -148,7 +188,7 @@ class BenchSession:
         wanted = self._stop_wanted.ask(ANSWER_S)
         if wanted:
             self._cancel(future, "a stop came while a device did not answer")
-            raise Stopped("stopped by an operator")
+            raise Stopped(STOPPED)
         self._unanswered_s = 0.0 if wanted is not None else self._unanswered_s + passed_s
         if self._unanswered_s > HANGS_S:
             why = f"the database has not answered for {HANGS_S:g} s"

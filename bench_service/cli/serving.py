@@ -11,6 +11,7 @@ import uvicorn
 
 from bench_service.api.http.door import Door, may_listen
 from bench_service.app import create_app, open_service
+from bench_service.cli.connections import AT_ONCE, BoundedConnections, lengthen_queue, raise_descriptors
 from bench_service.cli.logs import set_up
 from bench_service.cli.private_files import protect
 from bench_service.cli.refusal import Refused
@@ -22,6 +23,14 @@ EMBEDDED = "embedded"
 """Name that commands give to a service in their own process, which they reach over a socket file."""
 GRACE_S = 3
 """How long open connections may take to end at shutdown [s]."""
+
+
+class _Server(uvicorn.Server):
+    """uvicorn's server, whose queue of connections is longer than what it accepts at once."""
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        lengthen_queue([each for server in self.servers for each in server.sockets])
 
 
 @contextmanager
@@ -46,11 +55,12 @@ def _opened(
 ) -> Generator[tuple[uvicorn.Server, BenchService]]:
     set_up(settings, level)
     protect(settings)
+    BoundedConnections.most = raise_descriptors()
     if socket_file is None:
         check_address(settings)
     rules = Door.of(settings) if socket_file is None else Door.of(settings, EMBEDDED)
     with ExitStack() as closing:
-        service = open_service(settings, closing, drive)
+        service = open_service(settings, closing, drive, apart=socket_file is None)
         config = uvicorn.Config(
             create_app(service, int(settings.max_import_mb * 1e6), closing.close, rules),
             settings.host,
@@ -59,8 +69,10 @@ def _opened(
             log_config=None,
             access_log=settings.log_access,
             timeout_graceful_shutdown=GRACE_S,
+            http=BoundedConnections,
+            backlog=AT_ONCE,
         )
-        server = uvicorn.Server(config)
+        server = _Server(config)
 
         def end() -> None:
             server.should_exit = True

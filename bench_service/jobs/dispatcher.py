@@ -14,6 +14,7 @@ While the bench's lease is lost (the database was restarted) nothing is claimed,
 """
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Event, Thread
 from typing import Protocol
@@ -67,9 +68,20 @@ class Dispatcher:
     """Gives one bench its jobs, one after the other, in a thread of its own."""
 
     def __init__(
-        self, bench_id: str, stores: JobStores, runner: JobRunner, engine: JobEngine, lease: Lease, poll_s: float
+        self,
+        bench_id: str,
+        stores: JobStores,
+        runner: JobRunner,
+        engine: JobEngine,
+        lease: Lease,
+        poll_s: float,
+        stopped: Callable[[], bool] = lambda: False,
     ) -> None:
-        """`poll_s`: how often the queue is looked at for jobs that other processes put there."""
+        """`poll_s`: how often the queue is looked at for jobs that other processes put there.
+
+        `stopped`: whether the bench is stopped over its host's stop channel, of which the database may not know yet.
+        """
+        self._stopped = stopped
         self._bench_id = bench_id
         self._stores = stores
         self._runner = runner
@@ -123,7 +135,7 @@ class Dispatcher:
             return False
         entry = queue.next()
         self._tell(queue)
-        if entry is None:
+        if entry is None or self._stopped():
             return False
         try:
             job = self._runner.claim(entry)

@@ -44,8 +44,8 @@ class Standing:
 class QueueService:
     """Reads the queues of all benches, and keeps reservations."""
 
-    def __init__(self, stores: JobStores, benches: BenchDirectory, wake: Callable[[], None]) -> None:
-        """`wake`: called where a job may start that had to wait."""
+    def __init__(self, stores: JobStores, benches: BenchDirectory, wake: Callable[[str], None]) -> None:
+        """`wake`: called for each bench on which a job may start that had to wait."""
         self._stores = stores
         self._wake = wake
         self._benches = benches
@@ -79,7 +79,8 @@ class QueueService:
     def give_back(self, reservation_id: str) -> Reservation:
         """End a reservation before its time. Raises `NotFound`."""
         kept = self._stores.reservations.end(reservation_id, now())
-        self._wake()
+        for bench_id in (kept.name,) if kept.kind is Reserved.BENCH else self._benches.ids():
+            self._wake(bench_id)
         return kept
 
     def usable(self, reservation_id: str, bench: str, unit: str) -> None:

@@ -36,9 +36,11 @@ class JobService:
         driver: BenchDriver | None,
         worker: Worker | None,
         code_version: str,
-        wake: Callable[[], None],
+        wake: Callable[[str], None],
     ) -> None:
-        """`driver`, `worker`: those of this process's own bench, if it drives one. `wake`: has the dispatcher look."""
+        """`driver`, `worker`: those of this process's own bench, if it drives one. `wake`: has a bench's queue
+        looked at.
+        """
         self._stores = stores
         self._planner = planner
         self._queues = queues
@@ -62,7 +64,7 @@ class JobService:
             self._queues.usable(request.reservation, plan.context.bench.id, request.unit)
         register(self._stores.units, plan.context.unit)
         stored = self._stores.jobs.add(self._new_job(request, plan, requested_by), key)
-        self._wake()
+        self._wake(stored.bench)
         with about(job=stored.id):
             log.info("%s on %s queued", stored.procedure, stored.unit)
         return stored
@@ -78,7 +80,7 @@ class JobService:
     def resume(self, job_id: str) -> Job:
         """Go on with a job that can be resumed, with the stations that remain. Raises `IllegalTransition`."""
         job = self._stores.jobs.resume(job_id, now())
-        self._wake()
+        self._wake(job.bench)
         return job
 
     def set_priority(self, job_id: str, priority: int) -> Job:

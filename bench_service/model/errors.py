@@ -12,6 +12,7 @@ ServiceError
 ├── NotSafe              the bench's devices are not known to be safe
 ├── SeveralStops         a release must name one of the stops that stand
 ├── AlreadyReserved      somebody keeps this bench or unit
+├── Overloaded           too much is asked for at one time
 ├── NotUnderstood        a job was stored by a version whose words this one does not know
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
@@ -56,6 +57,10 @@ class BenchBusy(ServiceError):
     def __init__(self, message: str, passing: bool = False) -> None:
         super().__init__(message)
         self.passing = passing
+
+
+class Overloaded(ServiceError):
+    """Too much is asked for at one time; the same request may be sent again later."""
 
 
 class Misconfigured(ServiceError):

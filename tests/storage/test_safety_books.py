@@ -16,14 +16,14 @@ def test_a_stop_its_confirmation_and_what_was_done(
 ) -> None:
     job = stores.jobs.add(new_job())
     books = SqlSafetyBooks(database_url, "sim")
-    assert not books.stopped()
+    assert not books.standing()
     books.confirm_safe("nobody: there is no stop")
     for _ in range(2):
         books.stop("could not be made safe: a test", "the supervisor")
     books.stop("another reason", "the supervisor")
-    assert books.stopped()
+    assert books.standing()
     other = SqlSafetyBooks(database_url, "sim-2")
-    assert not other.stopped()
+    assert not other.standing()
     other.close()
     books.confirm_safe("the supervisor")
     books.confirm_safe("somebody later")
@@ -45,5 +45,5 @@ def test_a_stop_its_confirmation_and_what_was_done(
     with database.read() as session:
         assert session.scalar(sa.select(sa.func.count()).select_from(AuditRow)) == 2
     release_all(stores.benches, "sim")
-    assert not books.stopped()
+    assert not books.standing()
     books.close()

@@ -15,6 +15,7 @@ from bench_service.api.benches.schemas import (
     StopRequest,
     StopView,
 )
+from bench_service.api.benches.stop_threads import stop_in_own_thread
 from bench_service.api.http.dependencies import REQUESTED_BY, After, ClientName, Limit, RequestedBy, Service
 from bench_service.api.http.errors import problems
 from bench_service.model.records import reasons_of
@@ -69,15 +70,18 @@ def read_queue(bench_id: str, service: Service) -> QueueView:
 
 
 @router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 413, 507))
-def stop(bench_id: str, service: Service, client: ClientName, body: StopRequest | None = None) -> Stopping:
+async def stop(bench_id: str, service: Service, client: ClientName, body: StopRequest | None = None) -> Stopping:
     """Software stop: end the running job, stop the table, switch the unit off; until this stop is released.
 
-    It is noted first, so it holds whoever is alive: a worker sees it, and in its place the bench's supervisor.
-    Several stops of a bench stand beside each other.
+    It goes to the bench itself first, on its host, and needs no database for that: a worker sees it, and in its place
+    the bench's supervisor. The database follows when it can; `books` says why where it has not yet. Several stops of a
+    bench stand beside each other.
     """
     asked = body or StopRequest.model_validate({})
-    done = service.stops.stop(bench_id, asked.reason, asked.by or client)
-    return Stopping(bench=bench_id, stop=done.stop.id, job=done.job, safety=SafetyView.of(done.safety))
+    done = await stop_in_own_thread(service.stops, bench_id, asked.reason, asked.by or client)
+    return Stopping(
+        bench=bench_id, stop=done.stop.id, job=done.job, safety=SafetyView.of(done.safety), books=done.books or None
+    )
 
 
 @router.get("/{bench_id}/stops", responses=problems(404))

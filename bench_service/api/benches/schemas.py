@@ -179,4 +179,5 @@ class Stopping(BaseModel):
     stop: str = Field(description="Id of this stop: a release names it")
     job: str | None = Field(description="The job that was running, which is being cancelled")
     safety: SafetyView = Field(description="What was known within a second of the stop; ask the bench for later")
+    books: str | None = Field(description="Why the database does not have this stop yet; null: it has")
     note: str = "This is a software stop. The emergency stop is a hardware circuit beside the table."

@@ -26,6 +26,7 @@ from bench_service.model.errors import (
     NotReady,
     NotSafe,
     NotUnderstood,
+    Overloaded,
     ServiceError,
     SeveralStops,
     StorageFailure,
@@ -43,6 +44,7 @@ STATUS: dict[type[Exception], int] = {
     NameTaken: 409,
     NotDriving: 503,
     NotReady: 503,
+    Overloaded: 503,
     NotMounted: 422,
     NotSafe: 409,
     SeveralStops: 409,
@@ -80,6 +82,8 @@ class Problem(BaseModel):
     lost: list[Shown] = Field(default_factory=list[Shown], description="Combinations that a plan cannot determine")
 
 
+RETRY_AFTER_S = "2"
+"""When a request that was too much may be sent again."""
 MOST_FIELDS = 100
 """Of a megabyte of wrong fields so many are told."""
 _NO_BODY = FieldError(field="body", message="UTF-8 text of one JSON document is expected")
@@ -177,7 +181,10 @@ def _on_known(request: Request, error: Exception) -> Response:
     if isinstance(error, SeveralStops):
         fields = [FieldError(field="stop_id", message=text, value=stop) for stop, text in error.stops]
     lost = list(error.lost) if isinstance(error, Undetermined) else []
-    return respond(request, status_of(error), str(error), type(error).__name__, fields, lost)
+    response = respond(request, status_of(error), str(error), type(error).__name__, fields, lost)
+    if isinstance(error, Overloaded):
+        response.headers["Retry-After"] = RETRY_AFTER_S
+    return response
 
 
 def _on_request_validation(request: Request, error: Exception) -> Response:

@@ -32,7 +32,17 @@ async function ask(form) {
   output.textContent = "Asking …";
   try {
     const answer = await fetch(form.getAttribute("action"), request);
-    if (answer.ok) { location.reload(); return; }
+    if (answer.ok) {
+      const said = await answer.json().catch(() => ({}));
+      if (said.safety && (said.books || said.safety.safe !== true)) {  // a stop: where the page may not load anew
+        refused(output, [said.safety.explanation, said.books && `The database does not have it yet: ${said.books}.`]
+          .filter(Boolean).join(" "));
+        button.disabled = false;
+        return;
+      }
+      location.reload();
+      return;
+    }
     refused(output, await problemOf(answer));
   } catch (error) {
     refused(output, error.name === "TimeoutError"

@@ -9,13 +9,19 @@ from functools import cached_property
 from sqlalchemy import ColumnElement, select
 
 from bench_service import wall_clock
+from bench_service.bench.stop.messages import Listening
+from bench_service.bench.stop.word import StopWord
+from bench_service.jobs.stop_entry import StopEntry
 from bench_service.model.errors import NotFound
 from bench_service.model.records import BenchStop
 from bench_service.persistence.bench.registry_store import SqlBenchRegistry
+from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.jobs.job_store import SqlJobStore
+from bench_service.persistence.jobs.queue_store import SqlQueueStore
 from bench_service.persistence.tables.bench import BenchStopRow
 from bench_service.persistence.tables.telemetry import AuditRow
+from bench_service.persistence.telemetry.audit_store import SqlAuditTrail
 
 
 class SqlSafetyBooks:
@@ -29,8 +35,16 @@ class SqlSafetyBooks:
     def _database(self) -> Database:
         return connect(self._url)
 
-    def stopped(self) -> bool:
-        return self._stands(BenchStopRow.released_at.is_(None))
+    def standing(self) -> tuple[BenchStop, ...]:
+        return SqlBenchRegistry(self._database).standing_stops(self._bench_id)
+
+    def enter(self, word: StopWord) -> None:
+        database = self._database
+        stores = SqlBenchRegistry(database), SqlQueueStore(database), SqlJobStore(database), SqlAuditTrail(database)
+        StopEntry(*stores).enter(self._bench_id, word)
+
+    def say_listening(self, at: Listening) -> None:
+        SqlStopAddresses(self._database).say(self._bench_id, at)
 
     def confirm_safe(self, by: str) -> None:
         if self._stands(BenchStopRow.released_at.is_(None), BenchStopRow.safe_at.is_(None)):
