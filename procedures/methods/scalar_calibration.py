@@ -18,7 +18,7 @@ from procedures.analysis.calibration.triad_analysis import noise_of_means, scatt
 from procedures.analysis.fitness.watched import Inspection
 from procedures.core import units
 from procedures.core.arrays import Array
-from procedures.core.errors import UnfitRecording
+from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import TRIADS, Recording, rates, require_finite
@@ -28,6 +28,9 @@ from procedures.procedure import STATIONS, Evidence, Method, Outcome, Parameters
 
 TURNED = replace(STATIONS.settings, at_rest=False, beside_others=False)
 """One recording of a unit that is turned by hand from pose to pose."""
+
+_SMALLEST_SD = 1e-9
+"""Of the largest reading: the noise of pose means that nothing is known of, before it is scaled to the residuals."""
 
 
 class Still(Parameters):
@@ -46,6 +49,15 @@ class Params(RecordedParameters):
     triad: Literal["accelerometer", "gyro"] = "accelerometer"
     gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9, description="needed for the accelerometers")
     earth_rate_rad_s: float = Field(units.EARTH_RATE, ge=7.0e-5, le=7.6e-5)
+    rows: Literal["samples", "pose_means"] = Field(
+        "samples",
+        description="of a single recording; pose_means: each row is the mean over a pose, no stretch is sought",
+    )
+    pose_sd: float | None = Field(
+        None,
+        gt=0.0,
+        description="standard uncertainty of pose means, in the recording's unit; None: from the residuals",
+    )
     still: Still = Field(default_factory=lambda: Still.model_validate({}))
     uncertainty_max: float = Field(
         0.01,
@@ -134,6 +146,8 @@ def _poses_of_one(recording: Recording, params: Params, unit: Unit | None) -> tu
     names = TRIADS[params.triad]
     samples = rates(recording, names)
     require_finite(info, names, samples)
+    if params.rows == "pose_means":
+        return _rows_as_poses(recording, samples, params, unit)
     settings = StillSettings(s.initial_s, s.window_s, s.factor, s.shortest_s, s.margin_s)
     stretches = still_stretches(samples, info.rate_hz, settings)
     if not stretches:
@@ -145,6 +159,29 @@ def _poses_of_one(recording: Recording, params: Params, unit: Unit | None) -> tu
     if known is not None:
         return outputs, known, True, output_unit
     return outputs, scatter_covariance(outputs, np.maximum(sd, np.median(sd, axis=0))), False, output_unit
+
+
+def _rows_as_poses(
+    recording: Recording, samples: Array, params: Params, unit: Unit | None
+) -> tuple[Array, Array, bool, str]:
+    """Each row as the mean over a pose, as `_poses_of_one`; a row lasts as long as its sample period.
+
+    The noise is what is given, else the unit's record over each row's time, else what the residuals show, for which
+    more poses are needed than the nine that the parameters take. Raises `BadParameter`.
+    """
+    info, rows = recording.info, len(samples)
+    output_unit = info.channels[info.column(TRIADS[params.triad][0])].rate_unit
+    if params.pose_sd is not None:
+        return samples, np.broadcast_to(params.pose_sd**2 * np.eye(rows), (3, rows, rows)), True, output_unit
+    windows = (np.arange(rows)[:, None] + np.array([0.0, 1.0])) / info.rate_hz + info.start_s
+    known = outputs_covariance(unit.triad(params.triad) if unit else None, output_unit, windows)
+    if known is not None:
+        return samples, known, True, output_unit
+    if rows <= len(PARAMETERS):
+        allowed = f"needed with {rows} pose means of unknown noise: {len(PARAMETERS)} parameters leave nothing to check"
+        raise BadParameter("pose_sd", None, allowed)
+    least = (_SMALLEST_SD * float(np.max(np.abs(samples)))) ** 2
+    return samples, np.broadcast_to(least * np.eye(rows), (3, rows, rows)), False, output_unit
 
 
 def _result(fit: ScalarFit, params: Params, output_unit: str) -> Result:
