@@ -6,6 +6,8 @@ from typing import Annotated, Any, Generic, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from procedures.analysis.fitness.findings import FitnessSettings
+from procedures.analysis.fitness.watched import Inspection
 from procedures.bench import Bench, BenchDescription
 from procedures.bench.imu import Stream
 from procedures.core.imu_model import TriadCalibration
@@ -24,6 +26,20 @@ class Parameters(BaseModel):
     def filled(self, defaults: Mapping[str, Any]) -> Self:
         """The same parameters with each None replaced by its default, where there is one."""
         return self.model_copy(update={name: value for name, value in defaults.items() if getattr(self, name) is None})
+
+
+Second = Annotated[float, Field(ge=0.0, le=1e9)]
+
+
+class RecordedParameters(Parameters):
+    """Base of the parameters of methods that work on recordings: a stretch of them may be asked for."""
+
+    start_s: Second | tuple[Second, ...] | None = Field(
+        None, description="from this second of each recording; a list: one for each"
+    )
+    stop_s: Second | tuple[Second, ...] | None = Field(
+        None, description="up to this second of each recording; a list: one for each"
+    )
 
 
 class Outcome(BaseModel):
@@ -115,6 +131,20 @@ def _uses_none(_: Any) -> tuple[CorrectionKind, ...]:
     return ()
 
 
+STATIONS = Inspection(
+    FitnessSettings(least_samples=1, counters_may_rest=True, beside_others=True, means_only=True, seeks_scale=True)
+)
+"""Stations at rest of which means are taken: what most procedures record. A station that turns says so itself."""
+
+
+def _stations(_: Any) -> Inspection:
+    return STATIONS
+
+
+def _at_rest(_params: Any, count: int) -> Inspection:
+    return Inspection(FitnessSettings(least_samples=1)) if count == 1 else STATIONS
+
+
 def _nothing_learnt(_: Any, unit: Unit, _origin: str) -> Unit:
     return unit
 
@@ -151,6 +181,8 @@ class Procedure(Generic[P, R]):
     """The unit's record with what a job's result found of it; the text names that result as its origin."""
     quantities: Callable[[P, Context], tuple[str, ...]] | None = None
     """Names of the checks and of the named estimates that a result will have; None: not known before the job."""
+    inspection: Callable[[P], Inspection] = _stations
+    """How its recordings are inspected before anything is judged; see `procedures.inspection`."""
 
 
 @dataclass(frozen=True)
@@ -167,3 +199,5 @@ class Method(Generic[P, R]):
     calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
     corrections: Callable[[R], tuple[UnitCorrection, ...]] = _no_corrections
     """The correction sets that a result gives: at most one of a kind."""
+    inspection: Callable[[P, int], Inspection] = _at_rest
+    """How so many recordings are inspected before anything is judged; see `procedures.inspection`."""

@@ -132,7 +132,7 @@ def run(
     as_json: AsJson = False,
 ) -> int:
     """Run a procedure on a unit and wait for its verdict."""
-    from bench_service.cli.tables import check_table
+    from bench_service.cli.tables import check_table, show_warnings
     from bench_service.cli.watching import JOB, exit_code, watch
 
     body = {"procedure": procedure, "unit": unit, "parameters": dict(map(parameter, set_)), "seed": seed}
@@ -145,6 +145,7 @@ def run(
         raise Refused(f"job {job['id']} {job['state']}: {(job['error'] or {}).get('message', 'no reason given')}")
     else:
         console.print(check_table(result["document"]))
+        show_warnings(result["document"], console)
         console.print(f"verdict {job['verdict']}, job {job['id']}", soft_wrap=True)
     return exit_code(job["verdict"])
 
@@ -175,7 +176,7 @@ def analyse(
     as_json: AsJson = False,
 ) -> int:
     """Run a method on stored recordings or calibrations."""
-    from bench_service.cli.tables import check_table
+    from bench_service.cli.tables import check_table, show_warnings
     from bench_service.cli.watching import exit_code
 
     body = {
@@ -190,6 +191,7 @@ def analyse(
         print(json.dumps(result, indent=2))
     else:
         console.print(check_table(result["document"]))
+        show_warnings(result["document"], console)
         console.print(f"verdict {result['verdict']}, result {result['id']}", soft_wrap=True)
     return exit_code(result["verdict"])
 

@@ -18,6 +18,7 @@ from bench_service.model.request import fingerprint
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.recording import Recording
+from procedures.inspection import analyse_method
 from procedures.procedure import DatedCalibration, Evidence
 
 
@@ -86,7 +87,7 @@ class AnalysisService:
         if len(units) > 1:
             raise UnfitRecording(f"the evidence is of several units: {', '.join(sorted(units))}")
         serial = next(iter(units), None)
-        outcome = method.analyse(evidence, params, None if serial is None else self._stores.units.unit(serial))
+        outcome = analyse_method(method, evidence, params, None if serial is None else self._stores.units.unit(serial))
         stored = StoredResult(
             id=new_id(),
             kind="method",

@@ -15,6 +15,7 @@ from procedures.core.errors import UnfitRecording
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Recording
 from procedures.core.unit_correction import UnitCorrection
+from procedures.inspection import analyse_procedure
 from procedures.procedure import Outcome
 
 
@@ -48,7 +49,7 @@ def analysed(
         raise UnfitRecording(f"job {job.id} has {len(recordings)} of its {len(job.stations)} recordings")
     context = context_of(job)
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
-    outcome = procedure.analyse(recordings, params, context)
+    outcome = analyse_procedure(procedure, recordings, params, context)
     used = context.unit.calibration_id if procedure.uses_calibration else None
     corrections = (context.unit.correction_id(kind) for kind in procedure.uses_corrections(params))
     stored = StoredResult(

@@ -6,7 +6,7 @@ neglected, and what that costs is in the uncertainty. Errata of F: `procedures.a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -16,22 +16,23 @@ from procedures.analysis.calibration.reference import INPUT_UNITS, reference_vec
 from procedures.analysis.calibration.station_means import StationMeans, station_means
 from procedures.analysis.calibration.triad_analysis import noise_of_means
 from procedures.analysis.field.fit import FieldFit, FieldModel, FieldUncertainty, fit_field
+from procedures.analysis.fitness.watched import Inspection
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Check, Limit, check, verdict
-from procedures.core.recording import Recording
+from procedures.core.recording import ACCELEROMETER, GYRO, Recording
 from procedures.core.report import Report, Table
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
-from procedures.procedure import Evidence, Method, Outcome, Parameters
+from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 
 
-class Params(Parameters):
+class Params(RecordedParameters):
     """Where and how the unit was turned, and how well that is known. Latitude and gravity depend on the place."""
 
     latitude_deg: float = Field(ge=-90.0, le=90.0)
@@ -263,4 +264,19 @@ def _warnings(triads: Sequence[FieldTriad], accelerometer: FieldFit, params: Par
     return found
 
 
-METHOD = Method("field_calibration", "Field calibration", "1.0.0", Params, Result, analyse, report, calibrations)
+def inspection(params: Params, count: int) -> Inspection:
+    """Positions at rest, of the triads that are calibrated."""
+    return replace(STATIONS, channels=ACCELEROMETER if params.gyro == "none" else GYRO + ACCELEROMETER)
+
+
+METHOD = Method(
+    "field_calibration",
+    "Field calibration",
+    "1.0.0",
+    Params,
+    Result,
+    analyse,
+    report,
+    calibrations,
+    inspection=inspection,
+)

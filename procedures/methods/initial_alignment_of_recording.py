@@ -4,7 +4,7 @@ Each recording is an alignment of its own. The uncertainty has the calibration's
 launch and the noise of the recording; beside it stands the azimuth error of thesis 1.1, from the unit's noise.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import Field
@@ -24,11 +24,11 @@ from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, Undetermined, UnfitRecording
 from procedures.core.imu_model import TriadCalibration, correct
 from procedures.core.limits import Check, Limit, check, verdict
-from procedures.core.recording import RecordingInfo
+from procedures.core.recording import ACCELEROMETER, GYRO, RecordingInfo
 from procedures.core.report import Report, Table
 from procedures.core.site import Site
 from procedures.core.unit import Unit
-from procedures.procedure import Evidence, Method, Outcome, Parameters
+from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
 
 TRIADS = ("accelerometer", "gyro")
 LIKELY = 4.0
@@ -36,7 +36,7 @@ LIKELY = 4.0
 the calibration or the uncertainty is wrong: one in 16 000 by chance."""
 
 
-class Params(Parameters):
+class Params(RecordedParameters):
     """Where the unit rested; neither latitude nor gravity has a default, they depend on the place."""
 
     latitude_deg: float = Field(ge=-90.0, le=90.0)
@@ -195,4 +195,5 @@ METHOD = Method(
     Result,
     analyse,
     report,
+    inspection=lambda _params, _count: replace(STATIONS, channels=GYRO + ACCELEROMETER),
 )

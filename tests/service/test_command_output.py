@@ -40,8 +40,8 @@ def _a_wide_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     ("arguments", "code", "shown", "beside_the_bar"),
     [
         (("jobs",), 0, 2, 0),
-        (("run", "no_operation", "--unit", "U"), 1, 2, 2),
-        (("analyse", "noise_analysis"), 1, 2, 0),
+        (("run", "no_operation", "--unit", "U"), 1, 3, 2),
+        (("analyse", "noise_analysis"), 1, 3, 0),
         (("campaign", "list"), 0, 3, 0),
         (("campaign", "runs"), 0, 6, 0),
         (("schedule", "list"), 0, 4, 0),
