@@ -230,7 +230,8 @@ def _figure(curve: Curve, name: str, confidence: float) -> Figure:
 
 def inspection(params: Params, count: int) -> Inspection:
     """Each recording by itself, the channels that are asked for."""
-    return Inspection(FitnessSettings(least_samples=1), params.channels)
+    gaps = "refuse" if params.gaps == "refuse" else "aware"
+    return Inspection(FitnessSettings(least_samples=1, gaps=gaps), params.channels)
 
 
 METHOD = Method(

@@ -47,9 +47,10 @@ def test_findings_are_warnings_of_the_recording(sqlite_client: Client) -> None:
         assert said in page
     refused = sqlite_client.analyse("allan_deviation", recordings=[made["id"]])
     assert refused.status_code == 422
-    assert "sample 200 is missing" in refused.json()["detail"]
+    assert "2 of 600 samples (0.333 %) are not a finite number, the first is sample 200" in refused.json()["detail"]
     left_out = sqlite_client.analyse("allan_deviation", recordings=[made["id"]], parameters={"gaps": "leave_out"})
     assert left_out.status_code == 201, left_out.text
+    assert any("2 of 600 samples" in warning for warning in left_out.json()["document"]["warnings"])
 
 
 def test_the_command_says_them_to_standard_error(
