@@ -75,6 +75,10 @@ def analyse_means(
     return triad_summary(fit, after, means.labels, scalar), fit
 
 
+LEAST_SCATTER = 0.5
+"""A dwell's own scatter counts as no less than this part of the median of all."""
+
+
 @dataclass(frozen=True)
 class AccelerometerSettings:
     """How accelerometers are calibrated."""
@@ -110,12 +114,14 @@ def analyse_accelerometers(
 def noise_of_means(means: StationMeans, record: TriadRecord | None) -> tuple[Array, bool]:
     """Covariance of the station means, (3, n, n), and whether it comes from the unit's record.
 
-    Outputs in counts have no record in their unit. Without one the scatter of batch means within each dwell stands in.
+    Outputs in counts have no record in their unit. Without one the scatter of batch means within each dwell stands in,
+    for a dwell that hardly scatters (clipped, held) a part of the dwells' median.
     """
     known = outputs_covariance(record, means.output_unit, means.windows)
     if known is not None:
         return known, True
-    return scatter_covariance(means.outputs, means.mean_sd), False
+    floor = LEAST_SCATTER * np.median(means.mean_sd, axis=0)
+    return scatter_covariance(means.outputs, np.maximum(means.mean_sd, floor)), False
 
 
 def scatter_covariance(outputs: Array, sd: Array) -> Array:
