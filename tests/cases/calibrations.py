@@ -17,6 +17,12 @@ RATE_HZ = 50.0
 KINDS = {"accelerometer": (Quantity.SPECIFIC_FORCE, "m/s^2"), "gyro": (Quantity.ANGULAR_RATE, "rad/s")}
 TURNS = ((0, 0), (90, 0), (180, 0), (270, 0), (0, 90), (0, 270), (90, 90), (45, 45))
 """(α, β) of positions set by hand [deg]."""
+EDGES = [
+    *[(a, b, 0) for a in (1, -1) for b in (1, -1)],
+    *[(a, 0, b) for a in (1, -1) for b in (1, -1)],
+    *[(0, a, b) for a in (1, -1) for b in (1, -1)],
+]
+"""Of a cube, not yet of unit length."""
 EARTH = 7.292115e-5
 
 
@@ -136,6 +142,11 @@ def clean_scalar(rng: np.random.Generator, kind: str, count: int | None = None, 
     return Trial(SCALAR, recorded("accelerometer", list(samples)), {"gravity_m_s2": G}, nine)
 
 
+def scalar_trial(recordings: tuple[MemoryRecording, ...]) -> Trial:
+    """A scalar calibration of given recordings."""
+    return Trial(SCALAR, recordings, {"gravity_m_s2": G}, np.array([]))
+
+
 def changed(trial: Trial, change: Callable[[int, np.ndarray], np.ndarray]) -> Trial:
     """The same with each pose's samples changed."""
     again = tuple(MemoryRecording(r.info, change(i, r.raw.copy())) for i, r in enumerate(trial.recordings))
@@ -145,7 +156,7 @@ def changed(trial: Trial, change: Callable[[int, np.ndarray], np.ndarray]) -> Tr
 def disturbed(rng: np.random.Generator) -> Trial:
     """One pose off by .1 to 1 m/s² on one channel."""
     trial = clean_scalar(rng, "white")
-    bad, axis, off = int(rng.integers(len(trial.recordings))), int(rng.integers(3)), rng.uniform(0.1, 1.0)
+    axis, off = int(rng.integers(3)), rng.uniform(0.1, 1.0)
     off = np.where(np.arange(3) == axis, off * rng.choice([-1.0, 1.0]), 0.0)
     means = np.array([r.raw.mean(axis=0) for r in trial.recordings])
     # A pose at right angles to the channel does not feel it: the one that feels it most is taken.

@@ -46,8 +46,12 @@ def test_every_local_day_that_exists_has_one_start(zone: str, first: date, days:
         at = time(int(rng.integers(0, 5)), int(rng.integers(0, 60)))
         wanted = [t for t in (expected(local, night, at) for night in nights) if t is not None]
         begin = wanted[0] - timedelta(seconds=1)
-        end = wanted[-1]
-        assert list(takewhile(lambda t: t <= end, starts_after(f"{at.minute} {at.hour} * * *", zone, begin))) == wanted
+        assert (
+            list(
+                takewhile(lambda t, end=wanted[-1]: t <= end, starts_after(f"{at.minute} {at.hour} * * *", zone, begin))
+            )
+            == wanted
+        )
 
 
 @pytest.mark.parametrize(("zone", "first", "days"), CHANGES)

@@ -26,7 +26,7 @@ REMARKABLE = 2.0
 ALIKE = 0.75
 """Channels that see a pose at least so much as the most concerned one are named with it."""
 DEAD = 0.02
-"""A channel whose means span less than this part of the liveliest channel's does not feel the poses."""
+"""A channel whose means span less than this part of the triad's middle one does not feel the poses."""
 SCALE_WITHIN = 2.0
 """Scale factors of nominal outputs beyond this, or under its inverse, are a wrong unit and not a unit's error."""
 SCALES_ALIKE = 20.0
@@ -100,14 +100,18 @@ def residual_misfit(
     return Misfit(ratio, spare, f"{labels[pose]}, channel {'xyz'[channel]} ({residuals[pose, channel]:+.3g})")
 
 
-def require_live(triad: str, outputs: Array, output_unit: str) -> None:
-    """Refuse means (n, 3) of which a channel does not change from pose to pose as the others do: `UnfitRecording`."""
+def require_live(triad: str, outputs: Array, output_unit: str, expected: Array | None = None) -> None:
+    """Refuse means (n, 3) of which a channel does not change from pose to pose as the others do: `UnfitRecording`.
+
+    `expected` (n, 3) are the inputs where they are known; else every channel is to feel about the same change.
+    """
     spans = np.ptp(outputs, axis=0)
-    for axis, span in zip("xyz", spans.tolist(), strict=True):
-        if span < DEAD * spans.max():
+    felt = spans / (1.0 if expected is None else np.ptp(expected, axis=0))
+    for axis, span, ratio in zip("xyz", spans.tolist(), felt.tolist(), strict=True):
+        if ratio < DEAD * np.median(felt):
             raise UnfitRecording(
-                f"{triad} {axis} changes by {span:.3g} {output_unit} between the poses and the liveliest channel by "
-                f"{spans.max():.3g}: the channel is dead or stuck, or no pose turns it to the reference"
+                f"{triad} {axis} changes by {span:.3g} {output_unit} between the poses, the triad's liveliest channel "
+                f"by {spans.max():.3g}: the channel is dead or stuck, or no pose turns it to the reference"
             )
 
 
