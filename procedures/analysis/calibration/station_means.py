@@ -47,6 +47,8 @@ class StationMeans:
     counts: tuple[int, ...]
     labels: tuple[str, ...]
     angles: tuple[TableAngles | None, ...]
+    at_reference_c: tuple[float, float] | None = None
+    """Readings of case and converter that a thermal correction has brought the outputs to; None: as they were."""
 
 
 @dataclass(frozen=True)
