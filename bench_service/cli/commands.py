@@ -199,7 +199,8 @@ def analyse(
     server: Server = None,
     as_json: AsJson = False,
 ) -> int:
-    """Run a method on stored recordings or calibrations."""
+    """Run a method on stored recordings or calibrations; prints its coefficients, checks and verdict."""
+    from bench_service.cli.report_tables import report_tables
     from bench_service.cli.tables import check_table
     from bench_service.cli.watching import exit_code
 
@@ -214,6 +215,8 @@ def analyse(
     if as_json:
         print(json.dumps(result, indent=2))
     else:
+        for table in report_tables(method, result["document"]):
+            console.print(table)
         console.print(check_table(result["document"]))
         console.print(f"verdict {result['verdict']}, result {result['id']}", soft_wrap=True)
     return exit_code(result["verdict"])
