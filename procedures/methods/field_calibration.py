@@ -19,7 +19,7 @@ from procedures.analysis.calibration.misfit import (
 from procedures.analysis.calibration.reference import INPUT_UNITS, reference_vectors
 from procedures.analysis.calibration.station_means import station_means
 from procedures.analysis.calibration.triad_analysis import noise_of_means
-from procedures.analysis.field.examined import FittedTriad, examined_fit
+from procedures.analysis.field.examined import FittedTriad, examined_fit, require_accelerometers
 from procedures.analysis.field.fit import FieldFit, FieldModel, FieldUncertainty
 from procedures.core import units
 from procedures.core.arrays import Array
@@ -109,6 +109,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
     Also `UnfitRecording` and `BadParameter` where positions are missing or too few.
     """
+    require_accelerometers(evidence.recordings)
     positions = _positions(evidence.recordings, params)
     fitted = _accelerometer(evidence.recordings, positions, params, unit)
     accelerometer, triads = fitted.fit, [_summary(fitted, params, estimated=True)]
@@ -275,9 +276,8 @@ def _checks(triads: Sequence[FieldTriad], params: Params) -> list[Check]:
 
 
 def _warnings(triads: Sequence[FieldTriad], accelerometer: FieldFit, params: Params) -> list[str]:
-    found: list[str] = []
-    if not accelerometer.noise_known:
-        found.append("the noise is not known: uncertainties come from the scatter within the recordings")
+    unknown = "the noise is not known: uncertainties come from the scatter within the recordings"
+    found = [] if accelerometer.noise_known else [unknown]
     for t in triads:
         name = t.calibration.triad
         if t.degrees_of_freedom == 0:

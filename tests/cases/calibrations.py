@@ -73,14 +73,18 @@ def inside(trial: Trial, times: float) -> float:
     return float(np.mean(np.abs(found[:, 0] - trial.truth) <= times * found[:, 1]))
 
 
-def recorded(triad: str, poses: list[np.ndarray], more: list[np.ndarray] | None = None) -> tuple[MemoryRecording, ...]:
+def recorded(
+    triad: str, poses: list[np.ndarray], more: list[np.ndarray] | None = None, rate_hz: float = RATE_HZ
+) -> tuple[MemoryRecording, ...]:
     """One recording a pose of samples (n, 3), with another triad's beside them where there is one."""
     channels = [Channel(f"{triad}_{a}", *KINDS[triad]) for a in "xyz"]
     if more is not None:
         channels += [Channel(f"gyro_{a}", *KINDS["gyro"]) for a in "xyz"]
         poses = [np.hstack(pair) for pair in zip(poses, more, strict=True)]
     return tuple(
-        MemoryRecording(RecordingInfo(f"r{i + 1}", "U", tuple(channels), RATE_HZ, len(raw), 10.0 * i), raw)
+        MemoryRecording(
+            RecordingInfo(f"r{i + 1}", "U", tuple(channels), rate_hz, len(raw), len(raw) / rate_hz * 2.0 * i), raw
+        )
         for i, raw in enumerate(poses)
     )
 

@@ -1,5 +1,6 @@
 """A triad's field calibration, examined: dead channels and impossible scale factors refused, misfit and its cause."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from procedures.analysis.field.positions import field_vectors
 from procedures.analysis.field.suspects import suspected
 from procedures.core.arrays import Array
 from procedures.core.errors import Undetermined, UnfitRecording
+from procedures.core.recording import ACCELEROMETER, GYRO, Recording
 
 
 @dataclass(frozen=True)
@@ -68,3 +70,14 @@ def _misfit(fit: FieldFit, means: StationMeans, noise: Array, known: bool) -> Mi
     slow = 0.0 if known else slow_share(means.slow_excess, noise) * fit.noise_share
     labels = tuple(f"position {i} ({label})" for i, label in enumerate(means.labels, start=1))
     return residual_misfit(fit.residuals, fit.residual_sd, fit.chi_square, fit.degrees_of_freedom, labels, slow)
+
+
+def require_accelerometers(recordings: Sequence[Recording]) -> None:
+    """Refuse recordings of gyros alone, with the way out: `UnfitRecording`."""
+    for recording in recordings:
+        names = {c.name for c in recording.info.channels}
+        if names.isdisjoint(ACCELEROMETER) and names.issuperset(GYRO):
+            raise UnfitRecording(
+                f"recording {recording.info.id} has gyros alone: a field calibration finds the base by accelerometers; "
+                "the method gyro_half_turns needs none"
+            )
