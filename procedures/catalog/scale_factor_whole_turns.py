@@ -241,7 +241,7 @@ def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
 PROCEDURE = Procedure(
     "scale_factor_whole_turns",
     "Gyro scale factor by whole turns",
-    "1.0.0",
+    "1.1.0",
     Params,
     Result,
     resolve,

@@ -8,6 +8,7 @@ a bad fit behind a wide interval. The scatter within the poses does not see the 
 with χ² against the scatter within the poses, ν the spare equations and κ the share of slow noise (`slow_noise`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,7 +89,7 @@ def scalar_misfit(fit: ScalarFit, outputs: Array, labels: tuple[str, ...], slow:
 
 
 def residual_misfit(
-    residuals: Array, expected_sd: Array, chi_square: float, spare: int, labels: tuple[str, ...], slow: float = 0.0
+    residuals: Array, expected_sd: Array, chi_square: float, spare: int, labels: Sequence[str], slow: float = 0.0
 ) -> Misfit:
     """Of residuals (n, 3) channel by channel with their expected standard deviations (n, 3)."""
     ratio = ratio_of(chi_square, spare, slow)

@@ -15,6 +15,7 @@ from procedures.analysis.calibration.reference_temperature import (
     thermal_warnings,
 )
 from procedures.analysis.calibration.scalar import fit_scalar, nominal_start, start_from_data
+from procedures.analysis.calibration.slow_noise import slow_share
 from procedures.analysis.calibration.station_means import StationMeans, station_means
 from procedures.analysis.calibration.station_noise import outputs_covariance
 from procedures.analysis.calibration.summary import (
@@ -72,7 +73,15 @@ def analyse_means(
     reference = reference_magnitude(triad, site)
     scalar = _scalar(means, reference, noise, known, fit) if with_scalar else None
     after = magnitudes(means.outputs, fit.calibration(), reference, means.labels, fit.magnitude_sd)
-    return triad_summary(fit, after, means.labels, scalar), fit
+    return triad_summary(fit, after, means.labels, scalar, _slow(means, noise, fit, known)), fit
+
+
+def _slow(means: StationMeans, noise: Array, fit: TriadFit, known: bool) -> float:
+    """Share of slow noise in what noise and table allow; none of noise that is known."""
+    if known:
+        return 0.0
+    own = float(np.sum(np.diagonal(noise, axis1=1, axis2=2)))
+    return slow_share(means.slow_excess, noise) * own / (own + float(np.sum(fit.of_table**2)))
 
 
 LEAST_SCATTER = 0.5
