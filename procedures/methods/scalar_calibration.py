@@ -125,7 +125,8 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     """Several recordings are one pose each; a single one is searched for still stretches."""
     recordings = evidence.recordings
     poses = _poses_of_one(recordings[0], params, unit) if len(recordings) == 1 else _poses(recordings, params, unit)
-    require_live(params.triad, poses.outputs, poses.output_unit)
+    if len(poses.outputs) >= len(PARAMETERS):  # of fewer poses the rank says more
+        require_live(params.triad, poses.outputs, poses.output_unit)
     reference = _reference(params)
     start = start_from_data(poses.outputs, reference) if poses.output_unit == "count" else nominal_start()
     what = f"the nine scalar {params.triad} parameters"
