@@ -35,6 +35,10 @@ from procedures.core.unit import Unit
 from procedures.procedure import Evidence, Method, Outcome, Parameters
 
 
+LEAST_TO_JUDGE = 6
+"""Poses from which on a channel that none of them changes is dead, or not turned; of fewer the rank says enough."""
+
+
 class Still(Parameters):
     """How poses are found in one long recording."""
 
@@ -125,7 +129,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     """Several recordings are one pose each; a single one is searched for still stretches."""
     recordings = evidence.recordings
     poses = _poses_of_one(recordings[0], params, unit) if len(recordings) == 1 else _poses(recordings, params, unit)
-    if len(poses.outputs) >= len(PARAMETERS):  # of fewer poses the rank says more
+    if len(poses.outputs) >= LEAST_TO_JUDGE:
         require_live(params.triad, poses.outputs, poses.output_unit)
     reference = _reference(params)
     start = start_from_data(poses.outputs, reference) if poses.output_unit == "count" else nominal_start()
