@@ -2,11 +2,11 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := calibration allan noise conditioning whole_turns alignment without_bench thermal misfit
+VALIDATIONS := calibration allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal misfit
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test bench chaos check validate lock clean
+.PHONY: help run test bench chaos format check validate lock clean
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -25,8 +25,11 @@ run: $(VENV)/.ready  ## calibrate and verify the simulated unit, then keep servi
 test: $(VENV)/.ready  ## the whole test suite
 	@$(BIN)/python -m pytest -n 2 --dist worksteal
 
-chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books
-	@$(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both
+chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books; press stop while something is in its way
+	@kept=0; $(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both || kept=1; $(BIN)/python -m tests.chaos.stop_matrix --runs 5 || kept=1; exit $$kept
+
+format: $(VENV)/.ready  ## format the code, put imports in order, mend what ruff can mend safely
+	@$(BIN)/ruff check --fix-only --quiet . ; $(BIN)/ruff format --quiet .
 
 check: $(VENV)/.ready  ## format, lint, types, import contracts
 	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/lint-imports --no-cache && $(BIN)/basedpyright

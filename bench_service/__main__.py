@@ -3,12 +3,16 @@
 import os
 import sys
 
-from bench_service.cli.commands import run_command_line
-from bench_service.settings import BadSettings, Settings
-
 
 def main() -> None:
     """Run the command line and exit with its code."""
+    if sys.argv[1:2] == ["stop"]:  # it loads no more than it needs, and reads no setting that it does not need
+        from bench_service.cli.stopping import stop_command
+
+        sys.exit(stop_command(sys.argv[2:], os.environ))
+    from bench_service.cli.commands import run_command_line
+    from bench_service.settings import BadSettings, Settings
+
     try:
         settings = Settings.from_environ(os.environ)
     except BadSettings as error:

@@ -9,10 +9,11 @@ from fastapi import Depends, FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
-from bench_service.api import audit, benches, health, metrics, procedures, recordings, reservations, results, trends
+from bench_service.api import audit, health, metrics, procedures, recordings, reservations, results, trends
+from bench_service.api.benches import routes as benches
 from bench_service.api.campaigns import routes as campaigns
 from bench_service.api.campaigns import schedules
-from bench_service.api.http import bodies, errors, request_id
+from bench_service.api.http import bodies, door, errors, headers, request_id
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs import routes as jobs
 from bench_service.api.units import routes as units
@@ -21,28 +22,37 @@ from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.live.values import Heartbeat, LiveBoard
 from bench_service.bench.prompts import AskedOperator, Asking
 from bench_service.bench.safety import SafetyService
+from bench_service.bench.stop.elsewhere import StopAddresses
+from bench_service.bench.stop.road import StopRoads
+from bench_service.bench_files import BenchFiles
 from bench_service.campaigns.stores import Stores
 from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
 from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.work_processes import WorkProcesses
 from bench_service.jobs.dispatcher import Dispatcher, JobEngine
 from bench_service.jobs.events.hub import EventHub
 from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.worker import Worker
-from bench_service.pages import campaign_pages, figures
+from bench_service.pages import campaign_pages, docs, figures, images, static_files
 from bench_service.pages import routes as pages
+from bench_service.pages.drawing_process import open_drawing
 from bench_service.persistence import BenchLease, acquire_lease, engine_database, lease_holder, open_stores
 from bench_service.persistence.bench.host_files import HostFiles
+from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.database import as_storage_error
+from bench_service.persistence.evidence.analysis_run import open_run
 from bench_service.service import BenchService
 from bench_service.settings import Settings
 from bench_service.telemetry.code_version import code_version
 from bench_service.telemetry.tracing import traces_to
 
+DRAWINGS = 30
+"""So many figures may be drawn or wait at one time."""
 ROUTERS = (
     procedures,
     jobs,
@@ -60,13 +70,15 @@ ROUTERS = (
 )
 
 
-def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> BenchService:
+def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apart: bool = False) -> BenchService:
     """A service that is ready to begin; `closing` undoes everything in reverse order.
 
     With `drive` it holds the bench's lease and runs jobs; without, it plans, queues, reads and analyses for benches
-    that other processes drive.
+    that other processes drive. With `apart` analyses and drawings are made in processes of their own.
     Raises `BenchBusy`, `StorageFailure`, `NotMounted`.
     """
+    files = BenchFiles(settings)
+    rescued = files.rescue() if drive else None
     threadpool_limits(1)  # our matrices have at most 72 rows: BLAS threads would only spin against the bench's own
     stores, database = open_stores(settings.database_url)
     closing.callback(database.dispose)
@@ -85,19 +97,36 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True) -> 
     if driver is not None:
         lease = acquire_lease(settings.database_url, settings.bench_id)
         closing.callback(lease.release)
-        files = HostFiles(settings.devices_in(), settings.bench_id)
         files.begin_driving()
-        closing.callback(files.end_driving)
+        closing.callback(files.host.end_driving)
         board = LiveBoard(stores.live, settings.bench_id)
         heartbeat = Heartbeat(board, stores.live)
         heartbeat.begin()
         closing.callback(heartbeat.end)
-        runner = InstrumentedRunner(stores, planner, driver, code, lease.held, board, settings.retry_scale, traces)
-        worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease))
+        runner = InstrumentedRunner(
+            stores, planner, driver, code, lease.held, board, settings.retry_scale, traces, files.stopped
+        )
+        worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease, files))
+        guard = files.guard(runner.stop_now, worker.wake)
+        guard.begin()
+        closing.callback(guard.end)
+        closing.callback(files.keep_books(stores).end)
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
-    service = BenchService(stores, driver, planner, worker, code, safety, board, database.free_bytes, traces)
+    addresses = StopAddresses(SqlStopAddresses(database).all, settings.stop_secret_in())
+    addresses.begin()
+    closing.callback(addresses.end)
+    roads = StopRoads(settings.devices_in(), addresses.road, addresses.host)
+    processes = WorkProcesses(open_run, settings.database_url, code) if apart else None
+    if processes is not None:
+        drawing = WorkProcesses(open_drawing, at_once=1, waiting=DRAWINGS)
+        figures.draw_in(drawing)
+        for undo in (processes.close, drawing.close, partial(figures.draw_in, None)):
+            closing.callback(undo)
+    service = BenchService(
+        stores, driver, planner, worker, code, safety, board, database.free_bytes, traces, roads, rescued, processes
+    )
     closing.callback(service.stop)
     service.register()
     return service
@@ -126,13 +155,16 @@ def _engine(settings: Settings, runner: JobRunner) -> JobEngine:
 
 
 def _dispatcher(
-    settings: Settings, stores: Stores, lease: BenchLease, runner: JobRunner, engine: JobEngine
+    settings: Settings, stores: Stores, lease: BenchLease, files: BenchFiles, runner: JobRunner, engine: JobEngine
 ) -> Dispatcher:
-    return Dispatcher(settings.bench_id, stores, runner, engine, lease, settings.poll_s)
+    return Dispatcher(settings.bench_id, stores, runner, engine, lease, settings.poll_s, files.stopped)
 
 
-def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[], None]) -> FastAPI:
-    """The application around a service that is open; `at_end` is called when the server shuts down."""
+def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[], None], rules: door.Door) -> FastAPI:
+    """The application around a service that is open; `at_end` is called when the server shuts down.
+
+    `rules`: which requests are let in.
+    """
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncGenerator[None]:
@@ -149,18 +181,22 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         lifespan=lifespan,
         generate_unique_id_function=lambda route: route.name,
         dependencies=[Depends(bodies.only_plain_json)],
+        docs_url=None,  # the framework's own pages load scripts from another host
+        redoc_url=None,
     )
     app.state.service = service
     app.state.hub = EventHub(service.stores.jobs, service.live, event_stream.FRAMES)
     app.state.max_import_bytes = max_import_bytes
     for module in ROUTERS:
         app.include_router(module.router)
-    app.include_router(pages.router)
-    app.include_router(campaign_pages.router)
+    for page in (static_files, docs, images, pages, campaign_pages):
+        app.include_router(page.router)
     app.add_middleware(bodies.Bounded)
     errors.install(app)
+    app.add_middleware(door.Doorkeeper, door=rules)
     metrics.install(app, service)
     app.add_middleware(audit.Audited, trail=service.stores.audit)
+    app.add_middleware(headers.SecurityHeaders)
     app.add_middleware(request_id.RequestId)
     service.traces.instrument(app)
     _declare_problem(app)

@@ -4,18 +4,22 @@ from collections.abc import Callable, Sequence
 
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import LiveBoard
+from bench_service.bench.make_safe import Rescue
 from bench_service.bench.safety import SafetyService
+from bench_service.bench.stop.road import StopRoads
 from bench_service.campaigns.service import CampaignService
 from bench_service.campaigns.stores import Stores
 from bench_service.evidence.analyses import AnalysisService
 from bench_service.evidence.imports import ImportService
 from bench_service.evidence.units import register
+from bench_service.evidence.work_processes import WorkProcesses
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue_service import QueueService
 from bench_service.jobs.service import JobService
 from bench_service.jobs.stops import StopService
 from bench_service.jobs.worker import Worker
 from bench_service.model.errors import NotDriving, NotReady
+from bench_service.model.records import reasons_of
 from bench_service.telemetry.tracing import Traces
 
 LEAST_FREE_BYTES = 200_000_000
@@ -36,10 +40,15 @@ class BenchService:
         live: LiveBoard | None = None,
         free_bytes: Callable[[], int | None] = lambda: None,
         traces: Traces | None = None,
+        roads: StopRoads | None = None,
+        rescued: Rescue | None = None,
+        processes: WorkProcesses | None = None,
     ) -> None:
         """`driver`: of this process's own bench; None: it plans and queues for benches that workers drive.
 
-        `free_bytes`: room on the database's disk, where that is known.
+        `free_bytes`: room on the database's disk, where that is known. `roads`: how a stop reaches its bench; None:
+        through the database alone. `rescued`: what was made safe before the database was opened. `processes`: where
+        analyses are worked out; None: in the caller's thread.
         """
         self.safety = safety
         self.traces = traces or Traces()
@@ -50,14 +59,16 @@ class BenchService:
         self.code_version = code_version
         self.benches = planner.benches
         self.imports = ImportService(stores)
-        self.analyses = AnalysisService(stores, planner.catalogue, stores.jobs.get, code_version)
+        self.analyses = AnalysisService(stores, planner.catalogue, stores.jobs.get, code_version, processes)
         self.queues = QueueService(stores, planner.benches, self._wake)
         self.jobs = JobService(stores, planner, self.queues, driver, worker, code_version, self._wake)
-        self.stops = StopService(stores, planner.benches, safety, self._wake)
+        self._roads = roads or StopRoads(None)
+        self.stops = StopService(stores, planner.benches, safety, self._wake, self._roads, stores.audit)
         self.campaigns = CampaignService(stores, planner, self.analyses, self.jobs.submit, self.jobs.cancel)
         self._driver = driver
         self._worker = worker
         self._free_bytes = free_bytes
+        self._rescued = rescued
 
     def register(self) -> None:
         """Remember the bench and its units, and forget what crashed imports left."""
@@ -69,7 +80,7 @@ class BenchService:
             register(self.stores.units, unit)
         self.stores.benches.put_bench(self._driver.description, [unit.serial for unit in mounted])
         if self._worker is not None:
-            self.safety.at_start(self._driver.description.id)
+            self.safety.at_start(self._driver.description.id, self._rescued)
 
     def begin(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
         """Begin to work, beside the first answers. The bench's lease must be held.
@@ -109,8 +120,9 @@ class BenchService:
             reasons += self._worker.troubles()
         if reasons:
             raise NotReady(reasons)
-        stops = (self.stores.benches.bench_stop(bench) for bench in self.benches.ids())
-        return tuple(f"bench {stop.bench} is stopped: {stop.reason}" for stop in stops if stop is not None)
+        standing = ((bench, self.stores.benches.standing_stops(bench)) for bench in self.benches.ids())
+        stopped = (f"bench {bench} is stopped: {reasons_of(stops)}" for bench, stops in standing if stops)
+        return (*stopped, *self.catalogue.notes())
 
     def stop(self) -> None:
         """End the service: the running job is left for the next start, the bench made safe."""
@@ -118,6 +130,10 @@ class BenchService:
         if self._worker is not None:
             self._worker.shut_down()
 
-    def _wake(self) -> None:
-        if self._worker is not None:
-            self._worker.wake()
+    def _wake(self, bench_id: str) -> None:
+        """There may be something to do for a bench: for this process's worker, or for one beside it on this host."""
+        if self._driver is not None and self._driver.description.id == bench_id:
+            if self._worker is not None:
+                self._worker.wake()
+        else:
+            self._roads.wake(bench_id)

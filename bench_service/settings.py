@@ -2,14 +2,26 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
-from urllib.parse import urlsplit
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from bench_service.device_folder import BENCH_ID, DATABASE_URL, device_folder
+
+LEAST_TOKEN = 20
+"""Characters of the shortest token that is taken."""
 
 
 class BadSettings(Exception):
     """A setting from the environment is not usable; the message names it."""
+
+
+def _listed(given: object) -> object:
+    """The parts of a list that is written with commas."""
+    return tuple(part for part in map(str.strip, given.split(",")) if part) if isinstance(given, str) else given
+
+
+HostName = Annotated[str, Field(pattern=r"^(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(:[0-9]{1,5})?$")]
 
 
 class Settings(BaseModel):
@@ -17,11 +29,23 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    database_url: str = "sqlite:///.bench/bench.sqlite"
+    database_url: str = DATABASE_URL
     """`sqlite:///file` (embedded, one machine) or `postgresql+psycopg://…`."""
     host: str = "127.0.0.1"
+    """An address other than a loopback one needs `token_file` or `published`."""
+    hosts: Annotated[tuple[HostName, ...], BeforeValidator(_listed)] = ()
+    """Names beside the loopback ones that requests may speak to, separated by commas: those of a proxy, of a container.
+
+    With a port (`bench.example:8443`) only that port."""
+    token_file: Path | None = None
+    """File with the token that programs send from elsewhere than this host, as `Authorization: Bearer …`.
+
+    The service asks for it, and commands with `--server` send it."""
+    published: Literal["loopback"] | None = None
+    """`loopback`: the service's address is reached only through a port published on a loopback address (a container's),
+    or through a proxy there that lets in only people it knows; then every peer counts as one of this host."""
     port: int = Field(8000, ge=0, le=65535)
-    bench_id: str = Field("sim", pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")
+    bench_id: str = Field(BENCH_ID, pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")
     """The one bench that this process drives."""
     unit_truth: Path | None = None
     """Truth file of the simulated unit; None: the one that ships."""
@@ -33,6 +57,12 @@ class Settings(BaseModel):
     """Where a simulated bench's devices keep their state; None: beside an SQLite file, in .bench/ for Postgres.
 
     A folder of the bench's own host, the same for every process of that bench."""
+    stop_listen: str = Field("127.0.0.1:0", pattern=r"^(|\S+:\d{1,5})$")
+    """Where a bench's supervisor takes stops from an API on another host, `host:port`, port 0 for any; empty: nowhere.
+
+    The name is also what the API is told to connect to; over a network it is one that the API's host can resolve."""
+    stop_secret_file: Path | None = None
+    """Secret that supervisors and APIs of a deployment share, 16 bytes or more; None: the device folder's own."""
     device_faults: str | None = None
     """For exercises: faults put into a simulated bench's devices (see `bench_service.drivers.device_faults`)."""
     ask_operator: bool = False
@@ -54,14 +84,28 @@ class Settings(BaseModel):
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported."""
 
+    def stop_secret_in(self) -> Path:
+        """The file of the secret under which a stop goes to another host."""
+        return self.stop_secret_file or self.devices_in() / "bench-stop.secret"
+
+    def token(self) -> str | None:
+        """The token of `token_file`; None where the settings name none. Raises `BadSettings`."""
+        if self.token_file is None:
+            return None
+        try:
+            words = self.token_file.read_text(encoding="utf-8").split()
+        except OSError as error:
+            raise BadSettings(f"BENCH_TOKEN_FILE {self.token_file} cannot be read: {error.strerror}") from error
+        except UnicodeDecodeError as error:
+            raise BadSettings(f"BENCH_TOKEN_FILE {self.token_file} is not UTF-8 text") from error
+        if len(words) != 1 or len(words[0]) < LEAST_TOKEN or not words[0].isascii():
+            text = f"must hold one token of at least {LEAST_TOKEN} letters, digits or signs"
+            raise BadSettings(f"BENCH_TOKEN_FILE {self.token_file} {text}")
+        return words[0]
+
     def devices_in(self) -> Path:
         """The folder of the devices' registers."""
-        if self.device_folder is not None:
-            return self.device_folder
-        address = urlsplit(self.database_url)
-        if address.scheme.startswith("sqlite"):
-            return Path(self.database_url.partition(":///")[2] or "bench.sqlite").parent
-        return Path(".bench") / (address.path.strip("/") or "postgres")
+        return device_folder(self.database_url, self.device_folder)
 
     @classmethod
     def from_environ(cls, environ: Mapping[str, str]) -> "Settings":

@@ -9,7 +9,7 @@ from typing import Literal, TypeVar
 
 from pydantic import Field
 
-from procedures.analysis.launch.analysis import analyse_launch
+from procedures.analysis.launch.analysis import INSPECTION, analyse_launch
 from procedures.analysis.launch.results import LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.summary import ChannelSummary, summarise
@@ -19,6 +19,8 @@ from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording
 from procedures.procedure import Outcome, Parameters
 
+LAUNCH = INSPECTION
+"""How launches are inspected: each by itself, at rest throughout."""
 Part = Literal["gyros", "accelerometers", "all", "none"]
 
 
@@ -97,8 +99,25 @@ def analyse_launches(result: type[R], recordings: Sequence[Recording], params: N
     checks = _checks(channels, params.noise_limits)
     longest = max((s.averaging_time_s for s in channels if s.averaging_time_s is not None), default=None)
     return result(
-        checks=checks, verdict=verdict(checks), launches=launches, channels=channels, averaging_time_s=longest
+        checks=checks,
+        verdict=verdict(checks),
+        warnings=_warnings(launches),
+        launches=launches,
+        channels=channels,
+        averaging_time_s=longest,
     )
+
+
+def _warnings(launches: Sequence[LaunchNoise]) -> tuple[str, ...]:
+    """What the inspection and the noise model say of each channel, each sentence once."""
+    several = len(launches) > 1
+    found: list[str] = []
+    for launch in launches:
+        begin = f"{launch.label}, " if several else ""
+        for channel in launch.channels:
+            found += channel.findings
+            found += (f"{begin}{channel.channel}: {sentence}" for sentence in channel.warnings)
+    return tuple(dict.fromkeys(found))
 
 
 def _checks(channels: Sequence[ChannelSummary], limits: NoiseLimits) -> tuple[Check, ...]:
@@ -129,4 +148,6 @@ def _check(s: ChannelSummary, process: str, maximum: float, unit: str, size: flo
     if found.mean is not None:
         return check(name, found.mean / size, limit, None if found.sd is None else found.sd / size)
     bound = min((r.upper_limit for r in found.values if r.upper_limit is not None), default=float("inf"))
-    return check(name, bound / size, limit, note="not observed: the value is what it stays below")
+    described = all(reading.described for reading in found.values)
+    reason = "not observed" if described else "not described by the noise model"
+    return check(name, bound / size, limit, note=f"{reason}: the value is what it stays below")

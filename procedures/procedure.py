@@ -2,10 +2,12 @@
 
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Self, TypeVar
+from typing import Annotated, Any, Generic, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
+from procedures.analysis.fitness.findings import FitnessSettings
+from procedures.analysis.fitness.watched import Inspection
 from procedures.bench import Bench, BenchDescription
 from procedures.bench.imu import Stream
 from procedures.core.imu_model import TriadCalibration
@@ -26,6 +28,20 @@ class Parameters(BaseModel):
         return self.model_copy(update={name: value for name, value in defaults.items() if getattr(self, name) is None})
 
 
+Second = Annotated[float, Field(ge=0.0, le=1e9)]
+
+
+class RecordedParameters(Parameters):
+    """Base of the parameters of methods that work on recordings: a stretch of them may be asked for."""
+
+    start_s: Second | tuple[Second, ...] | None = Field(
+        None, description="from this second of each recording; a list: one for each"
+    )
+    stop_s: Second | tuple[Second, ...] | None = Field(
+        None, description="up to this second of each recording; a list: one for each"
+    )
+
+
 class Outcome(BaseModel):
     """Base of every result model: JSON-ready numbers, the checks with their verdict, and warnings to the reader."""
 
@@ -34,6 +50,16 @@ class Outcome(BaseModel):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A named number of a result. Limits and trends of campaigns may be about it, as about a check."""
+
+    name: str
+    unit: str
+    estimate: float
+    standard_uncertainty: float
 
 
 P = TypeVar("P", bound=Parameters)
@@ -57,6 +83,12 @@ class PredictedUncertainty:
     standard_uncertainty: float
     from_noise: float
     from_table: float = 0.0
+    quantity: Annotated[str, Field(exclude=True)] = ""
+    """The check or named estimate of the result that this is about, where its name is not `name`; kept out of JSON."""
+
+    def about(self, quantity: str) -> bool:
+        """Whether this is the uncertainty of a quantity of the result."""
+        return quantity == (self.quantity or self.name)
 
 
 @dataclass(frozen=True)
@@ -99,6 +131,20 @@ def _uses_none(_: Any) -> tuple[CorrectionKind, ...]:
     return ()
 
 
+STATIONS = Inspection(
+    FitnessSettings(least_samples=1, counters_may_rest=True, beside_others=True, means_only=True, seeks_scale=True)
+)
+"""Stations at rest of which means are taken: what most procedures record. A station that turns says so itself."""
+
+
+def _stations(_: Any) -> Inspection:
+    return STATIONS
+
+
+def _at_rest(_params: Any, count: int) -> Inspection:
+    return Inspection(FitnessSettings(least_samples=1)) if count == 1 else STATIONS
+
+
 def _nothing_learnt(_: Any, unit: Unit, _origin: str) -> Unit:
     return unit
 
@@ -135,6 +181,8 @@ class Procedure(Generic[P, R]):
     """The unit's record with what a job's result found of it; the text names that result as its origin."""
     quantities: Callable[[P, Context], tuple[str, ...]] | None = None
     """Names of the checks and of the named estimates that a result will have; None: not known before the job."""
+    inspection: Callable[[P], Inspection] = _stations
+    """How its recordings are inspected before anything is judged; see `procedures.inspection`."""
 
 
 @dataclass(frozen=True)
@@ -151,3 +199,5 @@ class Method(Generic[P, R]):
     calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
     corrections: Callable[[R], tuple[UnitCorrection, ...]] = _no_corrections
     """The correction sets that a result gives: at most one of a kind."""
+    inspection: Callable[[P, int], Inspection] = _at_rest
+    """How so many recordings are inspected before anything is judged; see `procedures.inspection`."""

@@ -1,7 +1,9 @@
 """The audit trail: every request that may change something and reached a route, with its outcome."""
 
+import asyncio
 import json
 from datetime import datetime
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
@@ -12,7 +14,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from bench_service.api.http.bodies import is_json
 from bench_service.api.http.dependencies import NO_CONTROL_CHARACTERS, REQUESTED_BY, WHO_LENGTH, After, Limit, Service
 from bench_service.api.http.errors import FieldError, problems, respond
+from bench_service.background import in_background
 from bench_service.formats.plain_json import faults, mended, shown
+from bench_service.mapping import copied
 from bench_service.telemetry.audit import AuditEntry, AuditTrail, record
 from bench_service.telemetry.log_context import request_id
 
@@ -37,7 +41,7 @@ class AuditView(BaseModel):
     @classmethod
     def of(cls, entry: AuditEntry) -> "AuditView":
         said = mended(entry.detail)  # of an older service's entry, a thousand brackets would close the whole trail
-        return cls(**{**vars(entry), "detail": said})
+        return copied(cls, entry, detail=said)
 
 
 class AuditPage(BaseModel):
@@ -58,6 +62,12 @@ def list_audit(
     """Who asked what, newest first."""
     page = service.stores.audit.list(who=who, target=target, after=after, limit=limit)
     return AuditPage(items=[AuditView.of(entry) for entry in page.items], next=page.next)
+
+
+STOP = "stop"
+"""Name of the route that stops a bench."""
+STOP_S = 0.3
+"""How long the answer to a stop waits for its entry; one that comes later is written all the same [s]."""
 
 
 class Audited:
@@ -101,7 +111,12 @@ class Audited:
             return
         act.noted = True
         target = headers.get(b"location", b"").decode() or shown(act.request.scope["path"])
-        await run_in_threadpool(record, self._trail, act.who, route.name, target, str(status), **act.detail())
+        work = partial(record, self._trail, act.who, route.name, target, str(status), **act.detail())
+        if route.name != STOP:
+            await run_in_threadpool(work)
+            return
+        # in a thread of its own, and not waited for for long: a stop is answered while the database is not
+        await asyncio.wait((asyncio.wrap_future(in_background("audit of a stop", work)),), timeout=STOP_S)
 
 
 class _Act:

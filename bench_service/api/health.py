@@ -14,7 +14,9 @@ class Health(BaseModel):
 
     status: str = "ok"
     code_version: str
-    notes: list[str] = Field(default_factory=list[str], description="What a person should know: a stopped bench")
+    notes: list[str] = Field(
+        default_factory=list[str], description="What a person should know: a stopped bench, a broken catalogue file"
+    )
 
 
 @router.get("/healthz", responses=problems())

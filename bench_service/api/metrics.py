@@ -103,15 +103,18 @@ class Snapshot(Collector):
         busy = GaugeMetricFamily("bench_busy", "1 while a job drives the bench", labels=["bench"])
         state = GaugeMetricFamily("bench_state", "1 for the state that the bench is in", labels=["bench", "state"])
         seen = GaugeMetricFamily("bench_driver_seen_seconds", "Since the driver gave a sign", labels=["bench"])
+        stops = GaugeMetricFamily("bench_stops_standing", "Stops that nobody has released", labels=["bench"])
         for bench in benches.benches():
             live = self._service.live.of_bench(bench.id)
-            found = _state(live, benches.bench_stop(bench.id) is not None)
+            standing = len(benches.standing_stops(bench.id))
+            stops.add_metric([bench.id], standing)
+            found = _state(live, standing > 0)
             busy.add_metric([bench.id], live is not None and live.there(at) and live.job is not None)
             for name in BENCH_STATES:
                 state.add_metric([bench.id, name], name == found)
             if live is not None:
                 seen.add_metric([bench.id], live.seen_s(at))
-        yield from (busy, state, seen)
+        yield from (busy, state, seen, stops)
 
 
 def _state(live: BenchLive | None, stopped: bool) -> str:

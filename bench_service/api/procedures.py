@@ -8,6 +8,7 @@ from pydantic import BaseModel, Field
 from bench_service.api.http.dependencies import Service
 from bench_service.api.http.errors import problems
 from bench_service.api.http.fields import NAME, Request
+from bench_service.mapping import copied
 from procedures.core.recording import Station
 from procedures.procedure import Method, Outcome, Parameters, PredictedUncertainty, Procedure
 
@@ -49,10 +50,9 @@ class Preview(BaseModel):
 
 
 def _view(entry: Procedure[Parameters, Outcome] | Method[Parameters, Outcome]) -> ProcedureView:
-    return ProcedureView(
-        name=entry.name,
-        title=entry.title,
-        version=entry.version,
+    return copied(
+        ProcedureView,
+        entry,
         parameters=entry.params.model_json_schema(),
         result=entry.result.model_json_schema(mode="serialization"),
     )
@@ -74,18 +74,15 @@ def read_procedure(name: str, service: Service) -> ProcedureView:
 def preview(name: str, request: PreviewRequest, service: Service) -> Preview:
     """Stations, duration, predicted uncertainties and warnings of a plan; axis limits that it passes as violations."""
     plan = service.planner.plan(name, request.unit, request.parameters, request.bench)
-    return Preview(
+    return copied(
+        Preview,
+        plan,
+        plan.prediction,
         procedure=name,
         unit=request.unit,
         bench=plan.context.bench.id,
         parameters=plan.parameters.model_dump(mode="json"),
-        stations=list(plan.stations),
-        duration_s=plan.prediction.duration_s,
-        data_bytes=plan.data_bytes,
-        predicted_uncertainties=list(plan.prediction.uncertainties),
-        basis=plan.prediction.basis,
-        warnings=list(plan.prediction.warnings),
-        violations=list(plan.violations),
+        predicted_uncertainties=plan.prediction.uncertainties,
     )
 
 

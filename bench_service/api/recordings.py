@@ -15,6 +15,7 @@ from bench_service.formats.description import ImportDescription
 from bench_service.formats.export import ExportFormat, export, extract
 from bench_service.formats.import_file import ImportFile
 from bench_service.formats.plain_json import shown
+from bench_service.mapping import copied
 from bench_service.model.records import RecordingState, StoredRecording
 from procedures.core.errors import BadParameter
 from procedures.core.recording import Channel, Station
@@ -47,28 +48,7 @@ class RecordingView(BaseModel):
 
     @classmethod
     def of(cls, stored: StoredRecording, results: tuple[str, ...] | None = None) -> "RecordingView":
-        info = stored.info
-        return cls(
-            id=info.id,
-            unit=info.unit,
-            job=stored.job_id,
-            bench=stored.bench,
-            station=info.station,
-            state=stored.state,
-            channels=list(info.channels),
-            rate_hz=info.rate_hz,
-            count=info.count,
-            duration_s=info.duration_s,
-            start_s=info.start_s,
-            launched_s=info.launched_s,
-            content_hash=info.content_hash,
-            simulated=info.simulated,
-            stored_bytes=stored.stored_bytes,
-            chunks=stored.chunks,
-            created_at=stored.created_at,
-            source=stored.source,
-            results=None if results is None else list(results),
-        )
+        return copied(cls, stored, stored.info, job=stored.job_id, results=results)
 
 
 class RecordingPage(BaseModel):

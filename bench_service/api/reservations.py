@@ -11,6 +11,7 @@ from bench_service.api.http.errors import made, problems
 from bench_service.api.http.fields import NAME, Request
 from bench_service.jobs.queue_service import LONGEST, ReservationRequest
 from bench_service.jobs.reservation import Reservation, Reserved
+from bench_service.mapping import copied
 from bench_service.wall_clock import now
 
 router = APIRouter(prefix="/api/v1/reservations", tags=["reservations"])
@@ -50,15 +51,11 @@ class ReservationView(BaseModel):
     @classmethod
     def of(cls, kept: Reservation) -> "ReservationView":
         """As HTTP says it."""
-        return cls(
-            id=kept.id,
+        return copied(
+            cls,
+            kept,
             bench=kept.name if kept.kind is Reserved.BENCH else None,
             unit=kept.name if kept.kind is Reserved.UNIT else None,
-            holder=kept.holder,
-            note=kept.note,
-            created_at=kept.created_at,
-            until=kept.until,
-            ended_at=kept.ended_at,
             active=kept.active(now()),
         )
 
@@ -81,7 +78,7 @@ def reserve(
     """Keep a bench or a unit. One that somebody keeps already is refused, with the holder and the end."""
     kind = Reserved.UNIT if body.bench is None else Reserved.BENCH
     name = body.bench or body.unit or ""
-    kept = service.queues.reserve(ReservationRequest(kind, name, body.holder, body.until, body.minutes, body.note), key)
+    kept = service.queues.reserve(copied(ReservationRequest, body, kind=kind, name=name), key)
     response.headers["Location"] = f"/api/v1/reservations/{kept.id}"
     return ReservationView.of(kept)
 

@@ -10,6 +10,7 @@ from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Se
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.fields import NAME, Request
 from bench_service.evidence.analyses import AnalysisRequest
+from bench_service.mapping import copied
 from bench_service.model.records import StoredResult
 from procedures.core.limits import Verdict
 
@@ -54,27 +55,13 @@ class ResultView(BaseModel):
 
     @classmethod
     def of(cls, result: StoredResult) -> "ResultView":
-        return cls(
-            id=result.id,
-            kind=result.kind,
-            name=result.name,
-            version=result.version,
-            unit=result.unit,
-            verdict=result.verdict,
-            created_at=result.created_at,
-            document=result.document,
-            lineage=Lineage(
-                recordings=[{"id": i, "content_hash": h} for i, h in result.recordings],
-                calibrations=list(result.calibrations),
-                corrections=list(result.corrections),
-                parameters=result.parameters,
-                code_version=result.code_version,
-                simulated=result.simulated,
-                seed=result.seed,
-                job=result.job_id,
-            ),
-            page=f"/results/{result.id}",
+        lineage = copied(
+            Lineage,
+            result,
+            recordings=[{"id": i, "content_hash": h} for i, h in result.recordings],
+            job=result.job_id,
         )
+        return copied(cls, result, lineage=lineage, page=f"/results/{result.id}")
 
 
 class ResultPage(BaseModel):
@@ -93,7 +80,8 @@ def run_method(
     body: AnalysisSubmission, service: Service, response: Response, key: IdempotencyKey = None
 ) -> ResultView:
     """Run a method on given recordings or calibrations of one unit."""
-    request = AnalysisRequest(body.method, tuple(body.recordings), tuple(body.calibrations), body.parameters)
+    given = {"recordings": tuple(body.recordings), "calibrations": tuple(body.calibrations)}
+    request = copied(AnalysisRequest, body, **given)
     result = service.analyses.run_method(request, key)
     response.headers["Location"] = f"/api/v1/results/{result.id}"
     return ResultView.of(result)

@@ -1,4 +1,4 @@
-"""PORT of memory: benches by name, the units that each can test, and the software stop of each.
+"""PORT of memory: benches by name, the units that each can test, and the software stops of each.
 
 Every method is one transaction: it commits, or it raises and nothing of it remains.
 """
@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Protocol
 
-from bench_service.model.records import BenchStop
+from bench_service.model.records import BenchStop, Page
 from procedures.bench import BenchDescription
 
 
 class BenchRegistry(Protocol):
-    """Benches that workers have registered, and the stops that stand."""
+    """Benches that workers have registered, and their stops. A bench works only while none of its stops stands."""
 
     def put_bench(self, bench: BenchDescription, mounted: Sequence[str] = ()) -> None:
         """Register a bench with the serials of the units that it can test."""
@@ -29,17 +29,33 @@ class BenchRegistry(Protocol):
     def benches(self) -> tuple[BenchDescription, ...]: ...
 
     def stop_bench(self, stop: BenchStop) -> None:
-        """Note that a bench was stopped; it stays so until it is released. A second stop changes nothing."""
+        """Note a stop beside those that stand. Repeated with the same id it changes nothing."""
+        ...
+
+    def stop_bench_once(self, stop: BenchStop) -> None:
+        """Note a stop by the service itself, unless one for the same reason stands: a retry adds none."""
         ...
 
     def confirm_safe(self, bench_id: str, at: datetime, by: str) -> None:
-        """Note that a stopped bench was seen safe; only the first time counts, and only while the stop stands."""
+        """Note that a stopped bench was seen safe, in every stop that stands and has no such note yet."""
         ...
 
-    def release_bench(self, bench_id: str) -> None:
-        """Let the bench work again; one that is not stopped stays as it is."""
+    def release_stop(self, bench_id: str, stop_id: str, at: datetime, by: str, remark: str) -> BenchStop:
+        """Release one stop; the bench works again once none stands. The same release repeated changes nothing.
+
+        Raises `NotFound`, and `IllegalTransition` where it was released before by another person or with another
+        remark.
+        """
+        ...
+
+    def standing_stops(self, bench_id: str) -> tuple[BenchStop, ...]:
+        """The stops that keep a bench from working, oldest first; empty where it may work."""
         ...
 
     def bench_stop(self, bench_id: str) -> BenchStop | None:
-        """Why the bench stands still, if a person stopped it."""
+        """The oldest stop that stands; None where the bench may work."""
+        ...
+
+    def stops(self, bench_id: str, *, after: str | None = None, limit: int = 50) -> Page[BenchStop]:
+        """Stops of a bench, newest first: those that stand and those that were released."""
         ...

@@ -7,12 +7,12 @@ from datetime import datetime
 from typing import Any
 
 from bench_service.bench.devices import BenchDevices, DeviceState
+from bench_service.bench.make_safe import Rescue, over_new_link
 from bench_service.bench.processes import ProcessIdentity, Watch
 from bench_service.bench.registry import BenchRegistry
 from bench_service.model.errors import NotFound, NotSafe
 from bench_service.model.records import BenchStop
 from bench_service.wall_clock import monotonic_s, now, pause
-from procedures.bench.errors import BenchError, DeviceBusy
 
 STOPPING_S = 1.0
 """How long the answer to a stop waits for the devices to be safe [s, real time]."""
@@ -63,20 +63,30 @@ class SafetyService:
         worker = driving.process if driving is not None and driving.alive else None
         supervisor = watch.supervisor()
         if state is None:
-            safe, explanation = _elsewhere(bench_id, self._benches.bench_stop(bench_id))
+            safe, explanation = _elsewhere(bench_id, self._benches.standing_stops(bench_id))
         else:
             safe, explanation = state.safe, _here(bench_id, state, worker, supervisor)
         return Safety(safe, explanation, state, worker, supervisor)
 
-    def stopping(self, bench_id: str) -> Safety:
-        """What is known shortly after a stop was noted. Where nobody else can, the devices are made safe here."""
+    def stopping(self, bench_id: str, patient: bool = True) -> Safety:
+        """What is known of a bench on this host shortly after its stop was asked for; needs no database.
+
+        Where nobody else can, the devices are made safe here. Not `patient`: what is known now.
+        """
         found = self.known(bench_id)
         if found.safe is False and found.worker is None and found.supervisor is None:
             alone = found.explanation
-            failure = self._try(bench_id)
+            obstacle = over_new_link(self._devices(bench_id), self._by)
             found = self.known(bench_id)
-            done = "This service made it safe itself." if failure is None else f"This service tried itself: {failure}."
+            done = f"This service tried itself: {obstacle}." if obstacle else "This service made it safe itself."
             return Safety(found.safe, f"{alone} {done}", found.devices, found.worker, found.supervisor)
+        return self._within(bench_id, found) if patient else found
+
+    def stopping_elsewhere(self, bench_id: str) -> Safety:
+        """What the books know of another host's bench shortly after its stop was entered. Raises `StorageFailure`."""
+        return self._within(bench_id, self.known(bench_id))
+
+    def _within(self, bench_id: str, found: Safety) -> Safety:
         deadline = monotonic_s() + STOPPING_S
         while found.safe is not True and monotonic_s() < deadline:
             pause(LOOK_S)
@@ -86,53 +96,44 @@ class SafetyService:
     def require(self, bench_id: str) -> None:
         """Raises `NotSafe` with the reason where the devices are not known to be safe, after trying to make them so."""
         found = self.known(bench_id)
-        failure = self._try(bench_id) if found.safe is False else None
-        if failure is not None:
-            raise NotSafe(f"bench {bench_id!r} is not released: {failure}")
+        obstacle = over_new_link(self._devices(bench_id), self._by) if found.safe is False else None
+        if obstacle is not None:
+            raise NotSafe(f"bench {bench_id!r} is not released: {obstacle}")
         if found.safe is None:
             raise NotSafe(f"bench {bench_id!r} is not released: {found.explanation}")
 
-    def at_start(self, bench_id: str) -> None:
-        """What a dead process left is made safe before anything else is done; the bench's lease must be held.
+    def at_start(self, bench_id: str, rescued: Rescue | None = None) -> None:
+        """Make safe whatever a dead process left, before anything else is done; the bench's lease must be held.
 
         Where that fails the bench is stopped: the service answers, but nothing moves until a person has looked.
+        `rescued`: what was found and done before the database was opened.
         """
-        state = self._devices(bench_id).device_state()
+        devices = self._devices(bench_id)
+        state = devices.device_state()
         if state is None:  # the first start on this host: from now on the devices are known here
-            failure = self._try(bench_id)
-            if failure is not None:
-                log.warning("bench %s: %s", bench_id, failure)
+            obstacle = over_new_link(devices, self._by)
+            if obstacle is not None:
+                log.warning("bench %s: %s", bench_id, obstacle)
             return
-        if state.safe:
+        if state.safe and rescued is None:
             return
         deadline = monotonic_s() + START_S
-        failure = self._try(bench_id)
-        while failure is not None and monotonic_s() < deadline:
+        obstacle = over_new_link(devices, self._by)
+        while obstacle is not None and monotonic_s() < deadline:
             pause(LOOK_S * 5)
-            failure = self._try(bench_id)
-        text = f"when the service started, {' and '.join(state.unsafe)}: "
-        if failure is None:
-            self._note(state.job, text + "made safe first")
+            obstacle = over_new_link(devices, self._by)
+        left = state if rescued is None else rescued.left
+        text = f"when the service started, {' and '.join(left.unsafe)}: "
+        if obstacle is None:
+            self._note(left.job, text + "made safe first")
         else:
-            self.stop_unsafe(bench_id, failure)
-            self._note(state.job, text + failure)
+            self.stop_unsafe(bench_id, str(obstacle))
+            self._note(left.job, text + str(obstacle))
 
     def stop_unsafe(self, bench_id: str, why: str) -> None:
         """Nothing may run on a bench that could not be made safe, until a person releases it."""
         log.error("bench %s: %s", bench_id, why)
-        self._benches.stop_bench(BenchStop(bench_id, now(), why))
-
-    def _try(self, bench_id: str) -> str | None:
-        """Make the devices safe over their own link; why not, in a sentence."""
-        try:
-            self._devices(bench_id).make_safe(self._by)
-        except DeviceBusy as busy:
-            return str(busy)
-        except BenchError as error:
-            return f"could not be made safe: {error}"
-        except ExceptionGroup as group:
-            return f"could not be made safe: {'; '.join(map(str, group.exceptions))}"
-        return None
+        self._benches.stop_bench_once(BenchStop(bench_id, now(), why, by=self._by))
 
     def _note(self, job: str | None, text: str) -> None:
         log.warning("%s", text)
@@ -159,9 +160,11 @@ def _here(bench_id: str, state: DeviceState, worker: ProcessIdentity | None, sup
     )
 
 
-def _elsewhere(bench_id: str, stop: BenchStop | None) -> tuple[bool | None, str]:
-    if stop is not None and stop.safe_at is not None:
-        return True, f"Seen safe on the bench's host at {stop.safe_at.isoformat()}, last commanded by {stop.safe_by}."
+def _elsewhere(bench_id: str, stops: tuple[BenchStop, ...]) -> tuple[bool | None, str]:
+    """Known safe where that was seen after the last stop: a bench that works in between may be anything."""
+    if stops and all(stop.safe_at is not None for stop in stops):
+        stop, seen = stops[-1], max(stop.safe_at for stop in stops if stop.safe_at is not None)
+        return True, f"Seen safe on the bench's host at {seen.isoformat()}, last commanded by {stop.safe_by}."
     return None, (
         f"The devices of bench {bench_id!r} are not on this host, and nobody on theirs has said that they are safe: "
         "whether a worker or a supervisor is alive there is not known here."

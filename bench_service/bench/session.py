@@ -4,7 +4,7 @@ import asyncio
 import logging
 import threading
 from collections.abc import AsyncIterator, Callable
-from concurrent.futures import Future
+from concurrent.futures import CancelledError, Future
 from contextlib import aclosing
 from typing import Any, TypeVar
 
@@ -12,6 +12,7 @@ from bench_service.background import NonBlockingQuery
 from bench_service.bench.live.tap import LiveTap
 from bench_service.bench.live.values import PUBLISH_S
 from bench_service.bench.observed import ObservedBench
+from bench_service.bench.streams import require_end, stream_of
 from bench_service.bench.watchdog import Patience, Watchdog
 from bench_service.evidence.recordings import RecordingStore
 from bench_service.model.errors import StorageFailure
@@ -19,7 +20,7 @@ from bench_service.model.job import Job
 from bench_service.model.records import NewRecording
 from bench_service.wall_clock import monotonic_s
 from procedures.bench import Bench
-from procedures.bench.errors import BenchError, Disconnected, Stopped
+from procedures.bench.errors import Disconnected, Stopped
 from procedures.bench.imu import Stream
 from procedures.core.recording import RecordingInfo, Station
 from procedures.procedure import Outcome, Parameters, Procedure
@@ -29,8 +30,9 @@ log = logging.getLogger(__name__)
 
 PATIENCE = Patience()
 """For how long a device may say nothing."""
-UNWIND_S = 2.0
+UNWIND_S = 1.0
 """How long a procedure may take to leave a verb that was cancelled [s, real time]."""
+STOPPED = "stopped by an operator"
 STOP_CHECK_S = 0.2
 """How long a move, a settle or a recording may go on before a stop that was asked for is seen [s, real time]."""
 HANGS_S = 10.0
@@ -69,6 +71,13 @@ class BenchSession:
         self._streams: AsyncIterator[Stream] | None = None
         self._next = -1
         self._shutting_down = threading.Event()
+        self._stopped = threading.Event()
+        self._under_way: Future[Any] | None = None
+        """What the procedure is asked for now."""
+        self._safety = threading.Lock()
+        """Held by who makes the bench safe, or ends the session: the job's own thread, or who stops it."""
+        self._is_safe = False
+        self._closed = False
         self._lost: str | None = None
         """Why the thread that drives the bench does not come back, if it does not."""
         self._loop = asyncio.new_event_loop()
@@ -79,11 +88,31 @@ class BenchSession:
         self._told: asyncio.Task[None] | None = None
 
     def record(self, index: int) -> RecordingInfo:
-        """Record one station and store it. Raises `BenchError`, `StorageFull`, `StorageFailure`, `ShuttingDown`.
+        """Record one station and store it. Raises `BenchError`, `ProcedureDefect`, `StorageFull`,
+        `StorageFailure`, `ShuttingDown`.
 
         A device that does not answer is `Disconnected`, whatever its driver does about it.
         """
-        return self._wait(asyncio.run_coroutine_threadsafe(self._record(index), self._loop))
+        if self._stopped.is_set():
+            raise Stopped(STOPPED)
+        self._under_way = asyncio.run_coroutine_threadsafe(self._record(index), self._loop)
+        try:
+            return self._wait(self._under_way)
+        except CancelledError:  # by `stop`
+            raise Stopped(STOPPED) from None
+        finally:
+            self._under_way = None
+
+    def stop(self) -> None:
+        """Leave whatever is under way, with `Stopped` for who waits for it; nothing more is recorded. From any thread.
+
+        It waits for nothing but the procedure's leaving, for `UNWIND_S`: neither for a database nor for the job's own
+        thread, which may hang in one.
+        """
+        self._stopped.set()
+        under_way = self._under_way
+        if under_way is not None:
+            self._cancel(under_way, "a stop came while a device or the database did not answer")
 
     def shut_down(self) -> None:
         """Ask whoever waits in `record` to leave with `ShuttingDown`; called from another thread."""
@@ -91,17 +120,27 @@ class BenchSession:
 
     def make_safe(self) -> None:
         """Close the procedure, then stop the table and switch the unit off. Raises an `ExceptionGroup` of failures,
-        and `Disconnected` where a device does not answer.
+        and `Disconnected` where a device does not answer. Once it is safe a second time does nothing.
         """
-        if self._lost is not None:
-            raise Disconnected(self._lost)
-        self._wait(asyncio.run_coroutine_threadsafe(self._make_safe(), self._loop), stoppable=False)
+        with self._safety:
+            if self._is_safe or self._closed:
+                return
+            if self._lost is not None:
+                raise Disconnected(self._lost)
+            self._wait(asyncio.run_coroutine_threadsafe(self._make_safe(), self._loop), stoppable=False)
+            self._is_safe = True
 
     def close(self) -> None:
         """End the thread, and give the devices' links back: whatever is still asked of them after is refused.
 
-        A thread that does not come back is left alone; it holds nothing that anybody needs.
+        A thread that does not come back is left alone; it holds nothing that anybody needs. A second time does nothing.
         """
+        with self._safety:
+            if not self._closed:
+                self._closed = True
+                self._close()
+
+    def _close(self) -> None:
         if self._tap is not None and self._lost is None:
             asyncio.run_coroutine_threadsafe(self._stop_telling(self._tap), self._loop).result()
         self._bench.close()
@@ -135,6 +174,9 @@ class BenchSession:
             if silence is not None:
                 self._cancel(future, silence)
                 raise Disconnected(silence)
+            if stoppable and self._stopped.is_set():
+                self._cancel(future, "a stop came while a device or the database did not answer")
+                raise Stopped(STOPPED)
             if stoppable and self._shutting_down.is_set():
                 self._cancel(future, "the service ended while a device did not answer")
                 raise ShuttingDown
@@ -146,7 +188,7 @@ class BenchSession:
         wanted = self._stop_wanted.ask(ANSWER_S)
         if wanted:
             self._cancel(future, "a stop came while a device did not answer")
-            raise Stopped("stopped by an operator")
+            raise Stopped(STOPPED)
         self._unanswered_s = 0.0 if wanted is not None else self._unanswered_s + passed_s
         if self._unanswered_s > HANGS_S:
             why = f"the database has not answered for {HANGS_S:g} s"
@@ -175,11 +217,11 @@ class BenchSession:
         if self._streams is None or self._next != index:
             await self._close_streams()
             self._streams = self._procedure.acquire(self._bench, self.job.stations[index:])
-        stream = await anext(self._streams)
-        if stream.station != station:
-            raise BenchError(f"procedure {self._procedure.name} gave {stream.station} where station {station} was due")
+        stream = await stream_of(self._streams, self._procedure.name, station)
         info = await self._store(stream, station)
         self._next = index + 1
+        if self._next == len(self.job.stations):
+            await require_end(self._streams, self._procedure.name, self.job.stations)
         return info
 
     async def _store(self, stream: Stream, station: Station) -> RecordingInfo:

@@ -1,28 +1,36 @@
 """The supervisor of a bench: a process that outlives the worker, and makes the bench safe where the worker cannot.
 
-It looks at three things: which process drives the bench and whether it lives, what the devices last said of themselves,
-and whether a person has stopped the bench. It starts nothing again. While the process that drives the bench lives, it
-ends one that does not answer a stop, and commands the devices only of a stopped bench whose link was given back.
+It looks at four things: which process drives the bench and whether it lives, what the devices last said of themselves,
+whether somebody has stopped the bench, and whether the driving process gives its heartbeat. It starts nothing again.
+While the process that drives the bench lives, it ends one that does not answer a stop, or gives no heartbeat while the
+bench is not safe, and commands the devices only of a stopped bench whose link was given back.
+
+All that it needs to act are files of its host; a database that does not answer is told later.
 """
 
 import logging
+import select
+import socket
 from collections.abc import Callable
 from threading import Event, Lock, Thread
-from typing import Protocol
 
 from bench_service.background import NonBlockingQuery
 from bench_service.bench.devices import BenchDevices, DeviceState
+from bench_service.bench.heartbeat import SILENT_S, HeartbeatFile
+from bench_service.bench.make_safe import over_new_link
 from bench_service.bench.processes import Driving, ProcessIdentity, Watch
+from bench_service.bench.stop.channel import SUPERVISOR, StopChannel
+from bench_service.bench.stop.exchange import StopExchange
+from bench_service.bench.stop.word import StopAnswer
+from bench_service.bench.supervisor_ports import Lease, Listener, SafetyBooks
+from bench_service.bench.worker_patience import HUNG_S, UNANSWERED_S, WorkerPatience
 from bench_service.model.errors import BenchBusy, ServiceError
 from bench_service.wall_clock import monotonic_s
-from procedures.bench.errors import BenchError, DeviceBusy
 
 LOOK_S = 0.1
 """How often the bench is looked at [s]: a worker's death is noticed within this."""
 STOP_LOOK_S = 0.5
 """How often the database is asked whether the bench is stopped [s]."""
-HUNG_S = 10.0
-"""How long a worker may leave a stop unanswered before it is killed [s]."""
 ANSWER_S = 0.1
 """How long a look waits for the database's answer [s]; one that comes later is seen by a later look."""
 LEASE_S = 0.8
@@ -35,32 +43,6 @@ LINGER_S = 60.0
 log = logging.getLogger(__name__)
 
 
-class Lease(Protocol):
-    """The right to drive a bench."""
-
-    def release(self) -> None: ...
-
-
-class SafetyBooks(Protocol):
-    """What the supervisor reads and writes in the database. Every verb raises `ServiceError` if it does not answer."""
-
-    def stopped(self) -> bool:
-        """Whether the bench is stopped."""
-        ...
-
-    def confirm_safe(self, by: str) -> None:
-        """A stopped bench is safe."""
-        ...
-
-    def stop(self, reason: str) -> None:
-        """Stop the bench until a person releases it."""
-        ...
-
-    def note(self, by: str, text: str, job: str | None) -> None:
-        """Say what was done: in the trail, and to the job that it concerns."""
-        ...
-
-
 class Supervisor:
     """Watches one bench until it is told to end, or nothing is left to watch."""
 
@@ -71,37 +53,62 @@ class Supervisor:
         watch: Watch,
         books: SafetyBooks,
         take_lease: Callable[[], Lease],
+        channel: StopChannel,
+        heartbeat: HeartbeatFile,
+        listener: Listener | None = None,
         hung_s: float = HUNG_S,
         linger_s: float = LINGER_S,
+        unanswered_s: float = UNANSWERED_S,
+        silent_s: float = SILENT_S,
     ) -> None:
         self._bench_id = bench_id
         self._devices = devices
         self._watch = watch
         self._books = books
         self._take_lease = take_lease
-        self._hung_s = hung_s
+        self._channel = channel
+        self._listener = listener
+        self._exchange = StopExchange(channel, books)
+        self._patience = WorkerPatience(channel, heartbeat, unanswered_s, hung_s, silent_s)
         self._linger_s = linger_s
         self._by = f"the supervisor, {ProcessIdentity.own()}"
         self._asked_books = NonBlockingQuery("books", self._ask_books)
         self._unsaid: list[tuple[str, str | None]] = []
         self._unsaid_stop: str | None = None
         self._stopped = False
-        self._confirmed = False
+        """By the channel, or as the books said last."""
         self._told_not_safe = False
         self._next_stop_look_s = 0.0
         self._next_try_s = 0.0
         self._first_try_s: float | None = None
         """Of devices that could not be made safe so far."""
-        self._unanswered_since_s: float | None = None
         self._left_since_s: float | None = None
         self._gone_since_s: float | None = None
         self._looked_s = monotonic_s()
 
     def run(self, ending: Event, companion: bool) -> None:
         """Watch until `ending` is set; a `companion` also ends with the process that it accompanies."""
-        while not ending.wait(LOOK_S):
-            if not self.look(companion):
-                return
+        listening = self._channel.listen(SUPERVISOR)
+        try:
+            while not ending.is_set() and self._look_once(listening, ending, companion):
+                pass
+        finally:
+            if listening is not None:
+                listening.close()
+            self._channel.close()
+
+    def _look_once(self, listening: socket.socket | None, ending: Event, companion: bool) -> bool:
+        """Wait for a word or for `LOOK_S`, then look; whether there is something left to watch."""
+        if listening is None:
+            ending.wait(LOOK_S)
+        elif select.select((listening,), (), (), LOOK_S)[0]:
+            self._channel.receive(listening)
+        try:
+            return ending.is_set() or self.look(companion)
+        except Exception:  # a supervisor that ended would leave the bench alone
+            log.exception("the supervisor of bench %s", self._bench_id)
+            ending.wait(LOOK_S)
+            return True
 
     def look(self, companion: bool = False) -> bool:
         """Look once, and do what must be done; False once a companion has nothing left to watch."""
@@ -111,12 +118,15 @@ class Supervisor:
         if state is not None and state.safe:  # whoever made it so
             self._told_not_safe, self._first_try_s = False, None
         self._look_for_stop(now_s)
-        if alive:
+        words = self._answer_stop(state)
+        self._stopped = bool(words) or self._exchange.stopped
+        if driving is not None and driving.alive:
             self._gone_since_s = None
-            self._look_for_hang(now_s, driving, state)
+            self._end_hung(now_s, driving, state, words)
             self._look_for_left(now_s, state)
         else:
-            self._unanswered_since_s = self._left_since_s = None
+            self._patience.reset(now_s)
+            self._left_since_s = None
             self._gone_since_s = now_s if self._gone_since_s is None else self._gone_since_s
             if state is not None and not state.safe and now_s >= self._next_try_s:
                 self._rescue(now_s, driving, state)
@@ -144,31 +154,37 @@ class Supervisor:
 
     def _ask_books(self) -> None:
         """In a thread of its own: all that goes to the database."""
-        self._stopped = self._books.stopped()
+        self._exchange.exchange()
+        if self._listener is not None and (at := self._listener.listening()) is not None:
+            self._books.say_listening(at)
         state = self._devices.device_state()
-        if not self._stopped:
-            self._confirmed = False
-        elif not self._confirmed and state is not None and state.safe:
+        if self._exchange.stopped and state is not None and state.safe:
             self._books.confirm_safe(state.by)
-            self._confirmed = True
         if self._unsaid_stop is not None:
-            self._books.stop(self._unsaid_stop)
+            self._books.stop(self._unsaid_stop, self._by)
             self._unsaid_stop = None
         while self._unsaid:
             self._books.note(self._by, *self._unsaid[0])
             self._unsaid.pop(0)
 
-    def _look_for_hang(self, now_s: float, driving: Driving | None, state: DeviceState | None) -> None:
-        """A worker that lives, is told to stop, has the devices' link and leaves them unsafe, does not answer."""
-        if not self._stopped or state is None or state.safe or not state.linked:
-            self._unanswered_since_s = None
+    def _answer_stop(self, state: DeviceState | None) -> frozenset[str]:
+        """Say in the channel what became of its words; their ids."""
+        ids = frozenset(word.id for word in self._channel.standing())
+        if ids:
+            safe = self._channel.answered(SUPERVISOR).safe & ids
+            is_safe = state is not None and state.safe
+            self._channel.answer(SUPERVISOR, StopAnswer(self._by, ids, ids if is_safe else safe))
+        return ids
+
+    def _end_hung(self, now_s: float, driving: Driving, state: DeviceState | None, words: frozenset[str]) -> None:
+        """Kill a worker that has the devices' link, leaves them unsafe, and does not answer, beat or get on."""
+        if state is None or state.safe or not state.linked:
+            self._patience.reset(now_s)
             return
-        if self._unanswered_since_s is None:
-            self._unanswered_since_s = now_s
-        elif now_s - self._unanswered_since_s > self._hung_s and driving is not None and driving.process.kill():
-            unsafe = ", ".join(state.unsafe)
-            self._say(f"{driving.process} left a stop unanswered for {self._hung_s:g} s ({unsafe}): killed", state.job)
-            self._unanswered_since_s = None
+        why = self._patience.over(now_s, driving.process, words, self._stopped)
+        if why is not None and driving.process.kill():
+            self._say(f"{driving.process} {why} ({', '.join(state.unsafe)}): killed", state.job)
+            self._patience.reset(now_s)
 
     def _look_for_left(self, now_s: float, state: DeviceState | None) -> None:
         """A worker that lives and has given the link of devices back that could not be made safe does nothing more."""
@@ -193,31 +209,29 @@ class Supervisor:
 
     def _try(self, now_s: float, why: str, state: DeviceState) -> None:
         """Make the devices safe over their own link, and say so; where that fails, try again later."""
-        try:
-            self._devices.make_safe(self._by)
-        except DeviceBusy as busy:
-            log.warning("bench %s: %s", self._bench_id, busy)
+        obstacle = over_new_link(self._devices, self._by)
+        if obstacle is not None:
             self._next_try_s = now_s + AGAIN_S
-        except (BenchError, ExceptionGroup) as failure:
-            self._next_try_s = now_s + AGAIN_S
+            if obstacle.busy:
+                log.warning("bench %s: %s", self._bench_id, obstacle)
+                return
             self._first_try_s = now_s if self._first_try_s is None else self._first_try_s
-            self._not_safe(failure, state)
+            self._not_safe(str(obstacle), state)
+            return
+        safe_s, unsafe = monotonic_s(), " and ".join(state.unsafe)
+        if self._first_try_s is not None:
+            how = f"at last, {safe_s - self._first_try_s:.3f} s after its first try"
         else:
-            safe_s, unsafe = monotonic_s(), " and ".join(state.unsafe)
-            if self._first_try_s is not None:
-                how = f"at last, {safe_s - self._first_try_s:.3f} s after its first try"
-            else:
-                how = f"{safe_s - now_s:.3f} s after it noticed"
-                how += "" if self._left_since_s else f", at most {safe_s - self._looked_s:.3f} s after that end"
-            self._say(f"{why}, and {unsafe}: made safe by the supervisor {how}", state.job)
-            self._told_not_safe, self._first_try_s = False, None
+            how = f"{safe_s - now_s:.3f} s after it noticed"
+            how += "" if self._left_since_s else f", at most {safe_s - self._looked_s:.3f} s after that end"
+        self._say(f"{why}, and {unsafe}: made safe by the supervisor {how}", state.job)
+        self._told_not_safe, self._first_try_s = False, None
 
-    def _not_safe(self, failure: Exception, state: DeviceState) -> None:
+    def _not_safe(self, why: str, state: DeviceState) -> None:
         """Nothing else may run on it until a person has looked. Said once, tried again and again."""
         if self._told_not_safe:
             return
-        reasons = "; ".join(map(str, failure.exceptions)) if isinstance(failure, ExceptionGroup) else str(failure)
-        self._unsaid_stop = f"could not be made safe: {reasons}"
+        self._unsaid_stop = why
         self._say(self._unsaid_stop, state.job)
         self._told_not_safe = True
 

@@ -7,7 +7,7 @@ beside the looking, under such a key too.
 """
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from threading import Event, Thread
 
 from bench_service.background import BackgroundTasks
@@ -22,12 +22,13 @@ from bench_service.model.errors import (
     BenchBusy,
     IllegalTransition,
     NotDriving,
+    Overloaded,
     ServiceError,
     StorageFailure,
     StorageFull,
 )
 from bench_service.model.job import FINAL, Job, JobState
-from bench_service.model.records import StoredResult
+from bench_service.model.records import BenchStop, StoredResult, reasons_of
 from bench_service.model.request import CAMPAIGN_RUN, JobRequest
 from bench_service.telemetry.log_context import about
 from bench_service.wall_clock import now
@@ -147,7 +148,7 @@ class Conductor:
             if step.job_id is None:
                 return transitions.submitted(run, index, self._submitted(run, index).id)
             return self._followed(run, index, late)
-        except (StorageFull, StorageFailure):  # nothing can be noted: the next look tries again
+        except (StorageFull, StorageFailure, Overloaded):  # nothing can be noted now: the next look tries again
             raise
         except (NotDriving, BenchBusy) as error:  # not the step's fault
             return transitions.waiting(run, str(error))
@@ -169,9 +170,9 @@ class Conductor:
     def _attempt(self, run: CampaignRun, index: int, late: bool) -> CampaignRun | None:
         if late:
             return transitions.out_of_time(run, now())
-        stop = self._stores.benches.bench_stop(run.bench)
-        if stop is not None and run.step_of(index).method is None:
-            return transitions.waiting(run, _stopped(run.bench, stop.reason))
+        stops = self._stores.benches.standing_stops(run.bench)
+        if stops and run.step_of(index).method is None:
+            return transitions.waiting(run, _stopped(run.bench, stops))
         return transitions.attempted(run, index, now())
 
     def _submitted(self, run: CampaignRun, index: int) -> Job:
@@ -201,9 +202,9 @@ class Conductor:
         if job.state in (JobState.FAILED, JobState.CANCELLED, JobState.INTERRUPTED):
             return self._broken(run, index, job)
         why = ""
-        stop = self._stores.benches.bench_stop(run.bench) if job.state is JobState.QUEUED else None
-        if stop is not None:
-            why = _stopped(run.bench, stop.reason)
+        stops = self._stores.benches.standing_stops(run.bench) if job.state is JobState.QUEUED else ()
+        if stops:
+            why = _stopped(run.bench, stops)
         elif job.state is JobState.PAUSED:
             why = f"job {job.id} is paused: resume or cancel it"
         return transitions.observed(run, index, StepState(job.state.value), why)
@@ -227,9 +228,7 @@ class Conductor:
             return transitions.out_of_time(run, at)
         why = "" if job.failure is None else f"{job.failure.kind}: {job.failure.message}"
         if job.state is JobState.CANCELLED:
-            stopped = (
-                self._stores.benches.bench_stop(run.bench) is not None
-            )  # then the job may go on once it is released
+            stopped = self._stores.benches.bench_stop(run.bench) is not None  # it may go on once that is released
             said = f"job {job.id} was cancelled" + (" when the bench was stopped" if stopped else "")
             return transitions.failed(run, index, StepState.CANCELLED, said, at, final=not stopped)
         kind = f"job {job.id} {job.state.value}: "
@@ -290,5 +289,5 @@ def key_of(run: CampaignRun, index: int) -> str:
     return f"campaign:{run.id}:{index}:{run.steps[index].attempt}"
 
 
-def _stopped(bench: str, reason: str) -> str:
-    return f"bench {bench} is stopped until somebody releases it: {reason}"
+def _stopped(bench: str, stops: Sequence[BenchStop]) -> str:
+    return f"bench {bench} is stopped until somebody releases it: {reasons_of(stops)}"

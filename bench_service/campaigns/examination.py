@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from bench_service.campaigns.campaign import Campaign, Step, StepLimit
-from bench_service.jobs.planning import Plan, Planner
+from bench_service.jobs.planning import Plan, Planner, stations_of
 from bench_service.model.errors import NotFound
 from procedures.core.errors import BadParameter, DomainError
 from procedures.core.units import HOUR, converted
@@ -144,7 +144,7 @@ class Examiner:
             raise BadParameter(where, step.does, str(error)) from error
         procedure, context = self._catalogue.procedure(step.does), self._planner.context(unit, bench)
         params = procedure.resolve(procedure.params.model_validate(step.parameters), context)
-        stations = procedure.schedule(params)
+        stations = stations_of(procedure, params)
         _require_known(step, where, None if procedure.quantities is None else procedure.quantities(params, context))
         duration_s = sum(s.power_off_s + s.settle_s + s.record_s for s in stations)
         warning = "not predicted: the calibration that it uses is not there yet"
@@ -214,7 +214,7 @@ def _require_calibrations(step: Step, where: str, progress: _Progress) -> None:
 
 def _unresolved(limit: StepLimit, where: str, predicted: tuple[PredictedUncertainty, ...]) -> list[str]:
     """Warn of a limit that is narrower than what the plan will know the quantity to; refuse a unit of another kind."""
-    found = next((p for p in predicted if _same(p.name, limit.quantity)), None)
+    found = next((p for p in predicted if p.about(limit.quantity)), None)
     if found is None:
         return []
     try:
@@ -233,11 +233,6 @@ def _unresolved(limit: StepLimit, where: str, predicted: tuple[PredictedUncertai
         f"the limit of {limit.quantity} cannot be resolved: ±{width:.3g} {limit.unit} is asked for, the plan's "
         f"standard uncertainty is {uncertainty:.3g} {limit.unit}"
     ]
-
-
-def _same(predicted: str, quantity: str) -> bool:
-    """A check's name is a sentence ("gyro_x random walk") where a prediction's is a path ("gyro_x.random_walk")."""
-    return predicted.replace("_", " ").replace(".", " ") == quantity.replace("_", " ").replace(".", " ")
 
 
 def step_field(campaign: Campaign, name: str) -> int:

@@ -17,6 +17,7 @@ from bench_service.campaigns.campaign import Campaign
 from bench_service.campaigns.run import CampaignRun, RunRequest
 from bench_service.campaigns.schedule import Missed, Overlap, Schedule, latest_due, next_start
 from bench_service.campaigns.stores import Stores
+from bench_service.mapping import copied
 from bench_service.model.errors import IdempotencyConflict, NotFound, ServiceError, StorageFailure, StorageFull
 from bench_service.model.records import Idempotency, Page
 from bench_service.model.request import fingerprint
@@ -66,20 +67,13 @@ class Scheduler:
             return self._kept(known)
         at = now()
         next_at = next_start(request.cron, request.time_zone, at)
-        run = self._prepared(RunRequest(request.campaign, request.unit, request.bench, labels=request.labels))
-        schedule = Schedule(
+        run = self._prepared(copied(RunRequest, request))
+        schedule = copied(
+            Schedule,
+            request,
             id=new_id(),
-            cron=request.cron,
-            time_zone=request.time_zone,
-            campaign=request.campaign,
-            unit=request.unit,
             created_at=at,
             bench=run.bench,
-            enabled=request.enabled,
-            missed=request.missed,
-            start_within_s=request.start_within_s,
-            overlap=request.overlap,
-            labels=request.labels,
             next_at=next_at if request.enabled else None,
         )
         return self._stores.campaigns.add_schedule(schedule, idempotency)
@@ -146,7 +140,7 @@ class Scheduler:
         open_run = self._stores.campaigns.open_run_of(schedule.id)
         if open_run is not None and schedule.overlap is Overlap.SKIP:
             return None, f"skipped: its run {open_run} is still open"
-        request = RunRequest(schedule.campaign, schedule.unit, schedule.bench, labels=schedule.labels)
+        request = copied(RunRequest, schedule)
         try:
             run = self._prepared(request)
         except (StorageFailure, StorageFull):

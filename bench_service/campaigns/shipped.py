@@ -7,7 +7,6 @@ from pathlib import Path
 from bench_service.campaigns.campaign import Campaign
 
 FOLDER = Path(__file__).parent
-DEFAULT = "thesis_acceptance"
 
 
 @cache

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from bench_service.cli.refusal import Away, Refused
-from bench_service.settings import Settings
+from bench_service.settings import BadSettings, Settings
 
 if TYPE_CHECKING:
     import httpx  # at run time where it is used: a server that starts needs no client
@@ -41,6 +41,15 @@ def connect(settings: Settings, server: str | None, drive: bool) -> Generator["h
         raise _away(error) from error
 
 
+def _token(settings: Settings) -> dict[str, str]:
+    """The header with the service's token, where the settings have one. Raises `Refused`."""
+    try:
+        token = settings.token()
+    except BadSettings as error:
+        raise Refused(str(error)) from error
+    return {} if token is None else {"Authorization": f"Bearer {token}"}
+
+
 def _address(server: str) -> "httpx.URL":
     """Where the service is. Raises `Refused` for what no resolver would take."""
     import httpx
@@ -58,7 +67,7 @@ def _client(settings: Settings, server: str | None, drive: bool) -> Generator["h
     import httpx
 
     if server is not None:
-        with httpx.Client(base_url=_address(server), timeout=TIMEOUT_S) as client:
+        with httpx.Client(base_url=_address(server), timeout=TIMEOUT_S, headers=_token(settings)) as client:
             yield client
         return
     from bench_service.cli.serving import serving  # a quarter of a second that a client of a server does not need

@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from pydantic import ValidationError
 
-from bench_service.cli import campaign_commands
+from bench_service.cli import bench_commands, campaign_commands
 from bench_service.cli.client import RESULT, call, check, connect, segment
 from bench_service.cli.files import check_folder, text_of, whole_file
-from bench_service.cli.options import AsJson, Server, console, errors, parameter, wide
+from bench_service.cli.options import AsJson, Server, announce, console, errors, parameter, wide
 from bench_service.cli.refusal import Refused
 from bench_service.model.errors import ServiceError
 from bench_service.settings import Settings
@@ -78,43 +77,19 @@ def serve(
     check_port(settings)
     if no_worker or not settings.drive:
         with ready(settings, drive=False, level="info") as server:
-            console.print(f"API without a bench of its own at http://{settings.host}:{settings.port}")
+            announce(f"API without a bench of its own at http://{settings.host}:{settings.port}")
             server.run()
         return
     with (
         ready(settings, level="info") as server,
         accompanied(settings, lambda: server.started and not server.should_exit),
     ):
-        console.print(f"bench {settings.bench_id} at http://{settings.host}:{settings.port}")
+        announce(f"bench {settings.bench_id} at http://{settings.host}:{settings.port}")
         server.run()
 
 
-@app.command()
-def worker(
-    context: typer.Context,
-    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
-) -> None:
-    """Run the jobs of a bench, without HTTP, until SIGTERM or SIGINT. Its running job is left for the next start."""
-    from bench_service.cli.working import work
-
-    settings = _of_bench(context.obj, bench)
-    work(settings, lambda line: print(line, flush=True))
-
-
-@app.command()
-def supervise(
-    context: typer.Context,
-    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
-    companion: Annotated[bool, typer.Option(help="End with the process that drives the bench")] = False,
-) -> int:
-    """Watch a bench on its own host, and make it safe where the process that drives it is gone or hangs.
-
-    Exit code 3: a companion left the bench to another supervisor.
-    """
-    from bench_service.cli.supervising import supervise as watch_over
-
-    settings = _of_bench(context.obj, bench)
-    return watch_over(settings, companion, lambda line: print(line, flush=True))
+for _command in (bench_commands.worker, bench_commands.supervise, bench_commands.stop):
+    app.command()(_command)
 
 
 @app.command()
@@ -157,7 +132,7 @@ def run(
     as_json: AsJson = False,
 ) -> int:
     """Run a procedure on a unit and wait for its verdict."""
-    from bench_service.cli.tables import check_table
+    from bench_service.cli.tables import check_table, show_warnings
     from bench_service.cli.watching import JOB, exit_code, watch
 
     body = {"procedure": procedure, "unit": unit, "parameters": dict(map(parameter, set_)), "seed": seed}
@@ -170,6 +145,7 @@ def run(
         raise Refused(f"job {job['id']} {job['state']}: {(job['error'] or {}).get('message', 'no reason given')}")
     else:
         console.print(check_table(result["document"]))
+        show_warnings(result["document"], console)
         console.print(f"verdict {job['verdict']}, job {job['id']}", soft_wrap=True)
     return exit_code(job["verdict"])
 
@@ -201,7 +177,7 @@ def analyse(
 ) -> int:
     """Run a method on stored recordings or calibrations; prints its coefficients, checks and verdict."""
     from bench_service.cli.report_tables import report_tables
-    from bench_service.cli.tables import check_table
+    from bench_service.cli.tables import check_table, show_warnings
     from bench_service.cli.watching import exit_code
 
     body = {
@@ -218,6 +194,7 @@ def analyse(
         for table in report_tables(method, result["document"]):
             console.print(table)
         console.print(check_table(result["document"]))
+        show_warnings(result["document"], console)
         console.print(f"verdict {result['verdict']}, result {result['id']}", soft_wrap=True)
     return exit_code(result["verdict"])
 
@@ -272,14 +249,6 @@ def jobs(
 
 def _with(settings: Settings, **given: Any) -> Settings:
     return settings.model_copy(update={name: value for name, value in given.items() if value is not None})
-
-
-def _of_bench(settings: Settings, bench: str | None) -> Settings:
-    """The settings of another bench. Raises `Refused` for a name that no bench can have."""
-    try:
-        return Settings.model_validate({**settings.model_dump(), "bench_id": bench or settings.bench_id})
-    except ValidationError as error:
-        raise Refused(f"--bench {bench}: {error.errors()[0]['msg']}") from error
 
 
 def _until_interrupted() -> None:

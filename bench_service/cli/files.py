@@ -1,10 +1,12 @@
 """Files that a command reads and writes."""
 
+import os
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
+from bench_service.cli.private_files import mode_of_exports
 from bench_service.cli.refusal import Refused
 
 
@@ -42,6 +44,7 @@ def whole_file(file: Path) -> Generator[BinaryIO]:
     try:
         try:
             with partial.open("wb") as sink:
+                os.fchmod(sink.fileno(), mode_of_exports())
                 yield sink
             partial.replace(file)
         finally:

@@ -4,6 +4,7 @@
 """
 
 import logging
+import re
 import sys
 from datetime import UTC, datetime
 
@@ -12,19 +13,34 @@ from bench_service.telemetry.log_context import AddSubjects
 
 FIELDS = "{asctime} {levelname} {name} {message}"
 OWN_HANDLERS = ("uvicorn", "uvicorn.error", "uvicorn.access", "dbos")
-"""Loggers that bring a handler of their own, unless they find one."""
+"""Loggers of libraries that bring a handler of their own, unless they find one; some put tracebacks into messages."""
+
+
+TRACE = "    | "
+"""Begins each line of a traceback: a message with a line break in it cannot look like a line of the log."""
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+"""Control characters, line separators of Unicode, and marks that change the direction of what follows."""
+
+
+def visible(text: str) -> str:
+    """Text with its control characters written as escapes, so that it stays one line and commands no terminal."""
+    return _CONTROL.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 class Lines(logging.Formatter):
-    """One line for a person; a traceback follows on its own lines."""
+    """One line for a person, whatever is in its message; a traceback follows on marked lines of its own."""
 
     def format(self, record: logging.LogRecord) -> str:
         about: dict[str, str] = getattr(record, "subjects", {})
         found = " ".join(f"{name}={value}" for name, value in about.items())
-        text = f"{_moment(record)} {record.levelname:7} {record.name}: {record.getMessage()}"
+        message = record.getMessage()
+        first, *more = message.split("\n") if record.name in OWN_HANDLERS else [message]
+        text = f"{_moment(record)} {record.levelname:7} {record.name}: {first}"
         if found:
             text += f" [{found}]"
-        return text if record.exc_info is None else f"{text}\n{self.formatException(record.exc_info)}"
+        if record.exc_info is not None:
+            more += self.formatException(record.exc_info).split("\n")
+        return "\n".join([visible(text), *(TRACE + visible(line) for line in more)])
 
 
 def set_up(settings: Settings, level: str) -> None:
@@ -55,6 +71,9 @@ def _json_lines() -> logging.Formatter:
 
     class JsonLines(JsonFormatter):
         """What a line is about as fields of their own, beside time, level, logger and message."""
+
+        def format(self, record: logging.LogRecord) -> str:
+            return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", super().format(record))
 
         def process_log_record(self, log_data: dict[str, object]) -> dict[str, object]:
             about = log_data.pop("subjects", None)

@@ -1,6 +1,7 @@
 """What several commands take and say in the same words."""
 
 import json
+from contextlib import suppress
 from math import isfinite
 from typing import Annotated, Any
 
@@ -39,6 +40,12 @@ def parameter(text: str) -> tuple[str, Any]:
 def notice(text: str) -> None:
     """Tell something on standard error that is no failure, above a progress bar where there is one."""
     errors.print(text, style="yellow", soft_wrap=True)
+
+
+def announce(text: str) -> None:
+    """Say what a service does. One whose output goes to a full disk, or to nobody, goes on."""
+    with suppress(OSError):
+        print(text, flush=True)
 
 
 def wide() -> Console:

@@ -9,15 +9,28 @@ from pathlib import Path
 
 import uvicorn
 
+from bench_service.api.http.door import Door, may_listen
 from bench_service.app import create_app, open_service
+from bench_service.cli.connections import AT_ONCE, BoundedConnections, lengthen_queue, raise_descriptors
 from bench_service.cli.logs import set_up
+from bench_service.cli.private_files import protect
 from bench_service.cli.refusal import Refused
 from bench_service.service import BenchService
 from bench_service.settings import Settings
 from bench_service.wall_clock import pause
 
+EMBEDDED = "embedded"
+"""Name that commands give to a service in their own process, which they reach over a socket file."""
 GRACE_S = 3
 """How long open connections may take to end at shutdown [s]."""
+
+
+class _Server(uvicorn.Server):
+    """uvicorn's server, whose queue of connections is longer than what it accepts at once."""
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        lengthen_queue([each for server in self.servers for each in server.sockets])
 
 
 @contextmanager
@@ -27,8 +40,9 @@ def ready(
     """A server around an open service, ready to run; the service is closed at the end, or when the server shuts down.
 
     `level`: from which on lines are logged, where the settings do not say.
-    Raises what `open_service` raises, before any thread or signal handler is there. Where the job engine does not start
-    the server ends, and `NotDriving` is raised at the end of the block.
+    Raises `Refused` for an address that it may not listen on, `Misconfigured` for a token that cannot be used, and what
+    `open_service` raises, before any thread or signal handler is there. Where the job engine does not start the server
+    ends, and `NotDriving` is raised at the end of the block.
     """
     with _opened(settings, drive, socket_file, level) as (server, service):
         yield server
@@ -40,18 +54,25 @@ def _opened(
     settings: Settings, drive: bool, socket_file: Path | None, level: str
 ) -> Generator[tuple[uvicorn.Server, BenchService]]:
     set_up(settings, level)
+    protect(settings)
+    BoundedConnections.most = raise_descriptors()
+    if socket_file is None:
+        check_address(settings)
+    rules = Door.of(settings) if socket_file is None else Door.of(settings, EMBEDDED)
     with ExitStack() as closing:
-        service = open_service(settings, closing, drive)
+        service = open_service(settings, closing, drive, apart=socket_file is None)
         config = uvicorn.Config(
-            create_app(service, int(settings.max_import_mb * 1e6), closing.close),
+            create_app(service, int(settings.max_import_mb * 1e6), closing.close, rules),
             settings.host,
             settings.port,
             uds=None if socket_file is None else str(socket_file),
             log_config=None,
             access_log=settings.log_access,
             timeout_graceful_shutdown=GRACE_S,
+            http=BoundedConnections,
+            backlog=AT_ONCE,
         )
-        server = uvicorn.Server(config)
+        server = _Server(config)
 
         def end() -> None:
             server.should_exit = True
@@ -66,8 +87,19 @@ def _check_start(service: BenchService) -> None:
         raise failure
 
 
+def check_address(settings: Settings) -> None:
+    """Raises `Refused` for an address from which anybody could ask, with what it takes to listen there."""
+    if not may_listen(settings):
+        raise Refused(
+            f"BENCH_HOST = {settings.host}: this service listens on another address than a loopback one only with a "
+            "token for those who ask from there, BENCH_TOKEN_FILE, or where that address is reached through a loopback "
+            "one alone, BENCH_PUBLISHED=loopback"
+        )
+
+
 def check_port(settings: Settings) -> None:
-    """Raises `Refused` with a hint where the port is taken."""
+    """Raises `Refused` with a hint where the port is taken, and as `check_address`."""
+    check_address(settings)
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -3,15 +3,19 @@
 It has a composition of its own, because that of the service loads what a supervisor must do without.
 """
 
-import signal
-import threading
+import logging
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
-from types import FrameType
 
+from bench_service.bench.heartbeat import HeartbeatFile
+from bench_service.bench.stop.channel import StopChannel
+from bench_service.bench.stop.listener import StopListener
+from bench_service.bench.stop.messages import made_secret
 from bench_service.bench.supervisor import Supervisor
+from bench_service.cli.ending import ending_on_signals
 from bench_service.cli.logs import set_up
+from bench_service.cli.private_files import protect
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.model.errors import BenchBusy
@@ -24,6 +28,7 @@ from bench_service.wall_clock import monotonic_s, pause
 
 TAKE_OVER_S = 2.0
 """How long a companion tries to become the supervisor [s]: one that is about to leave has left by then."""
+log = logging.getLogger(__name__)
 SUPERVISED_ALREADY = 3
 """Exit code of a companion that leaves its bench to another supervisor."""
 
@@ -35,13 +40,8 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
     that drives the bench.
     """
     set_up(settings, "info")
-    ending = threading.Event()
-
-    def end(_signal: int, _frame: FrameType | None) -> None:
-        ending.set()
-
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, end)
+    protect(settings)
+    ending = ending_on_signals()
     folder, bench = settings.devices_in(), settings.bench_id
     files = HostFiles(folder, bench)
     with ExitStack() as closing:
@@ -55,9 +55,34 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
         closing.callback(books.close)
         take_lease = partial(acquire_lease, settings.database_url, bench, SUPERVISOR)
         devices = RegisteredDevices(DeviceRegister(folder, bench))
+        channel, heartbeat = StopChannel(folder, bench), HeartbeatFile(folder, bench)
+        try:
+            channel.prepare()
+        except OSError as error:  # a full disk: what there is must do
+            log.warning("the stop channel of bench %s: %s", bench, error)
+        listener = _listener(settings, channel, devices)
+        if listener is not None:
+            listener.begin()
+            closing.callback(listener.end)
         say(f"supervising bench {bench}")
-        Supervisor(bench, devices, files, books, take_lease).run(ending, companion)
+        Supervisor(bench, devices, files, books, take_lease, channel, heartbeat, listener).run(ending, companion)
     return 0
+
+
+def _listener(settings: Settings, channel: StopChannel, devices: RegisteredDevices) -> StopListener | None:
+    """Takes stops from other hosts; None where the settings want none, or no secret can be had."""
+    if not settings.stop_listen:
+        return None
+    secret = made_secret(settings.stop_secret_in())
+    if secret is None:
+        log.warning("no stop is taken from other hosts: %s holds no secret", settings.stop_secret_in())
+        return None
+
+    def is_safe() -> bool:
+        state = devices.device_state()
+        return state is not None and state.safe
+
+    return StopListener(settings.stop_listen, secret, channel, is_safe)
 
 
 def _lock(files: HostFiles, patience_s: float) -> SupervisorLock:

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -45,6 +46,12 @@ def check_table(document: dict[str, Any]) -> Table:
         outcome = Text("pass", style="green") if check["passed"] else Text("fail", style="red")
         table.add_row(check["name"], f"{check['value']:.4g}", ", ".join(bounds), limit["unit"], outcome)
     return table
+
+
+def show_warnings(document: dict[str, Any], to: Console) -> None:
+    """What a person should know before believing the result."""
+    for warning in document.get("warnings", []):
+        to.print(Text(f"warning: {warning}", style="yellow"), soft_wrap=True)
 
 
 def job_table(jobs: list[dict[str, Any]]) -> Table:

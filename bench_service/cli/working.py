@@ -1,14 +1,14 @@
 """``bench worker``: the jobs of one bench, in a process without HTTP."""
 
-import signal
 import threading
 from collections.abc import Callable
 from contextlib import ExitStack
-from types import FrameType
 
 from bench_service.app import open_service
 from bench_service.cli.companion import accompanied
+from bench_service.cli.ending import ending_on_signals
 from bench_service.cli.logs import set_up
+from bench_service.cli.private_files import protect
 from bench_service.settings import Settings
 
 
@@ -18,13 +18,8 @@ def work(settings: Settings, say: Callable[[str], object]) -> None:
     Raises what `open_service` raises, `BenchBusy` first of all, and `NotDriving` where the engine does not start.
     """
     set_up(settings, "info")
-    ending = threading.Event()
-
-    def end(_signal: int, _frame: FrameType | None) -> None:
-        ending.set()
-
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, end)
+    protect(settings)
+    ending = ending_on_signals()
     started = threading.Event()
     with accompanied(settings, lambda: started.is_set() and not ending.is_set()), ExitStack() as closing:
         service = open_service(settings, closing)

@@ -6,9 +6,7 @@ the kernel gives it to one process and takes it back at its death.
 """
 
 import fcntl
-import json
 import os
-import zlib
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -18,14 +16,10 @@ from typing import Any
 from bench_service import wall_clock
 from bench_service.bench.devices import DeviceState
 from bench_service.bench.processes import ProcessIdentity
+from bench_service.bench.records_in_place import Unreadable, encoded, read_record, write_record
 from bench_service.drivers.device_cables import DeviceCables
 from bench_service.drivers.device_journal import DeviceJournal
 from procedures.bench.errors import DeviceBusy, Disconnected
-
-RECORD_BYTES = 4096
-"""A state is written in one piece of this size, over the one before: nothing is half-written, no disk too full."""
-TRIES = 50
-"""How often a reader looks again that met a writer in the middle."""
 
 
 class DeviceRegister:
@@ -100,32 +94,23 @@ class DeviceLink:
 
     def _note(self, file: int, verb: str, arguments: dict[str, Any], changes: dict[str, Any]) -> None:
         self.state = replace(self.state, at=wall_clock.now(), **changes)
-        os.pwrite(file, _written(self.state), 0)
+        write_record(file, 0, _written(self.state))
         self._journal.write(verb, arguments, job=self.state.job)
 
 
 def _written(state: DeviceState) -> bytes:
-    """A record: CRC-32, then the state as JSON, padded."""
     document = dict(vars(state))
     document["at"] = None if state.at is None else state.at.isoformat()
-    body = json.dumps(document).encode()
-    if len(body) > RECORD_BYTES - 16:
-        return _written(replace(state, fault=state.fault[:200], by=state.by[:200], job=None))
-    return f"{zlib.crc32(body):08x} ".encode() + body + b" " * (RECORD_BYTES - 10 - len(body)) + b"\n"
+    return encoded(document) or _written(replace(state, fault=state.fault[:200], by=state.by[:200], job=None))
 
 
 def _read(file: int) -> DeviceState | None:
     """The state in a file; None in an empty one, which somebody is about to write."""
-    for _ in range(TRIES):
-        record = os.pread(file, RECORD_BYTES, 0)
-        if not record:
-            return None
-        checksum, _, body = record.partition(b" ")
-        body = body.rstrip()
-        if checksum == f"{zlib.crc32(body):08x}".encode():
-            return _state(json.loads(body))
-        wall_clock.pause(0.002)
-    return DeviceState(fault="what the devices' register holds cannot be read: they must be looked at")
+    try:
+        document = read_record(file)
+    except Unreadable:
+        return DeviceState(fault="what the devices' register holds cannot be read: they must be looked at")
+    return None if document is None else _state(document)
 
 
 def _state(document: dict[str, Any]) -> DeviceState:

@@ -8,7 +8,7 @@ from bench_service.bench.observed import ObservedBench
 from bench_service.drivers.device_cables import DeviceCables
 from bench_service.drivers.device_faults import DeviceFaults
 from bench_service.drivers.device_register import DeviceLink, DeviceRegister
-from procedures.bench import Bench
+from procedures.bench import SAFE_ORDER, Bench
 from procedures.bench.errors import Disconnected, OutOfRange
 
 READS = frozenset({"turntable.read_angles", "turntable.is_moving", "supply.is_on", "chamber.read"})
@@ -21,7 +21,7 @@ SAFE: dict[str, Callable[[DeviceState], dict[str, Any]]] = {
     "current_source": lambda _: {"current_ma": 0.0},
     "supply": lambda _: {"powered": False},
 }
-"""What a device is once it is made safe, in the order in which that is done."""
+"""What a device is once it is made safe."""
 LOST = "as the bench's truth file has it"
 """Why a link is lost that neither a person nor an exercise has lost."""
 
@@ -174,7 +174,7 @@ class RegisteredDevices:
             return state
         link = self._register.open(by, None if state is None else state.job)
         try:
-            failures = [failure for device in SAFE if (failure := self._make_safe(link, device)) is not None]
+            failures = [failure for device in SAFE_ORDER if (failure := self._make_safe(link, device)) is not None]
             fault = "; ".join(map(str, failures))
             link.note(f"bench.make_safe.{'failed' if fault else 'done'}", {}, fault=fault)
             if failures:

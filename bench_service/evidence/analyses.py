@@ -8,14 +8,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.documents import document_of, require_storable
 from bench_service.evidence.job_analysis import analysed, recordings_of
 from bench_service.evidence.stores import EvidenceStores
+from bench_service.evidence.work_processes import WorkProcesses
 from bench_service.model.job import Job
 from bench_service.model.records import Idempotency, RecordingState, StoredResult
 from bench_service.model.request import fingerprint
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.recording import Recording
+from procedures.inspection import analyse_method
 from procedures.procedure import DatedCalibration, Evidence
 
 
@@ -33,9 +36,17 @@ class AnalysisService:
     """Runs methods and analyses on stored evidence; each call returns with its result stored."""
 
     def __init__(
-        self, stores: EvidenceStores, catalogue: Catalogue, read_job: Callable[[str], Job], code_version: str
+        self,
+        stores: EvidenceStores,
+        catalogue: Catalogue,
+        read_job: Callable[[str], Job],
+        code_version: str,
+        processes: WorkProcesses | None = None,
     ) -> None:
-        """`read_job`: gives a job by its id, and raises `NotFound`."""
+        """`read_job`: gives a job by its id, and raises `NotFound`. `processes`: where analyses are worked out; None:
+        here, in the caller's thread.
+        """
+        self._processes = processes
         self._stores = stores
         self._catalogue = catalogue
         self._read_job = read_job
@@ -49,10 +60,12 @@ class AnalysisService:
             return self._stores.results.get(known)
         job = self._read_job(job_id)
         recordings = recordings_of(self._stores, job_id)
-        if len(recordings) < len(job.stations):
-            raise UnfitRecording(f"job {job_id} has {len(recordings)} of its {len(job.stations)} recordings")
         merged = {**job.requested_parameters, **parameters}
-        result = analysed(job, self._catalogue.procedure(job.procedure), merged, recordings, self._code_version)
+        procedure = self._catalogue.procedure(job.procedure)
+        if self._processes is not None:
+            procedure.params.model_validate(merged)
+            return self._stores.results.get(self._processes.result("again", job_id, parameters, key))
+        result = analysed(job, procedure, merged, recordings, self._code_version)
         return self._stores.results.add(result.stored, result.calibrations, False, idempotency, result.corrections)
 
     def run_method(self, request: AnalysisRequest, key: str | None = None) -> StoredResult:
@@ -65,6 +78,8 @@ class AnalysisService:
         _require_each_once("calibrations", request.calibrations)
         method = self._catalogue.method(request.method)
         params = method.params.model_validate(request.parameters)
+        if self._processes is not None:
+            return self._stores.results.get(self._processes.result("method", request, key))
         used = [self._stores.results.calibration(c) for c in request.calibrations]
         dated = tuple(DatedCalibration(c.id, c.made_at.isoformat(), c.triads) for c in used)
         evidence = Evidence(self._complete(request.recordings), dated)
@@ -72,14 +87,14 @@ class AnalysisService:
         if len(units) > 1:
             raise UnfitRecording(f"the evidence is of several units: {', '.join(sorted(units))}")
         serial = next(iter(units), None)
-        outcome = method.analyse(evidence, params, None if serial is None else self._stores.units.unit(serial))
+        outcome = analyse_method(method, evidence, params, None if serial is None else self._stores.units.unit(serial))
         stored = StoredResult(
             id=new_id(),
             kind="method",
             name=method.name,
             version=method.version,
             parameters=params.model_dump(mode="json"),
-            document=outcome.model_dump(mode="json"),
+            document=document_of(outcome),
             verdict=outcome.verdict,
             recordings=tuple((r.info.id, r.info.content_hash) for r in evidence.recordings),
             calibrations=request.calibrations,
@@ -89,6 +104,7 @@ class AnalysisService:
             unit=serial,
         )
         gives = method.calibrations(outcome), method.corrections(outcome)
+        require_storable(*gives)
         return self._stores.results.add(stored, gives[0], False, idempotency, gives[1])
 
     def _complete(self, ids: Sequence[str]) -> tuple[Recording, ...]:

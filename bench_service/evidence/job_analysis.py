@@ -5,14 +5,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from bench_service.evidence.catalogue import AnyProcedure
+from bench_service.evidence.documents import document_of, require_storable
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.model.context import context_of
 from bench_service.model.job import Job
 from bench_service.model.records import StoredResult
 from bench_service.wall_clock import new_id, now
+from procedures.core.errors import UnfitRecording
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Recording
 from procedures.core.unit_correction import UnitCorrection
+from procedures.inspection import analyse_procedure
 from procedures.procedure import Outcome
 
 
@@ -38,10 +41,15 @@ def analysed(
     recordings: Sequence[Recording],
     code_version: str,
 ) -> Analysed:
-    """Run a procedure's analysis on a job's recordings. Raises `DomainError`, `ValidationError` for the parameters."""
+    """Run a procedure's analysis on a job's recordings. Raises `DomainError`, `ValidationError` for the parameters.
+
+    A value that cannot be stored, NaN above all, is `UnfitResult`.
+    """
+    if len(recordings) != len(job.stations):
+        raise UnfitRecording(f"job {job.id} has {len(recordings)} of its {len(job.stations)} recordings")
     context = context_of(job)
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
-    outcome = procedure.analyse(recordings, params, context)
+    outcome = analyse_procedure(procedure, recordings, params, context)
     used = context.unit.calibration_id if procedure.uses_calibration else None
     corrections = (context.unit.correction_id(kind) for kind in procedure.uses_corrections(params))
     stored = StoredResult(
@@ -50,7 +58,7 @@ def analysed(
         name=procedure.name,
         version=procedure.version,
         parameters=params.model_dump(mode="json"),
-        document=outcome.model_dump(mode="json"),
+        document=document_of(outcome),
         verdict=outcome.verdict,
         recordings=tuple((r.info.id, r.info.content_hash) for r in recordings),
         calibrations=(used,) if used else (),
@@ -63,4 +71,6 @@ def analysed(
         context=job.context,
         corrections=tuple(c for c in corrections if c is not None),
     )
-    return Analysed(outcome, stored, procedure.calibrations(outcome), procedure.corrections(outcome))
+    found = Analysed(outcome, stored, procedure.calibrations(outcome), procedure.corrections(outcome))
+    require_storable(found.calibrations, found.corrections)
+    return found

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
+from bench_service.mapping import copied
 from bench_service.model.quantities import Quantity, quantity
 from bench_service.model.records import ResultValue, StoredResult
 from procedures.analysis.control_chart import LEAST_POINTS, ControlLimits, Signal, control_limits, signals
@@ -57,8 +58,9 @@ def trend_of(values: Sequence[ResultValue], unit: str, procedure: str, name: str
 def value_of(result: StoredResult, name: str) -> ResultValue:
     """A quantity of one result. Raises `NotFound`, naming what there is."""
     found = quantity(result.document, name)
-    return ResultValue(result.id, result.job_id, result.created_at, result.simulated, result.code_version, found)
+    about = {"result": result.id, "job": result.job_id, "at": result.created_at}
+    return copied(ResultValue, result, **about, quantity=found)
 
 
 def _point(of: ResultValue, q: Quantity) -> TrendPoint:
-    return TrendPoint(of.result, of.job, of.at, q.value, q.standard_uncertainty, of.simulated, of.code_version)
+    return copied(TrendPoint, of, q)

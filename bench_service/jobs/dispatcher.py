@@ -14,13 +14,14 @@ While the bench's lease is lost (the database was restarted) nothing is claimed,
 """
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Event, Thread
 from typing import Protocol
 
 from bench_service.bench.driver import Lease
 from bench_service.bench.session import ShuttingDown
-from bench_service.jobs.queue import BenchQueue, QueueEntry, RunningJob
+from bench_service.jobs.queue import BenchQueue, QueueEntry
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.stores import JobStores
 from bench_service.model.errors import NotFound, NotUnderstood, ServiceError
@@ -54,7 +55,7 @@ class JobEngine(Protocol):
         """Run a claimed job to its end. Raises `ShuttingDown`, and whatever keeps it from running."""
         ...
 
-    def unfinished(self, job: RunningJob) -> Unfinished:
+    def unfinished(self, job: QueueEntry) -> Unfinished:
         """What became of a running job's workflow."""
         ...
 
@@ -67,9 +68,20 @@ class Dispatcher:
     """Gives one bench its jobs, one after the other, in a thread of its own."""
 
     def __init__(
-        self, bench_id: str, stores: JobStores, runner: JobRunner, engine: JobEngine, lease: Lease, poll_s: float
+        self,
+        bench_id: str,
+        stores: JobStores,
+        runner: JobRunner,
+        engine: JobEngine,
+        lease: Lease,
+        poll_s: float,
+        stopped: Callable[[], bool] = lambda: False,
     ) -> None:
-        """`poll_s`: how often the queue is looked at for jobs that other processes put there."""
+        """`poll_s`: how often the queue is looked at for jobs that other processes put there.
+
+        `stopped`: whether the bench is stopped over its host's stop channel, of which the database may not know yet.
+        """
+        self._stopped = stopped
         self._bench_id = bench_id
         self._stores = stores
         self._runner = runner
@@ -123,12 +135,12 @@ class Dispatcher:
             return False
         entry = queue.next()
         self._tell(queue)
-        if entry is None:
+        if entry is None or self._stopped():
             return False
         try:
             job = self._runner.claim(entry)
         except (NotUnderstood, NotFound) as error:  # its unit is not known, or its words are not
-            self._interrupt(entry.job, Failure(type(error).__name__, str(error)))
+            self._interrupt(entry.id, Failure(type(error).__name__, str(error)))
             return True
         if job is None:
             return False
@@ -166,8 +178,8 @@ class Dispatcher:
     def _tell(self, queue: BenchQueue) -> None:
         """Note in the events of the queue's first job why it does not start, once for each reason."""
         head: QueueEntry | None = queue.entries[0] if queue.entries else None
-        why = None if head is None or (queue.stop is None and not queue.reservations) else queue.hold(head)
-        if head is None or why is None or self._told == (head.job, why):
+        why = None if head is None or (not queue.stops and not queue.reservations) else queue.hold(head)
+        if head is None or why is None or self._told == (head.id, why):
             return
-        self._stores.jobs.note(head.job, "note", now(), {"text": why})
-        self._told = (head.job, why)
+        self._stores.jobs.note(head.id, "note", now(), {"text": why})
+        self._told = (head.id, why)

@@ -19,10 +19,11 @@ from pydantic import TypeAdapter
 
 from bench_service.bench.session import ShuttingDown
 from bench_service.jobs.dispatcher import Unfinished
-from bench_service.jobs.queue import RunningJob
+from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.runner import JobRunner, StepOutcome
-from bench_service.model.errors import NotUnderstood, ServiceError, StorageFailure, StorageFull
+from bench_service.model.errors import NotUnderstood, ServiceError, StorageFailure, StorageFull, UnfitValue
 from bench_service.model.job import Failure, Job
+from bench_service.telemetry.defects import described
 
 PROCEDURE_ABI = "1"
 """Raise it when stored workflows can no longer be continued by this code."""
@@ -123,7 +124,7 @@ class Engine:
             handle = DBOS.start_workflow(self._workflow, job.id, job.attempt)
         handle.get_result()
 
-    def unfinished(self, job: RunningJob) -> Unfinished:
+    def unfinished(self, job: QueueEntry) -> Unfinished:
         """What became of a running job's workflow."""
         status = DBOS.get_workflow_status(_workflow_id(job))
         if status is None:
@@ -198,7 +199,7 @@ class Engine:
             try:
                 self._runner.end_early(job_id, outcome)
                 return
-            except NotUnderstood:  # no end of ours can be noted: the dispatcher interrupts it
+            except (NotUnderstood, UnfitValue):  # no end of ours can be noted: the dispatcher interrupts it
                 return
             except (StorageFull, StorageFailure) as error:
                 log.warning("the end of job %s cannot be noted yet: %s", job_id, error)
@@ -235,9 +236,9 @@ class Engine:
         """A defect, or books that cannot be kept."""
         error = self._understood(raised)
         refused = isinstance(error, ServiceError)
-        log.error("job %s failed inside the service: %s", job_id, error, exc_info=None if refused else error)
-        kind = type(error).__name__
-        return StepOutcome(Failure(kind, str(error)) if refused else Failure("InternalError", f"{kind}: {error}"))
+        said = str(error) if refused else described(error)
+        log.error("job %s failed inside the service: %s", job_id, said, exc_info=None if refused else error)
+        return StepOutcome(Failure(type(error).__name__ if refused else "InternalError", said))
 
 
 @contextmanager
@@ -255,7 +256,7 @@ def _failure_said_once() -> Generator[None]:
         logger.removeFilter(dropped)
 
 
-def _workflow_id(job: Job | RunningJob) -> str:
+def _workflow_id(job: Job | QueueEntry) -> str:
     """Each attempt of a job is a workflow of its own."""
     return f"{job.id}/{job.attempt}"
 

@@ -31,8 +31,9 @@ class InstrumentedRunner(JobRunner):
         live: LiveBoard,
         retry_scale: float,
         traces: Traces,
+        stopped: Callable[[], bool],
     ) -> None:
-        super().__init__(stores, planner, driver, code_version, lease_held, live, retry_scale)
+        super().__init__(stores, planner, driver, code_version, lease_held, live, retry_scale, stopped)
         self._traces = traces
         self._campaign: tuple[str, str | None] = ("", None)
         """The job that was begun last, and the campaign run that it belongs to."""

@@ -8,6 +8,7 @@ from bench_service.evidence.catalogue import AnyProcedure, Catalogue
 from bench_service.evidence.units import UnitStore
 from bench_service.model.errors import NotFound, NotMounted
 from procedures.bench import BenchDescription
+from procedures.core.errors import ProcedureDefect
 from procedures.core.recording import Station
 from procedures.core.unit import Unit
 from procedures.procedure import Context, Parameters, Prediction
@@ -60,7 +61,7 @@ class Planner:
         procedure = self.catalogue.procedure(name)
         context = self.context(unit, bench)
         parameters = procedure.resolve(procedure.params.model_validate(requested), context)
-        stations = procedure.schedule(parameters)
+        stations = stations_of(procedure, parameters)
         violations = tuple(
             f"station {s.index} ({s.label}): {sentence}" for s in stations for sentence in _violations(s, context.bench)
         )
@@ -71,6 +72,22 @@ class Planner:
     def refreshed(self, context: Context) -> Context:
         """The same bench, and the unit as it is known now: its noise, and the calibration that is current."""
         return replace(context, unit=self._units.unit(context.unit.serial))
+
+
+def stations_of(procedure: AnyProcedure, parameters: Parameters) -> tuple[Station, ...]:
+    """The stations of complete parameters. Raises `ProcedureDefect` where they are not numbered 0, 1, 2, … in order.
+
+    Recordings are found by these numbers after a crash, so a job with others would lose stations.
+    """
+    stations = tuple(procedure.schedule(parameters))
+    numbers = [station.index for station in stations]
+    if numbers != list(range(len(stations))):
+        found = ", ".join(map(str, numbers[:8])) + (", …" if len(numbers) > 8 else "")
+        raise ProcedureDefect(
+            f"procedure {procedure.name} numbers its {len(stations)} stations {found}: `schedule` must number them "
+            "from 0, in order: 0, 1, 2, …"
+        )
+    return stations
 
 
 def _violations(station: Station, bench: BenchDescription) -> tuple[str, ...]:

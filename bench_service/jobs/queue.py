@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from bench_service.jobs.reservation import Reservation, Reserved
 from bench_service.model.job import Failure, Job
-from bench_service.model.records import BenchStop
+from bench_service.model.records import BenchStop, reasons_of
 
 LONGEST_PAUSE_S = 300.0
 """No retry is put off for longer [s]. One that is due later than that was put off by a clock that was set back since:
@@ -20,9 +20,10 @@ it waits no more."""
 
 @dataclass(frozen=True)
 class QueueEntry:
-    """What a queued job's turn depends on."""
+    """A job that waits for its bench or drives it, by the fields that every version of the service reads."""
 
-    job: str
+    id: str
+    procedure: str
     unit: str
     priority: int
     queued_at: datetime
@@ -53,7 +54,8 @@ class BenchQueue:
     """In order."""
     running: str | None = None
     """The job that drives the bench."""
-    stop: BenchStop | None = None
+    stops: tuple[BenchStop, ...] = ()
+    """Those that stand, oldest first."""
     reservations: tuple[Reservation, ...] = ()
     """Those that hold now, of the bench and of the units in the queue."""
 
@@ -63,8 +65,8 @@ class BenchQueue:
 
     def hold(self, entry: QueueEntry) -> str | None:
         """Why a job may not start whatever else the bench does; None where it may."""
-        if self.stop is not None:
-            return f"bench {self.bench} is stopped: {self.stop.reason}"
+        if self.stops:
+            return f"bench {self.bench} is stopped: {reasons_of(self.stops)}"
         for reservation in self._of_others(entry):
             what = f"{reservation.kind.value} {reservation.name}"
             return f"{what} is reserved by {reservation.holder} until {reservation.until.isoformat()}"
@@ -83,9 +85,9 @@ class BenchQueue:
         ahead, last = (0, "") if self.running is None else (1, self.running)
         for number, entry in enumerate(self.entries, start=1):
             hold = self.hold(entry)
-            places[entry.job] = Place(number, ahead, hold or self._turn(ahead, last, driven))
+            places[entry.id] = Place(number, ahead, hold or self._turn(ahead, last, driven))
             if hold is None:
-                ahead, last = ahead + 1, entry.job
+                ahead, last = ahead + 1, entry.id
         return places
 
     def _turn(self, ahead: int, last: str, driven: bool) -> str:
@@ -107,16 +109,6 @@ class BenchQueue:
                 yield reservation
 
 
-@dataclass(frozen=True)
-class RunningJob:
-    """The job that drives a bench, as far as it is known whatever version of the service stored it."""
-
-    id: str
-    attempt: int
-    procedure: str
-    unit: str
-
-
 class QueueStore(Protocol):
     """The queues of all benches, as they are kept. Every method is one transaction."""
 
@@ -136,7 +128,7 @@ class QueueStore(Protocol):
         """
         ...
 
-    def running(self, bench: str) -> RunningJob | None:
+    def running(self, bench: str) -> QueueEntry | None:
         """The job that drives a bench."""
         ...
 

@@ -8,6 +8,7 @@ from bench_service.bench.directory import BenchDirectory
 from bench_service.jobs.queue import BenchQueue, Place
 from bench_service.jobs.reservation import Reservation, Reserved
 from bench_service.jobs.stores import JobStores
+from bench_service.mapping import copied
 from bench_service.model.errors import NotFound
 from bench_service.model.job import Job, JobState
 from bench_service.model.records import Idempotency
@@ -43,8 +44,8 @@ class Standing:
 class QueueService:
     """Reads the queues of all benches, and keeps reservations."""
 
-    def __init__(self, stores: JobStores, benches: BenchDirectory, wake: Callable[[], None]) -> None:
-        """`wake`: called where a job may start that had to wait."""
+    def __init__(self, stores: JobStores, benches: BenchDirectory, wake: Callable[[str], None]) -> None:
+        """`wake`: called for each bench on which a job may start that had to wait."""
         self._stores = stores
         self._wake = wake
         self._benches = benches
@@ -71,14 +72,15 @@ class QueueService:
             self._benches.description(request.name)
         else:
             self._stores.units.unit(request.name)
-        made = Reservation(new_id(), request.kind, request.name, request.holder, at, until, request.note)
+        made = copied(Reservation, request, id=new_id(), created_at=at, until=until)
         key = None if idempotency_key is None else Idempotency(f"reservations:{idempotency_key}", fingerprint(request))
         return self._stores.reservations.add(made, key)
 
     def give_back(self, reservation_id: str) -> Reservation:
         """End a reservation before its time. Raises `NotFound`."""
         kept = self._stores.reservations.end(reservation_id, now())
-        self._wake()
+        for bench_id in (kept.name,) if kept.kind is Reserved.BENCH else self._benches.ids():
+            self._wake(bench_id)
         return kept
 
     def usable(self, reservation_id: str, bench: str, unit: str) -> None:

@@ -1,5 +1,6 @@
 """The steps of a job, each safe to repeat: what the engine calls, and what it must not know."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -8,6 +9,7 @@ from threading import Event
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.tap import LiveTap
 from bench_service.bench.live.values import LiveBoard
+from bench_service.bench.make_safe import RoadEnd, over_new_link, whole_road
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.session import BenchSession, ShuttingDown
 from bench_service.evidence.catalogue import AnyProcedure
@@ -22,10 +24,12 @@ from bench_service.model.job import Failure, Job, JobState
 from bench_service.model.records import BenchStop, Idempotency, StoredResult
 from bench_service.wall_clock import now
 from procedures.bench import BenchNeeds
-from procedures.bench.errors import BenchError, Disconnected, Stopped
+from procedures.bench.errors import BenchError, Stopped
 from procedures.core.errors import DomainError
 from procedures.core.limits import Verdict
 from procedures.procedure import Outcome
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -53,11 +57,13 @@ class JobRunner:
         lease_held: Callable[[], bool],
         live: LiveBoard | None = None,
         retry_scale: float = 1.0,
+        stopped: Callable[[], bool] = lambda: False,
     ) -> None:
         """`lease_held`: whether this process still has the right to drive the bench; asked before every station.
 
         `live`: where it is said what the bench does; None: nowhere.
         `retry_scale`: of the pauses before a retry; less than 1 where bench time is not real time.
+        `stopped`: whether the bench is stopped over its host's stop channel; asks no database.
         """
         self._stores = stores
         self._planner = planner
@@ -66,12 +72,14 @@ class JobRunner:
         self._lease_held = lease_held
         self._live = live
         self._retry_scale = retry_scale
+        self._stopped = stopped
+        self._by = f"the service, {ProcessIdentity.own()}"
         self._session: BenchSession | None = None
         self._ending = Event()
 
     def claim(self, entry: QueueEntry) -> Job | None:
         """Begin a queued job, with what is known of its unit now; None where it cannot begin any more."""
-        job = self._stores.jobs.get(entry.job)
+        job = self._stores.jobs.get(entry.id)
         context = self._planner.refreshed(context_of(job))
         return self._stores.queue.claim(entry, CONTEXT.dump_python(context, mode="json"), now())
 
@@ -90,6 +98,8 @@ class JobRunner:
         """
         if self._ending.is_set():
             raise ShuttingDown
+        if self._stopped():  # before the database is asked anything
+            return StepOutcome(cancelled=True)
         jobs, recordings = self._stores.jobs, self._stores.recordings
         if index in {r.info.station.index for r in recordings.of_job(job_id) if r.info.station}:
             jobs.station_done(job_id, index, now(), {})
@@ -121,32 +131,48 @@ class JobRunner:
     def make_safe(self, job_id: str) -> StepOutcome:
         """Leave the bench safe; after a restart in which no session survived, without the procedure.
 
-        A device that does not answer is asked once more over a new link. Where that fails too, the job ends and the
-        bench is stopped: nothing else runs on it until a person has looked.
+        Where it cannot be made safe the job ends and the bench is stopped: nothing else runs on it until a person has
+        looked.
         """
         session = self._session
         if session is None or session.job.id != job_id:
             if self._driver.device_state() is not None:
-                return self._make_safe_anew(job_id, "")
+                obstacle = over_new_link(self._driver, self._by)
+                return StepOutcome() if obstacle is None else self._not_safe(job_id, obstacle.why)
             job = self._stores.jobs.get(job_id)
             try:
                 session = self._session_of(job)
             except (BenchError, ServiceError) as error:
                 return self._not_safe(job_id, str(error))
-        try:
-            session.make_safe()
-        except ExceptionGroup as group:
-            why = "; ".join(str(error) for error in group.exceptions)
-            if group.split(Disconnected)[1] is not None:
-                return self._not_safe(job_id, why)
-        except Disconnected as silence:
-            why = str(silence)
-        else:
-            return StepOutcome()
-        finally:
-            self._session = None
-            session.close()
-        return self._make_safe_anew(job_id, why)
+        end = self._whole_road(session)
+        if end.obstacle is not None:
+            return self._not_safe(job_id, end.obstacle.why)
+        if end.detour:
+            text = f"the bench was made safe over a new link: {end.detour}"
+            self._stores.jobs.note(job_id, "note", now(), {"text": text})
+        return StepOutcome()
+
+    def stop_now(self) -> None:
+        """Leave the running job's station and make the bench safe, whatever the job's own thread waits for.
+
+        Called by the stop guard. The job's end is noted by its own thread, as soon as that can.
+        """
+        session = self._session
+        if session is None:
+            return
+        session.stop()
+        if self._driver.device_state() is None:  # a bench without a register: its one link is the session's
+            return
+        end = self._whole_road(session)
+        if end.obstacle is not None:
+            log.error("job %s: %s", session.job.id, end.obstacle)
+
+    def _whole_road(self, session: BenchSession) -> RoadEnd:
+        def given_back() -> None:
+            if self._session is session:
+                self._session = None
+
+        return whole_road(session, self._driver, self._by, given_back)
 
     def conclude(self, job_id: str) -> StepOutcome:
         """Analyse, store the result with what it found, and end the job with the verdict; may be repeated."""
@@ -205,30 +231,21 @@ class JobRunner:
         if found != unit:
             self._stores.units.put_unit(found)
 
-    def _make_safe_anew(self, job_id: str, why: str) -> StepOutcome:
-        """Over the devices' own link, once the job's is given up; `why` that one did not do."""
-        try:
-            self._driver.make_safe(f"the service, {ProcessIdentity.own()}")
-        except BenchError as error:
-            return self._not_safe(job_id, f"{why}; then: {error}" if why else str(error))
-        except ExceptionGroup as group:
-            again = [text for text in map(str, group.exceptions) if text not in why]
-            return self._not_safe(job_id, "; ".join([*([why] if why else []), *again]))
-        if why:
-            self._stores.jobs.note(job_id, "note", now(), {"text": f"the bench was made safe over a new link: {why}"})
-        return StepOutcome()
-
     def _not_safe(self, job_id: str, why: str) -> StepOutcome:
         text = f"the bench could not be made safe: {why}"
-        self._stores.benches.stop_bench(BenchStop(self._driver.description.id, now(), f"could not be made safe: {why}"))
+        by, reason = f"the worker, {ProcessIdentity.own()}", f"could not be made safe: {why}"
+        self._stores.benches.stop_bench_once(BenchStop(self._driver.description.id, now(), reason, by=by))
         self._stores.jobs.note(job_id, "note", now(), {"text": text})
         return StepOutcome(Failure("NotSafe", text))
 
     def _stop_wanted(self, job_id: str) -> bool:
         """Whether the job was cancelled or its bench stopped, whichever process was asked.
 
-        A database that does not answer now, because it is restarted, has nothing to say: the recording goes on.
+        A database that does not answer now, because it is restarted, has nothing to say: the recording goes on. A stop
+        on the bench's own host does not depend on it.
         """
+        if self._stopped():
+            return True
         try:
             bench_stop = self._stores.benches.bench_stop(self._driver.description.id)
             return bench_stop is not None or self._stores.jobs.cancel_requested(job_id)

@@ -2,16 +2,16 @@
 
 import logging
 from collections.abc import Callable
-from dataclasses import replace
 from random import SystemRandom
 
 from bench_service.bench.driver import BenchDriver, TrueTriad
 from bench_service.evidence.units import register
 from bench_service.jobs.planning import Plan, Planner
-from bench_service.jobs.queue import RunningJob
+from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.queue_service import QueueService
 from bench_service.jobs.stores import JobStores
 from bench_service.jobs.worker import Worker
+from bench_service.mapping import copied
 from bench_service.model.context import CONTEXT
 from bench_service.model.errors import NotFound
 from bench_service.model.job import Job, JobState
@@ -36,9 +36,11 @@ class JobService:
         driver: BenchDriver | None,
         worker: Worker | None,
         code_version: str,
-        wake: Callable[[], None],
+        wake: Callable[[str], None],
     ) -> None:
-        """`driver`, `worker`: those of this process's own bench, if it drives one. `wake`: has the dispatcher look."""
+        """`driver`, `worker`: those of this process's own bench, if it drives one. `wake`: has a bench's queue
+        looked at.
+        """
         self._stores = stores
         self._planner = planner
         self._queues = queues
@@ -61,9 +63,8 @@ class JobService:
         if request.reservation is not None:
             self._queues.usable(request.reservation, plan.context.bench.id, request.unit)
         register(self._stores.units, plan.context.unit)
-        job = replace(self._new_job(request, plan), requested_by=requested_by)
-        stored = self._stores.jobs.add(job, key)
-        self._wake()
+        stored = self._stores.jobs.add(self._new_job(request, plan, requested_by), key)
+        self._wake(stored.bench)
         with about(job=stored.id):
             log.info("%s on %s queued", stored.procedure, stored.unit)
         return stored
@@ -79,14 +80,14 @@ class JobService:
     def resume(self, job_id: str) -> Job:
         """Go on with a job that can be resumed, with the stations that remain. Raises `IllegalTransition`."""
         job = self._stores.jobs.resume(job_id, now())
-        self._wake()
+        self._wake(job.bench)
         return job
 
     def set_priority(self, job_id: str, priority: int) -> Job:
         """Change the place of a queued job. Raises `IllegalTransition` where it is not queued."""
         return self._stores.queue.set_priority(job_id, priority, now())
 
-    def running_job(self, bench_id: str) -> RunningJob | None:
+    def running_job(self, bench_id: str) -> QueueEntry | None:
         """A bench's job that has begun and not ended."""
         return self._stores.queue.running(bench_id)
 
@@ -114,14 +115,14 @@ class JobService:
             raise NotFound("truth of job", job_id, f"the process that drives bench {job.bench} knows it")
         return self._driver.truth(job.unit, job.seed)
 
-    def _new_job(self, request: JobRequest, plan: Plan) -> Job:
+    def _new_job(self, request: JobRequest, plan: Plan, requested_by: str) -> Job:
         bench, created_at = plan.context.bench, now()
         seed = request.seed if request.seed is not None else SEEDS.getrandbits(48)
-        return Job(
+        return copied(
+            Job,
+            request,
             id=new_id(),
-            procedure=plan.procedure.name,
             procedure_version=plan.procedure.version,
-            unit=request.unit,
             bench=bench.id,
             state=JobState.QUEUED,
             created_at=created_at,
@@ -134,10 +135,6 @@ class JobService:
             code_version=self._code_version,
             simulated=bench.simulated,
             seed=seed if bench.simulated else None,
-            priority=request.priority,
-            labels=request.labels,
-            deadline_at=request.deadline_at,
-            retries=request.retries,
             retries_left=request.retries,
-            reservation=request.reservation,
+            requested_by=requested_by,
         )

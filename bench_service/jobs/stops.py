@@ -1,44 +1,135 @@
-"""The software stop of a bench, and its release: what a client asks for, wherever the bench's worker is."""
+"""The software stop of a bench, and its release: what a client asks for, wherever the bench's worker is.
+
+A stop goes first to the bench itself, by the stop channel of its host or by its supervisor's listener, and then into
+the books. The former needs no database; the latter follows when it can.
+"""
 
 from collections.abc import Callable
-from contextlib import suppress
+from concurrent.futures import Future
+from dataclasses import dataclass
 
 from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.safety import Safety, SafetyService
+from bench_service.bench.stop.road import StopRoads
+from bench_service.bench.stop.word import StopWord
+from bench_service.jobs.stop_entry import StopEntry
+from bench_service.jobs.stop_ledger import StopLedger
 from bench_service.jobs.stores import JobStores
-from bench_service.model.errors import IllegalTransition, NotUnderstood
+from bench_service.model.errors import NotFound, ServiceError, SeveralStops
 from bench_service.model.records import BenchStop
-from bench_service.wall_clock import now
+from bench_service.telemetry.audit import AuditTrail
+from bench_service.wall_clock import monotonic_s, now
+
+BOOKS_S = 1.0
+"""How long the answer to a stop waits for the books, from the moment at which it was asked for [s]."""
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """The outcome of a stop."""
+
+    stop: BenchStop
+    job: str | None
+    """Id of the job that was running, which is being cancelled, as far as known."""
+    safety: Safety
+    """What is known of the bench's safety shortly after the stop."""
+    books: str = ""
+    """Why the database does not have the stop yet; empty: it has."""
 
 
 class StopService:
     """Stops benches and releases them."""
 
     def __init__(
-        self, stores: JobStores, benches: BenchDirectory, safety: SafetyService, wake: Callable[[], None]
+        self,
+        stores: JobStores,
+        benches: BenchDirectory,
+        safety: SafetyService,
+        wake: Callable[[str], None],
+        roads: StopRoads,
+        trail: AuditTrail,
     ) -> None:
-        """`wake`: has this process's dispatcher look at its queue."""
+        """`wake`: has the dispatcher of a bench look at its queue, where it is within reach."""
         self._stores = stores
         self._benches = benches
         self._safety = safety
         self._wake = wake
+        self._roads = roads
+        self._entry = StopEntry(stores.benches, stores.queue, stores.jobs, trail)
+        self._ledger = StopLedger(self._enter)
 
-    def stop(self, bench_id: str, reason: str) -> tuple[str | None, Safety]:
-        """Stop what the bench is doing, wherever its worker is, until it is released; the id of the job that was
-        running, if any, and what is known of the bench's safety then. Jobs in the queue wait.
+    def stop(self, bench_id: str, reason: str, by: str, via: str = "http", patient: bool = True) -> Stopped:
+        """Stop what the bench is doing, wherever its worker is, until this stop is released. Jobs in the queue wait.
+
+        `by`: who stops it; `via`: over which way. It waits for the bench and for the books, for a second each at the
+        most, and neither waits for the other; where it is not `patient`, for neither. Raises `NotFound` for a bench
+        that nobody knows.
+        """
+        books_by_s = monotonic_s() + (BOOKS_S if patient else 0.0)
+        word = StopWord(reason, by, via)
+        road = self._roads.to(bench_id)
+        found = None if road is None else road.ask(word)
+        entering = self._ledger.enter(bench_id, word)
+        if road is not None and road.here:
+            safety = self._safety.stopping(bench_id, patient)
+            job, books = self._entered(entering, books_by_s - monotonic_s())
+            job = job or (safety.devices.job if safety.devices is not None and safety.worker is not None else None)
+        else:
+            job, books = self._entered(entering, books_by_s - monotonic_s())
+            safety = found or (
+                self._safety.stopping_elsewhere(bench_id) if not books else self._roads.unreached(bench_id)
+            )
+        return Stopped(BenchStop(bench_id, word.at, reason, by=by, id=word.id), job, safety, books)
+
+    def _enter(self, bench_id: str, word: StopWord) -> str | None:
+        self._benches.description(bench_id)
+        job = self._entry.enter(bench_id, word)
+        channel = self._roads.channel(bench_id)
+        if channel is not None:
+            channel.mark_booked([word.id])
+        return job
+
+    def _entered(self, entering: "Future[str | None]", within_s: float) -> tuple[str | None, str]:
+        """The job that a stop ended, and why the books do not have it yet. Raises `NotFound`."""
+        try:
+            return entering.result(max(within_s, 0.0)), ""
+        except NotFound:
+            raise
+        except TimeoutError:
+            return None, self._ledger.failure or "the database has not answered yet"
+        except ServiceError as error:
+            return None, str(error)
+
+    def release(self, bench_id: str, stop_id: str, by: str, remark: str) -> BenchStop:
+        """Release one stop. The bench works again, and the jobs in its queue go on, once no stop stands.
+
+        `by`: who releases it. Raises `NotFound`, `NotSafe` while the devices are not known to be safe, and
+        `IllegalTransition` where another person released it before.
         """
         self._benches.description(bench_id)
-        self._stores.benches.stop_bench(BenchStop(bench_id, now(), reason))
-        running = self._stores.queue.running(bench_id)
-        if running is not None:
-            with suppress(IllegalTransition, NotUnderstood):  # it has ended this moment; or nobody here can read it
-                self._stores.jobs.request_cancel(running.id, now())
-        return None if running is None else running.id, self._safety.stopping(bench_id)
-
-    def release(self, bench_id: str) -> None:
-        """Let a stopped bench work again; the jobs in its queue go on. Raises `NotSafe` while it is not safe."""
-        self._benches.description(bench_id)
-        if self._stores.benches.bench_stop(bench_id) is not None:
+        if any(stop.id == stop_id for stop in self._stores.benches.standing_stops(bench_id)):
             self._safety.require(bench_id)
-            self._stores.benches.release_bench(bench_id)
-        self._wake()
+        released = self._stores.benches.release_stop(bench_id, stop_id, now(), by, remark)
+        channel = self._roads.channel(bench_id)
+        if channel is not None:
+            channel.clear([stop_id])
+        self._wake(bench_id)
+        return released
+
+    def release_only(self, bench_id: str, by: str, remark: str) -> None:
+        """Release the only stop that stands; nothing where none does.
+
+        Raises `SeveralStops` where more than one stands, and what `release` raises.
+        """
+        self._benches.description(bench_id)
+        standing = self._stores.benches.standing_stops(bench_id)
+        if len(standing) > 1:
+            raise SeveralStops(bench_id, [(stop.id, _described(stop)) for stop in standing])
+        if standing:
+            self.release(bench_id, standing[0].id, by, remark)
+        else:
+            self._wake(bench_id)
+
+
+def _described(stop: BenchStop) -> str:
+    return f"{stop.at.isoformat(timespec='seconds')}{' by ' + stop.by if stop.by else ''}: {stop.reason}"

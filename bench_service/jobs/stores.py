@@ -70,10 +70,6 @@ class JobStore(Protocol):
         """Note that recordings up to and including `station` (index) are complete; idempotent."""
         ...
 
-    def set_context(self, job_id: str, context: dict[str, Any]) -> Job:
-        """Replace what was known at submission by what is known at the start."""
-        ...
-
     def request_cancel(self, job_id: str, at: datetime) -> Job:
         """A queued job is cancelled at once, a running one soon; `NotUnderstood` is raised after that.
 

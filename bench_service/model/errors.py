@@ -10,12 +10,15 @@ ServiceError
 ├── NotDriving           this process drives no bench
 ├── NotReady             a job could not start here now
 ├── NotSafe              the bench's devices are not known to be safe
+├── SeveralStops         a release must name one of the stops that stand
 ├── AlreadyReserved      somebody keeps this bench or unit
+├── Overloaded           too much is asked for at one time
 ├── NotUnderstood        a job was stored by a version whose words this one does not know
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
-    └── DamagedRecording  what is stored of a recording is not what was written
+    ├── DamagedRecording  what is stored of a recording is not what was written
+    └── UnfitValue        a value cannot be stored, now or later
 """
 
 from collections.abc import Sequence
@@ -56,6 +59,10 @@ class BenchBusy(ServiceError):
         self.passing = passing
 
 
+class Overloaded(ServiceError):
+    """Too much is asked for at one time; the same request may be sent again later."""
+
+
 class Misconfigured(ServiceError):
     """A file that the settings name cannot be used."""
 
@@ -74,6 +81,18 @@ class NotReady(ServiceError):
 
 class NotSafe(ServiceError):
     """The bench's devices are not known to be safe."""
+
+
+class SeveralStops(ServiceError):
+    """A release must name one of the stops that stand."""
+
+    def __init__(self, bench: str, stops: Sequence[tuple[str, str]]) -> None:
+        """`stops`: id and description of each."""
+        super().__init__(
+            f"{len(stops)} stops of bench {bench!r} stand: release each by its id, POST "
+            f"/api/v1/benches/{bench}/stops/{{stop_id}}/release"
+        )
+        self.stops = tuple(stops)
 
 
 class AlreadyReserved(ServiceError):
@@ -109,3 +128,7 @@ class StorageFailure(ServiceError):
 
 class DamagedRecording(StorageFailure):
     """What is stored of a recording is not what was written."""
+
+
+class UnfitValue(StorageFailure):
+    """A value that the database cannot store, or not give back: to try again changes nothing."""

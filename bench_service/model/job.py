@@ -1,10 +1,11 @@
 """A job: one execution of a procedure on one unit on one bench, and the states it may pass through."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
 from typing import Any
 
+from bench_service.model.request import JobTerms
 from procedures.bench.errors import (
     BenchError,
     DeviceBusy,
@@ -75,14 +76,12 @@ class Failure:
     station: int | None = None
 
 
-@dataclass(frozen=True)
-class Job:
+@dataclass(frozen=True, kw_only=True)
+class Job(JobTerms):
     """One job as it is stored. Times are UTC; `stations_done` counts recordings sealed so far."""
 
     id: str
-    procedure: str
     procedure_version: str
-    unit: str
     bench: str
     state: JobState
     created_at: datetime
@@ -97,28 +96,17 @@ class Job:
     """Predicted bench time."""
     code_version: str
     simulated: bool
-    seed: int | None = None
-    """Of the simulated world; None on a real bench."""
-    priority: int = 10
-    """Smaller runs first."""
-    labels: dict[str, str] = field(default_factory=dict[str, str])
     verdict: Verdict | None = None
     stations_done: int = 0
     cancel_requested: bool = False
     pause_requested: bool = False
     attempt: int = 1
     """How often it was queued: once, and again at each resume."""
-    deadline_at: datetime | None = None
-    """No station begins later; the job then fails."""
     queued_at: datetime | None = None
     """When it came into its bench's queue, the last time."""
     not_before: datetime | None = None
     """It waits in the queue until then: the pause before an automatic retry."""
-    retries: int = 0
-    """How often a fault of the bench may be answered by trying again from the station that failed."""
     retries_left: int = 0
-    reservation: str | None = None
-    """The reservation under which it runs; None: it waits while its bench or unit is reserved."""
     requested_by: str = ""
     """Who asked for it, as far as the client said."""
     prompt: dict[str, Any] | None = None

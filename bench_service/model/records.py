@@ -1,5 +1,6 @@
 """What is remembered, as values: recordings, results, calibrations, and the pages and keys around them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
@@ -8,6 +9,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from bench_service.model.quantities import Quantity
+from bench_service.wall_clock import new_id
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import Channel, RecordingInfo, Station
@@ -77,7 +79,7 @@ class NewRecording:
 
 @dataclass(frozen=True)
 class BenchStop:
-    """A software stop of a bench, until a person releases it."""
+    """A software stop of a bench: it stands until a person releases it. Several of a bench may stand at once."""
 
     bench: str
     at: datetime
@@ -86,6 +88,30 @@ class BenchStop:
     """When somebody on the bench's host saw the devices safe, since; None: nobody has confirmed it."""
     safe_by: str = ""
     """By whom they were last commanded then."""
+    by: str = ""
+    """Who stopped the bench: a person, as far as known, or the process that could not make it safe."""
+    id: str = field(default_factory=new_id)
+    released_at: datetime | None = None
+    """When it was released; None: it stands."""
+    released_by: str = ""
+    remark: str = ""
+    """Remark of the person who released it."""
+
+    @property
+    def stands(self) -> bool:
+        """Whether nobody has released it yet."""
+        return self.released_at is None
+
+
+SHOWN_STOPS = 3
+"""So many reasons of stops are told in a sentence; the list of stops has all of them."""
+
+
+def reasons_of(stops: Sequence[BenchStop]) -> str:
+    """Why a bench is stopped, in a sentence, whoever stopped it."""
+    reasons = list(dict.fromkeys(stop.reason for stop in stops))
+    more = f" (and {len(reasons) - SHOWN_STOPS} more reasons)" if len(reasons) > SHOWN_STOPS else ""
+    return "; ".join(reasons[:SHOWN_STOPS]) + more
 
 
 @dataclass(frozen=True)

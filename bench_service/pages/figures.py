@@ -4,16 +4,21 @@ Margins are fixed and logarithmic axes have their labels and fine grid from here
 what takes matplotlib most of its time, and a static run has twenty plots.
 """
 
+import logging
 from functools import lru_cache
 from io import StringIO
 from math import ceil, floor, log10
+from threading import Lock
 from typing import TYPE_CHECKING
 
+from bench_service.evidence.work_processes import WorkProcesses
+from bench_service.model.errors import Overloaded, StorageFailure
 from procedures.core.report import Figure, Series
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+log = logging.getLogger(__name__)
 SIZE_IN = (7.2, 3.4)
 MARGINS = {"left": 0.12, "right": 0.985, "bottom": 0.15, "top": 0.97}
 COLOURS = ("#1f5fa8", "#c2410c", "#15803d", "#7c3aed", "#a16207", "#0e7490")
@@ -23,19 +28,50 @@ MOST_DECADES = 12
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
+SMALLEST = Figure("", "", "", (Series("", (0.0, 1.0), (0.0, 1.0)),))
+_elsewhere: list[WorkProcesses] = []
+"""The process that draws, where it is not this one."""
+
+
 def warm_up() -> None:
-    """Load matplotlib, so that nobody waits for it at the first plot."""
-    svg(Figure("", "", "", (Series("", (0.0, 1.0), (0.0, 1.0)),)))
+    """Load matplotlib where it draws, so that nobody waits for it at the first plot."""
+    svg(SMALLEST)
+
+
+def draw_in(processes: WorkProcesses | None) -> None:
+    """From now on draw in another process; None: in this one."""
+    _elsewhere[:] = [] if processes is None else [processes]
+
+
+SALT = "bench"
+"""Of the names inside a drawing: drawn again, a figure is the same to the byte."""
+_DRAWING = Lock()
+"""matplotlib's settings are global: two drawings at once would take each other's."""
 
 
 @lru_cache(maxsize=200)
 def svg(figure: Figure) -> str:
-    """The figure as an inline `<svg>` element; drawn once, because a result never changes."""
+    """The figure as an SVG document; drawn once, because a result never changes."""
+    for processes in _elsewhere:
+        try:
+            return processes.result("svg", figure)
+        except (Overloaded, StorageFailure) as error:
+            log.warning("a figure is drawn in this process: %s", error)
+    return drawn_here(figure)
+
+
+def drawn_here(figure: Figure) -> str:
+    """The figure as an SVG document, drawn by this process."""
+    with _DRAWING:
+        return _drawn(figure)
+
+
+def _drawn(figure: Figure) -> str:
     from matplotlib import rc_context
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure as Canvas
 
-    with rc_context({"svg.fonttype": "none", "font.size": 9, "axes.formatter.useoffset": False}):
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": SALT, "font.size": 9, "axes.formatter.useoffset": False}):
         canvas = Canvas(figsize=SIZE_IN)
         canvas.subplots_adjust(**MARGINS)
         FigureCanvasSVG(canvas)

@@ -1,36 +1,23 @@
 """The pages: what the bench is doing, a job, a result, a unit."""
 
-from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
-from fastapi.templating import Jinja2Templates
 
 from bench_service.model.job import FINAL, Job, JobState
+from bench_service.model.records import StoredResult
 from bench_service.pages.corrections import correction_table
-from bench_service.pages.figures import svg
+from bench_service.pages.images import SHELF
+from bench_service.pages.rendering import service_of, templates
 from bench_service.service import BenchService
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import TRIADS
-from procedures.core.report import Figure, Report
+from procedures.core.report import Figure
 from procedures.core.unit import Unit
 from procedures.core.units import DISPLAY, NOISE_DISPLAY
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
-templates = Jinja2Templates(Path(__file__).parent / "templates")
-
-
-def number(value: Any) -> str:
-    """A cell as a reader wants it: six significant digits, a dash for what is absent."""
-    if value is None:
-        return "–"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-templates.env.filters["number"] = number
 
 _VERBS = {
     JobState.QUEUED: (("pause", "Pause"), ("cancel", "Cancel")),
@@ -41,21 +28,23 @@ _VERBS = {
 """What a person can do to a job, by its state."""
 
 
-def service_of(request: Request) -> BenchService:
-    """What the application was made for."""
-    return request.app.state.service
-
-
 def _page(request: Request, name: str, **context: Any) -> HTMLResponse:
     return templates.TemplateResponse(request, name, context)
 
 
-def _sections(report: Report) -> list[dict[str, Any]]:
-    """Tables as they are, figures with their drawing."""
-    return [
-        {"figure": section, "svg": svg(section)} if isinstance(section, Figure) else {"table": section}
-        for section in report.sections
-    ]
+def _reported(service: BenchService, result: StoredResult) -> dict[str, Any]:
+    """A result with its report: tables as they are, figures with the address of their image."""
+    report = service.catalogue.report(result)
+    sections: list[dict[str, Any]] = []
+    number = 0
+    for section in report.sections:
+        if isinstance(section, Figure):
+            number += 1
+            version = SHELF.put(section, service.code_version)
+            sections.append({"figure": section, "image": f"/results/{result.id}/figures/{number}.svg?v={version}"})
+        else:
+            sections.append({"table": section})
+    return {"result": result, "report": report, "sections": sections}
 
 
 def _noise_rows(unit: Unit) -> list[list[str]]:
@@ -108,7 +97,7 @@ def home(request: Request) -> HTMLResponse:
                 "bench": service.benches.description(bench_id),
                 "running": service.jobs.running_job(bench_id),
                 "safety": service.safety.known(bench_id),
-                "stop": service.stores.benches.bench_stop(bench_id),
+                "stops": service.stores.benches.standing_stops(bench_id),
                 "driven": service.benches.driven(bench_id),
                 "queued": queued.get(bench_id, 0),
             }
@@ -117,6 +106,15 @@ def home(request: Request) -> HTMLResponse:
         jobs=service.stores.jobs.list(limit=50).items,
         units=service.stores.units.units(),
     )
+
+
+@router.get("/benches/{bench_id}/stops")
+def stops_page(bench_id: str, request: Request, after: str | None = None) -> HTMLResponse:
+    """The stops of a bench, newest first: who stopped it and why, who released it with which remark."""
+    service = service_of(request)
+    service.benches.description(bench_id)
+    page = service.stores.benches.stops(bench_id, after=after)
+    return _page(request, "stops.html", bench=bench_id, stops=page.items, next=page.next)
 
 
 @router.get("/jobs/{job_id}")
@@ -140,9 +138,7 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
         live=live,
         fraction=job.stations_done / stations if live is None else live.fraction,
         recordings=service.stores.recordings.of_job(job_id),
-        result=result,
-        sections=_sections(service.catalogue.report(result)) if result else [],
-        report=service.catalogue.report(result) if result else None,
+        **(_reported(service, result) if result else {"result": None}),
     )
 
 
@@ -150,9 +146,7 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
 def result_page(result_id: str, request: Request) -> HTMLResponse:
     """A result: verdict, checks, tables, plots, lineage."""
     service = service_of(request)
-    result = service.stores.results.get(result_id)
-    report = service.catalogue.report(result)
-    return _page(request, "result.html", result=result, report=report, sections=_sections(report))
+    return _page(request, "result.html", **_reported(service, service.stores.results.get(result_id)))
 
 
 @router.get("/units/{serial}")

@@ -13,6 +13,7 @@ from sqlalchemy.orm import Session
 from bench_service.campaigns.campaign import Campaign
 from bench_service.campaigns.run import CampaignRun
 from bench_service.campaigns.schedule import Schedule
+from bench_service.mapping import copied
 from bench_service.model.errors import NameTaken, NotFound
 from bench_service.model.job import FINAL, JobState
 from bench_service.model.records import Idempotency, Page
@@ -194,16 +195,12 @@ def _run(row: CampaignRunRow) -> CampaignRun:
 
 
 def _row_of_run(run: CampaignRun) -> CampaignRunRow:
-    return CampaignRunRow(
-        id=run.id,
+    return copied(
+        CampaignRunRow,
+        run,
         campaign=run.campaign.name,
-        unit=run.unit,
-        bench=run.bench,
         state=run.state.value,
         verdict=None if run.verdict is None else run.verdict.value,
-        created_at=run.created_at,
-        finished_at=run.finished_at,
-        schedule_id=run.schedule_id,
         document=RUN.dump_python(run, mode="json"),
     )
 
@@ -220,12 +217,4 @@ def _schedule(row: ScheduleRow) -> Schedule:
 
 
 def _row_of_schedule(schedule: Schedule) -> ScheduleRow:
-    return ScheduleRow(
-        id=schedule.id,
-        campaign=schedule.campaign,
-        enabled=schedule.enabled,
-        created_at=schedule.created_at,
-        next_at=schedule.next_at,
-        last_at=schedule.last_at,
-        document=SCHEDULE.dump_python(schedule, mode="json"),
-    )
+    return copied(ScheduleRow, schedule, document=SCHEDULE.dump_python(schedule, mode="json"))

@@ -16,13 +16,13 @@ from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
-from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError, SQLAlchemyError
+from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError, SQLAlchemyError, StatementError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import QueuePool
 
 from bench_service import wall_clock
 from bench_service.formats.plain_json import read_back
-from bench_service.model.errors import StorageFailure, StorageFull
+from bench_service.model.errors import StorageFailure, StorageFull, UnfitValue
 
 BUSY_S = 30.0
 """How long a writer waits for another one."""
@@ -193,12 +193,14 @@ def storage_errors() -> Generator[None, None, None]:
         if is_full(error.orig):
             raise StorageFull("the database cannot grow: the disk is full") from error
         raise StorageFailure(f"the database failed: {error.orig}") from error
+    except StatementError as error:  # raised before the database is asked: the value has no form there
+        raise UnfitValue(f"a value cannot be stored: {error.orig}") from error
     except SQLAlchemyError as error:
         raise StorageFailure(f"the database failed: {error}") from error
     except sqlite3.Error as error:
         raise StorageFailure(f"the database failed: {error}") from error
     except (ValueError, OverflowError) as error:
-        raise StorageFailure(f"a value cannot be stored, or not be read again: {error}") from error
+        raise UnfitValue(f"a value cannot be stored, or not be read again: {error}") from error
 
 
 def as_storage_error(error: Exception) -> Exception:

@@ -27,10 +27,10 @@ DURATION_S = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 
 class Ending:
     """A job that has ended."""
 
-    job_id: str
+    id: str
     procedure: str
     state: str
-    verdict: str
+    verdict: str | None
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime
@@ -103,7 +103,7 @@ class Tallies:
             while page := self.store.endings(since, after, PAGE):
                 for ending in page:
                     self._count(ending)
-                since, after = page[-1].finished_at, page[-1].job_id
+                since, after = page[-1].finished_at, page[-1].id
             if self._newest is not None:
                 self._newest = min(self._newest, at)
                 self._recent = {k: None for k in self._recent if k[1] >= self._newest - OVERLAP}
@@ -113,12 +113,12 @@ class Tallies:
                 self._recorded_at_s = monotonic_s()
 
     def _count(self, ending: Ending) -> None:
-        key = (ending.job_id, ending.finished_at)
+        key = (ending.id, ending.finished_at)
         if key in self._recent:
             return
         self._recent[key] = None
         self._newest = ending.finished_at if self._newest is None else max(self._newest, ending.finished_at)
-        self.finished[ending.procedure, ending.state, ending.verdict] += 1
+        self.finished[ending.procedure, ending.state, ending.verdict or ""] += 1
         self._ended_stations += ending.stations_done
         if ending.started_at is not None:
             duration_s = (ending.finished_at - ending.started_at).total_seconds()

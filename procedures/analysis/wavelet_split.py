@@ -92,7 +92,8 @@ def wavelet_split(
         details = np.asarray(parts[-j], dtype=np.float64)
         noise = _noise(details) if unit_size is None else unit_size
         threshold = noise * heursure(details / noise) if noise > 0.0 else 0.0
-        parts[-j] = pywt.threshold(details, threshold, "soft")
+        if threshold > 0.0:  # pywt divides by the size of a detail: one that is zero would come out as no number
+            parts[-j] = pywt.threshold(details, threshold, "soft")
         zero = float(np.mean(np.abs(details) <= threshold))
         done.append(Level(j, 2.0 ** (j - 1) * cell_s, 2.0**j * cell_s, len(details), noise, threshold, zero))
     kept = np.asarray(pywt.waverec(parts, wavelet, mode=EDGES), dtype=np.float64)[: len(cells)] + mean
@@ -103,6 +104,11 @@ def wavelet_split(
 def shortest_s(levels: int, cell_s: float, wavelet: str = "sym8") -> float:
     """The shortest series [s] that can be split into so many levels: ``2^levels·(filter − 1)`` cells (PyWavelets)."""
     return (_filter_length(wavelet) - 1) * 2**levels * cell_s
+
+
+def most_levels(cells: int, wavelet: str = "sym8") -> int:
+    """Levels into which a series of so many cells can be split at most; 0: it is too short for any."""
+    return int(pywt.dwt_max_level(cells, _filter_length(wavelet)))
 
 
 def heursure(details: Array) -> float:
@@ -136,7 +142,7 @@ def _checked(cells: Array, cell_s: float, rule: Rule, unit_size: float | None, w
     length = _filter_length(wavelet)
     if cells.ndim != 1 or not np.all(np.isfinite(cells)):
         raise UnfitRecording("a wavelet split takes one series of finite values")
-    most = pywt.dwt_max_level(cells.size, length)
+    most = most_levels(cells.size, wavelet)
     if not 1 <= levels <= most:
         raise BadParameter("levels", levels, f"1 to {most}, for {cells.size} cells and {wavelet}")
     return length

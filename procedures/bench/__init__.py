@@ -1,6 +1,6 @@
 """PORTS: what a bench must be able to do. A driver or a simulator implements them; a procedure sees only these."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from procedures.bench.chamber import Chamber
@@ -14,6 +14,7 @@ from procedures.bench.supply import Supply
 from procedures.bench.turntable import Turntable
 
 __all__ = [
+    "SAFE_ORDER",
     "Bench",
     "BenchDescription",
     "BenchNeeds",
@@ -25,6 +26,9 @@ __all__ = [
     "Supply",
     "Turntable",
 ]
+
+SAFE_ORDER = ("turntable", "chamber", "current_source", "supply")
+"""The order in which devices are made safe: what moves first, what only wastes energy last. Written here alone."""
 
 
 @dataclass
@@ -39,7 +43,6 @@ class Bench:
     chamber: Chamber | None = None
     operator: Operator | None = None
     current_source: CurrentSource | None = None
-    _devices: tuple[str, ...] = field(default=("turntable", "chamber", "current_source", "supply"), repr=False)
 
     async def make_safe(self) -> None:
         """Stop the table, lead the chamber to ambient, take the current away, switch the unit off.
@@ -47,7 +50,7 @@ class Bench:
         Every device is tried; raises an `ExceptionGroup` of what failed.
         """
         failures: list[Exception] = []
-        for device in self._devices:
+        for device in SAFE_ORDER:
             try:
                 if (there := getattr(self, device)) is not None:
                     await there.make_safe()

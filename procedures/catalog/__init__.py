@@ -1,18 +1,16 @@
 """ONE FILE = ONE PROCEDURE. A file put here is found, listed by the service with its schema, and tested for form."""
 
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import Any
 
+from procedures.discovery import Discovered, discovered
 from procedures.procedure import Procedure
 
 
+def find() -> Discovered[Procedure[Any, Any]]:
+    """Every PROCEDURE of this folder by name, and the files that give none, with the reason."""
+    return discovered(__name__, __path__, "PROCEDURE", Procedure)
+
+
 def discover() -> dict[str, Procedure[Any, Any]]:
-    """Every PROCEDURE of this folder by name. The name is the file's; a mismatch is a programming error."""
-    found: dict[str, Procedure[Any, Any]] = {}
-    for module in iter_modules(__path__):
-        entry: Procedure[Any, Any] = import_module(f"{__name__}.{module.name}").PROCEDURE
-        if entry.name != module.name:
-            raise ValueError(f"{__name__}.{module.name}: PROCEDURE.name is {entry.name!r}, not the file's name")
-        found[entry.name] = entry
-    return found
+    """Every PROCEDURE of this folder by name, which is the file's. Raises what is wrong with the first broken file."""
+    return find().complete()

@@ -34,6 +34,7 @@ from procedures.analysis.calibration.triad_analysis import AccelerometerSettings
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
+from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import BadParameter, Undetermined
 from procedures.core.frames import orientation_beta_gamma, orientation_gamma_beta
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
@@ -220,9 +221,10 @@ def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
     parts, unit = predicted_parts(plan), INPUT_UNITS[plan.triad]
     if parts is None:
         return []
+    rows = [(name, coefficient_unit(name, unit, unit)) for name in COEFFICIENT_NAMES]
     return [
-        PredictedUncertainty(f"{plan.triad}.{name}", coefficient_unit(name, unit, unit), float(np.hypot(n, t)), n, t)
-        for name, n, t in zip(COEFFICIENT_NAMES, parts[0].tolist(), parts[1].tolist(), strict=True)
+        PredictedUncertainty(CoefficientName(plan.triad, name), of, float(np.hypot(n, t)), n, t)
+        for (name, of), n, t in zip(rows, parts[0].tolist(), parts[1].tolist(), strict=True)
     ]
 
 

@@ -6,7 +6,7 @@ compensation. A soak is over when the converter's own sensor says so. Currents, 
 """
 
 from collections.abc import AsyncIterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import Field
@@ -24,7 +24,7 @@ from procedures.core.recording import AXES, Recording, Station
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
 from procedures.core.unit_correction import UnitCorrection
-from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
+from procedures.procedure import STATIONS, Context, Outcome, Parameters, Prediction, Procedure
 
 TEMPERATURES_C = tuple(float(t) for t in range(-40, 61, 10))
 
@@ -271,4 +271,5 @@ PROCEDURE = Procedure(
     analyse,
     report,
     corrections=corrections,
+    inspection=lambda _: replace(STATIONS, temperatures=True),
 )

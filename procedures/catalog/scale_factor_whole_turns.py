@@ -23,6 +23,7 @@ from procedures.analysis.turns.summary import WholeTurns, analyse_turns
 from procedures.bench import Bench, BenchDescription
 from procedures.bench.imu import Stream
 from procedures.core import units
+from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Check, Limit, check, verdict
@@ -125,7 +126,9 @@ def predict(params: Params, context: Context) -> Prediction:
     table = (made.table_per_sd**2).sum(axis=1) ** 0.5
     parts = zip(coefficient_names(params.terms), total.tolist(), noise.tolist(), table.tolist(), strict=True)
     uncertainties = tuple(
-        PredictedUncertainty(f"gyro.{name}", "rad/s" if name.startswith("b_") else "1", sd, of_noise, of_table)
+        PredictedUncertainty(
+            CoefficientName("gyro", name), "rad/s" if name.startswith("b_") else "1", sd, of_noise, of_table
+        )
         for name, sd, of_noise, of_table in parts
     )
     basis = "whole turns; " + (

@@ -13,15 +13,13 @@ from pydantic import Field
 from procedures import steps
 from procedures.analysis.calibration.station_plan import windows
 from procedures.analysis.launch.prediction import predicted_noise, unresolved_noise
-from procedures.analysis.wavelet_split import shortest_s
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
-from procedures.core.errors import BadParameter
 from procedures.core.recording import TRIADS, Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
-from procedures.launches import NoiseParameters, NoiseResult, analyse_launches
+from procedures.launches import LAUNCH, NoiseParameters, NoiseResult, analyse_launches
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 from procedures.reports.launch import noise_report
 
@@ -49,11 +47,7 @@ class Result(NoiseResult):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Nothing depends on unit or bench. Raises `BadParameter` for launches too short for what is asked of them."""
-    least_s = shortest_s(params.wavelet_levels, params.cell_s)
-    if params.wavelet != "none" and params.duration_s < least_s:
-        allowed = f"at least {least_s:g} s for wavelet_levels = {params.wavelet_levels}; or wavelet = none"
-        raise BadParameter("duration_s", params.duration_s, allowed)
+    """Nothing depends on unit or bench."""
     return params
 
 
@@ -88,7 +82,13 @@ def predict(params: Params, context: Context) -> Prediction:
             continue
         for name, noise in zip(names, record.noise, strict=True):
             found += [
-                PredictedUncertainty(f"{name}.{p.process}", p.unit, p.standard_uncertainty, p.standard_uncertainty)
+                PredictedUncertainty(
+                    f"{name}.{p.process}",
+                    p.unit,
+                    p.standard_uncertainty,
+                    p.standard_uncertainty,
+                    quantity=f"{name} {p.process.replace('_', ' ')}",
+                )
                 for p in predicted_noise(name, noise, params.duration_s, params.launches)
             ]
             warnings += unresolved_noise(name, noise, params.duration_s)
@@ -114,8 +114,14 @@ def report(result: Result) -> Report:
 
 def learns(result: Result, unit: Unit, origin: str) -> Unit:
     """The unit with the noise and the averaging time that were found: what later previews and dwells rest on."""
-    noise = {s.channel: s.noise for s in result.channels}
     records: dict[str, TriadRecord | None] = {"gyro": unit.gyro, "accelerometer": unit.accelerometer}
+    known = {
+        name: noise
+        for triad, names in TRIADS.items()
+        if (record := records[triad]) is not None
+        for name, noise in zip(names, record.noise, strict=True)
+    }
+    noise = {s.channel: s.noise_over(known.get(s.channel)) for s in result.channels}
     for triad, (x, y, z) in TRIADS.items():
         if all(name in noise for name in (x, y, z)):
             old = records[triad] or TriadRecord((noise[x], noise[y], noise[z]))
@@ -151,4 +157,5 @@ PROCEDURE = Procedure(
     report,
     learns=learns,
     quantities=quantities,
+    inspection=lambda _: LAUNCH,
 )

@@ -5,6 +5,7 @@ that every dwell was recorded whole: what the means say, an analysis or a person
 """
 
 from collections.abc import AsyncIterator, Sequence
+from dataclasses import replace
 from math import floor
 from typing import Annotated, Literal
 
@@ -23,7 +24,7 @@ from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report, Table
 from procedures.core.table_angles import TableAngles
-from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+from procedures.procedure import STATIONS, Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
 
 SHORTEST_S = 1.0
 """Least recording of a dwell."""
@@ -212,4 +213,5 @@ PROCEDURE = Procedure(
     acquire,
     analyse,
     report,
+    inspection=lambda _: replace(STATIONS, temperatures=True),
 )

@@ -7,6 +7,7 @@ its profile in a figure only.
 """
 
 from collections.abc import AsyncIterator, Sequence
+from dataclasses import replace
 from typing import Literal
 
 from pydantic import Field
@@ -31,7 +32,7 @@ from procedures.core.report import Report
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
 from procedures.core.thermal_correction import Form
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
-from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
+from procedures.procedure import STATIONS, Context, Outcome, Parameters, Prediction, Procedure
 from procedures.reports import thermal_figures, thermal_tables
 
 LEAST_OFF_S = 3.0 * units.HOUR
@@ -295,4 +296,5 @@ PROCEDURE = Procedure(
     uses_calibration=True,
     corrections=corrections,
     uses_corrections=uses_corrections,
+    inspection=lambda _: replace(STATIONS, temperatures=True),
 )

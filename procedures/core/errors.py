@@ -4,7 +4,9 @@ DomainError
 ├── BadParameter    a parameter's value is not allowed: names the field, the value and what is allowed
 ├── Undetermined    the plan or the recordings cannot determine a parameter: names the lost combinations
 ├── UnfitRecording  a recording cannot be analysed as asked: gaps, too short, constant, wrong unit
-└── MissingChannel  a recording lacks a channel that is needed
+├── MissingChannel  a recording lacks a channel that is needed
+├── UnfitResult     a result has a value that cannot be stored: names the field
+└── ProcedureDefect a procedure does not do what its place in the catalogue promises: for its author
 """
 
 from collections.abc import Sequence
@@ -48,3 +50,16 @@ class MissingChannel(DomainError):
         super().__init__(f"the recording has no channel {name!r}; it has {', '.join(present) or 'none'}")
         self.name = name
         self.present = tuple(present)
+
+
+class UnfitResult(DomainError):
+    """A result has a value that cannot be stored, such as a number that is not finite."""
+
+    def __init__(self, field: str, value: object, needed: str) -> None:
+        super().__init__(f"{field} = {value!r}: {needed}")
+        self.field = field
+        self.value = value
+
+
+class ProcedureDefect(DomainError):
+    """A procedure does not do what its place in the catalogue promises; its author must change it."""

@@ -6,7 +6,7 @@ divided by the sample period.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Protocol, TypeVar
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from procedures.core.arrays import Array
-from procedures.core.errors import MissingChannel, UnfitRecording
+from procedures.core.errors import BadParameter, MissingChannel, UnfitRecording
 from procedures.core.table_angles import TableAngles
 from procedures.core.temperature_profile import TemperatureProfile
 from procedures.core.turn import Turn
@@ -190,6 +190,46 @@ class MemoryRecording:
 
     def blocks(self) -> Iterator[RawArray]:
         yield self.raw
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Samples `start` … `stop` (half open) of another recording."""
+
+    info: RecordingInfo
+    whole: Recording
+    start: int
+    stop: int
+
+    def blocks(self) -> Iterator[RawArray]:
+        seen = 0
+        for block in self.whole.blocks():
+            part = block[max(self.start - seen, 0) : max(self.stop - seen, 0)]
+            seen += len(block)
+            if len(part):
+                yield part
+            if seen >= self.stop:
+                return
+
+
+def cut(recording: Recording, start_s: float | None, stop_s: float | None) -> Recording:
+    """A recording from one second of it to another; None: from its beginning, to its end. Its id and hash stay.
+
+    Raises `BadParameter` where nothing lies between them, or where the recording is shorter.
+    """
+    info = recording.info
+    if start_s is None and stop_s is None:
+        return recording
+    allowed = f"within 0 … {info.duration_s:g} s, the length of recording {info.id}"
+    for name, value in (("start_s", start_s), ("stop_s", stop_s)):
+        if value is not None and not 0.0 <= value <= info.duration_s * (1.0 + 1e-9):
+            raise BadParameter(name, value, allowed)
+    start = round((start_s or 0.0) * info.rate_hz)
+    stop = info.count if stop_s is None else min(round(stop_s * info.rate_hz), info.count)
+    if stop <= start:
+        raise BadParameter("stop_s", stop_s, f"later than start_s, {start_s or 0.0:g} s, {allowed}")
+    told = replace(info, count=stop - start, start_s=info.start_s + start / info.rate_hz)
+    return Stretch(told, recording, start, stop)
 
 
 def rates(recording: Recording, names: Sequence[str]) -> Array:

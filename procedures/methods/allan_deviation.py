@@ -7,24 +7,37 @@ confidence from equivalent degrees of freedom. Samples are taken in nominal unit
 from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
 from procedures.analysis.allan.correlated import Uncorrelatable
 from procedures.analysis.allan.deviation import Deviation, DeviationStream
-from procedures.analysis.allan.statistic import STATISTICS, Statistic, log_sizes
+from procedures.analysis.allan.statistic import (
+    STATISTICS,
+    Sizes,
+    Statistic,
+    log_sizes,
+    octave_sizes,
+    one_two_four_sizes,
+)
+from procedures.analysis.fitness.findings import FitnessSettings
+from procedures.analysis.fitness.watched import Inspection
 from procedures.core import units
-from procedures.core.errors import UnfitRecording
+from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import Limit, check, verdict
 from procedures.core.recording import INCREMENTS, Quantity, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
-from procedures.procedure import Evidence, Method, Outcome, Parameters
+from procedures.procedure import Evidence, Method, Outcome, RecordedParameters
+
+MOST = 10_000
+"""Cluster times that are taken of one recording: a curve of more is no curve to be read."""
+Tau = Annotated[float, Field(gt=0.0, le=1e9)]
 
 
-class Params(Parameters):
+class Params(RecordedParameters):
     """Which statistic of which channels."""
 
     statistic: Literal["allan", "overlapping_allan", "modified_allan", "time", "hadamard", "overlapping_hadamard"] = (
@@ -34,6 +47,13 @@ class Params(Parameters):
         None, min_length=1, max_length=64, description="None: every channel but temperatures"
     )
     points: int = Field(100, ge=5, le=1000, description="cluster times, evenly in the logarithm, at the most")
+    taus: (
+        Literal["even", "octave", "decade", "all"] | Annotated[tuple[Tau, ...], Field(min_length=1, max_length=MOST)]
+    ) = Field(
+        "even",
+        description="even: `points` of them; octave: 1, 2, 4 … samples; decade: 1, 2, 4, 10, 20, 40 … samples; all: "
+        "every whole number of samples; or a list [s], each taken as the nearest whole number of samples",
+    )
     confidence: float = Field(0.6827, gt=0.0, lt=1.0, description="of the intervals")
 
 
@@ -130,7 +150,7 @@ def _deviations(
     columns = [info.column(name) for name in names]
     channels = [info.channels[c] for c in columns]
     with _naming(info.id):
-        sizes = log_sizes(statistic.largest(info.count), params.points)
+        sizes = _sizes(params, statistic.largest(info.count), info.rate_hz)
         streams = [
             DeviationStream(
                 info.rate_hz,
@@ -148,6 +168,25 @@ def _deviations(
             with _naming(info.id, channel.name):
                 stream.add(channel.value(np.asarray(block)[:, column].astype(np.float64)))
     return [_finished(stream, info.id, name) for stream, name in zip(streams, names, strict=True)]
+
+
+def _sizes(params: Params, largest: int, rate_hz: float) -> Sizes:
+    """The cluster sizes that are asked for. Raises `BadParameter` naming the times that the recording has."""
+    if isinstance(params.taus, tuple):
+        for tau_s in params.taus:
+            if not 0.5 <= tau_s * rate_hz < largest + 0.5:
+                allowed = (
+                    f"from {1 / rate_hz:g} s, one sample, to {largest / rate_hz:g} s, the longest of this recording"
+                )
+                raise BadParameter("taus", tau_s, allowed)
+        return np.unique(np.round(np.asarray(params.taus) * rate_hz).astype(np.int64))
+    if params.taus == "all" and largest > MOST:
+        allowed = (
+            f"of {largest} cluster times at most {MOST} are taken: ask for octave, decade, a list or a shorter stretch"
+        )
+        raise BadParameter("taus", "all", allowed)
+    every = {"octave": octave_sizes, "decade": one_two_four_sizes, "all": lambda m: np.arange(1, m + 1, dtype=np.int64)}
+    return log_sizes(largest, params.points) if params.taus == "even" else every[params.taus](largest)
 
 
 def _finished(stream: DeviationStream, recording: str, channel: str) -> Deviation:
@@ -185,4 +224,18 @@ def _figure(curve: Curve, name: str, confidence: float) -> Figure:
     return Figure(f"{curve.channel}, {curve.recording}", "τ, s", f"σ, {label}", series, x_log=True, y_log=True)
 
 
-METHOD = Method("allan_deviation", "Allan deviation and its relatives", "1.0.0", Params, Result, analyse, report)
+def inspection(params: Params, count: int) -> Inspection:
+    """Each recording by itself, the channels that are asked for."""
+    return Inspection(FitnessSettings(least_samples=1), params.channels)
+
+
+METHOD = Method(
+    "allan_deviation",
+    "Allan deviation and its relatives",
+    "1.0.0",
+    Params,
+    Result,
+    analyse,
+    report,
+    inspection=inspection,
+)

@@ -6,7 +6,7 @@ neglected, and what that costs is in the uncertainty. Errata of F: `procedures.a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -16,27 +16,29 @@ from procedures.analysis.calibration.misfit import (
     MISFIT_MAX,
     REMARKABLE,
 )
-from procedures.analysis.calibration.reference import INPUT_UNITS, reference_vectors
+from procedures.analysis.calibration.reference import reference_vectors
 from procedures.analysis.calibration.station_means import station_means
 from procedures.analysis.calibration.triad_analysis import noise_of_means
 from procedures.analysis.field.examined import FittedTriad, examined_fit, require_accelerometers
 from procedures.analysis.field.fit import FieldFit, FieldModel, FieldUncertainty
+from procedures.analysis.field.summary import FieldTriad, field_summary
+from procedures.analysis.fitness.watched import Inspection
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Check, Limit, check, verdict
-from procedures.core.recording import Recording
+from procedures.core.recording import ACCELEROMETER, GYRO, Recording
 from procedures.core.report import Report, Table
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
-from procedures.procedure import Evidence, Method, Outcome, Parameters
+from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 
 
-class Params(Parameters):
+class Params(RecordedParameters):
     """Where and how the unit was turned, and how well that is known. Latitude and gravity depend on the place."""
 
     latitude_deg: float = Field(ge=-90.0, le=90.0)
@@ -71,29 +73,6 @@ class Params(Parameters):
     )
 
 
-@dataclass(frozen=True)
-class FieldTriad:
-    """One triad's bias and scale with standard uncertainties, and the base as this triad saw it."""
-
-    calibration: TriadCalibration
-    bias: tuple[float, ...]
-    bias_sd: tuple[float, ...]
-    scale: tuple[float, ...]
-    scale_relative_sd: tuple[float, ...]
-    scale_estimated: bool
-    chi_square: float
-    degrees_of_freedom: int
-    p_value: float | None
-    residuals: tuple[tuple[float, ...], ...]
-    """Per recording, in the output's unit."""
-    misfit: float | None = None
-    """Residuals over what noise and declared uncertainties allow; None where no equation is spare."""
-    worst: str = ""
-    """Position and channel with the greatest residual."""
-    suspected: str = ""
-    """A mistake in the positions that would explain a misfit."""
-
-
 class Result(Outcome):
     """The triads, and the tilt where it was estimated."""
 
@@ -112,10 +91,10 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     require_accelerometers(evidence.recordings)
     positions = _positions(evidence.recordings, params)
     fitted = _accelerometer(evidence.recordings, positions, params, unit)
-    accelerometer, triads = fitted.fit, [_summary(fitted, params, estimated=True)]
+    accelerometer, triads = fitted.fit, [field_summary(fitted, params.cross_coupling_sd, estimated=True)]
     if params.gyro != "none":
         gyro = _gyro(evidence.recordings, positions, params, unit, accelerometer)
-        triads.append(_summary(gyro, params, estimated=params.gyro == "bias_and_scale"))
+        triads.append(field_summary(gyro, params.cross_coupling_sd, params.gyro == "bias_and_scale"))
     checks = tuple(_checks(triads, params))
     estimated = params.tilt != "level"
     sd = np.sqrt(np.diagonal(accelerometer.covariance)[6:]) / units.DEG
@@ -239,26 +218,6 @@ def _fit(
     return examined_fit(what, means, noise, known, model, uncertainty)
 
 
-def _summary(fitted: FittedTriad, params: Params, estimated: bool) -> FieldTriad:
-    fit, means = fitted.fit, fitted.means
-    triad = means.triad
-    return FieldTriad(
-        fit.calibration(triad, means.output_unit, INPUT_UNITS[triad], params.cross_coupling_sd),
-        tuple(fit.bias.tolist()),
-        tuple(np.sqrt(np.diagonal(fit.covariance)[:3]).tolist()),
-        tuple(fit.scale.tolist()),
-        tuple(fit.scale_relative_sd.tolist()),
-        estimated,
-        fit.chi_square,
-        fit.degrees_of_freedom,
-        fit.p_value,
-        tuple(tuple(row) for row in fit.residuals.tolist()),
-        fitted.misfit.ratio,
-        fitted.misfit.worst,
-        fitted.suspected,
-    )
-
-
 def _checks(triads: Sequence[FieldTriad], params: Params) -> list[Check]:
     limit = Limit("1", params.scale_sd_limit, source="ours")
     greatest = max(triads[0].scale_relative_sd)
@@ -297,4 +256,19 @@ def _warnings(triads: Sequence[FieldTriad], accelerometer: FieldFit, params: Par
     return found
 
 
-METHOD = Method("field_calibration", "Field calibration", "1.1.0", Params, Result, analyse, report, calibrations)
+def inspection(params: Params, count: int) -> Inspection:
+    """Positions at rest, of the triads that are calibrated."""
+    return replace(STATIONS, channels=ACCELEROMETER if params.gyro == "none" else GYRO + ACCELEROMETER)
+
+
+METHOD = Method(
+    "field_calibration",
+    "Field calibration",
+    "1.1.0",
+    Params,
+    Result,
+    analyse,
+    report,
+    calibrations,
+    inspection=inspection,
+)

@@ -3,21 +3,22 @@
 Turns about one axis do not determine a matrix of scale factors and misalignments (rank 5 of 9): none is given.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
 from procedures.analysis.calibration.station_means import station_means
+from procedures.analysis.fitness.watched import Inspection
 from procedures.analysis.turns.half_turns import HalfTurns, half_turns, level_rate
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import Check, Limit, check, verdict
-from procedures.core.recording import AXES, Recording
+from procedures.core.recording import AXES, GYRO, Recording
 from procedures.core.report import Report, Table
 from procedures.core.unit import Unit
-from procedures.procedure import Evidence, Method, Outcome, Parameters
+from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
 
 CONFIDENCE = 0.999
 """Of the interval within which the rate must agree with the latitude's: fails by chance once in a thousand."""
@@ -25,7 +26,7 @@ WANDERS = 2.0
 """Scatter of the pairs over that of the noise within the dwells, beyond which the bias wanders."""
 
 
-class Params(Parameters):
+class Params(RecordedParameters):
     """How the unit was turned, and where."""
 
     up: Literal["x", "y", "z"] = Field("y", description="axis of the unit that points upwards; it is turned about it")
@@ -168,4 +169,18 @@ def _warnings(found: HalfTurns, level: list[int]) -> tuple[str, ...]:
     return (*wandering, "turns about one axis do not determine scale factors and misalignments: none are given")
 
 
-METHOD = Method("gyro_half_turns", "Gyros alone, by half turns", "1.0.0", Params, Result, analyse, report)
+def inspection(_params: Params, _count: int) -> Inspection:
+    """Headings at rest beside one another, the gyros alone."""
+    return replace(STATIONS, channels=GYRO)
+
+
+METHOD = Method(
+    "gyro_half_turns",
+    "Gyros alone, by half turns",
+    "1.0.0",
+    Params,
+    Result,
+    analyse,
+    report,
+    inspection=inspection,
+)

@@ -25,11 +25,11 @@ from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, Undetermined, UnfitRecording
 from procedures.core.imu_model import TriadCalibration, correct
 from procedures.core.limits import Check, Limit, check, verdict
-from procedures.core.recording import RecordingInfo
+from procedures.core.recording import ACCELEROMETER, GYRO, RecordingInfo
 from procedures.core.report import Report, Table
 from procedures.core.site import Site
 from procedures.core.unit import Unit
-from procedures.procedure import Evidence, Method, Outcome, Parameters
+from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
 
 TRIADS = ("accelerometer", "gyro")
 LIKELY = 4.0
@@ -37,7 +37,7 @@ LIKELY = 4.0
 the calibration or the uncertainty is wrong: one in 16 000 by chance."""
 
 
-class Params(Parameters):
+class Params(RecordedParameters):
     """Where the unit rested; neither latitude nor gravity has a default, they depend on the place."""
 
     latitude_deg: float = Field(ge=-90.0, le=90.0)
@@ -236,4 +236,5 @@ METHOD = Method(
     Result,
     analyse,
     report,
+    inspection=lambda _params, _count: replace(STATIONS, channels=GYRO + ACCELEROMETER),
 )

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
+from procedures.analysis.fitness.findings import FitnessSettings
+from procedures.analysis.fitness.watched import Inspection
 from procedures.analysis.least_squares.chi_square import tail_probability
 from procedures.analysis.recursive_bias import window_noise
 from procedures.analysis.recursive_bias.kalman import RecursiveBias, white_covariance
@@ -21,12 +23,12 @@ from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import ACCELEROMETER, GYRO, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
-from procedures.procedure import Evidence, Method, Outcome, Parameters
+from procedures.procedure import Evidence, Method, Outcome, RecordedParameters
 
 P_VALUE_MIN = 0.001
 
 
-class Params(Parameters):
+class Params(RecordedParameters):
     """Which channels, what is known beforehand, and how sure is sure enough."""
 
     channels: tuple[str, ...] | None = Field(None, min_length=1, max_length=64, description="None: both triads")
@@ -210,4 +212,18 @@ def _warnings(biases: Sequence[ChannelBias]) -> list[str]:
     return found
 
 
-METHOD = Method("kalman_calibration", "Kalman calibration of a constant bias", "1.1.0", Params, Result, analyse, report)
+def inspection(params: Params, count: int) -> Inspection:
+    """Each recording by itself, the channels that are asked for."""
+    return Inspection(FitnessSettings(least_samples=1, counters_may_rest=True), params.channels or GYRO + ACCELEROMETER)
+
+
+METHOD = Method(
+    "kalman_calibration",
+    "Kalman calibration of a constant bias",
+    "1.1.0",
+    Params,
+    Result,
+    analyse,
+    report,
+    inspection=inspection,
+)

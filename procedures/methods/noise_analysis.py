@@ -5,12 +5,12 @@ Channels may be angle or velocity increments, rates or specific forces, in SI or
 
 from procedures.core.report import Report
 from procedures.core.unit import Unit
-from procedures.launches import NoiseParameters, NoiseResult, analyse_launches
-from procedures.procedure import Evidence, Method
+from procedures.launches import LAUNCH, NoiseParameters, NoiseResult, analyse_launches
+from procedures.procedure import Evidence, Method, RecordedParameters
 from procedures.reports.launch import noise_report
 
 
-class Params(NoiseParameters):
+class Params(RecordedParameters, NoiseParameters):
     """How to analyse, and what to hold the noise to."""
 
 
@@ -28,4 +28,13 @@ def report(result: Result) -> Report:
     return noise_report(result.launches, result.channels, result.averaging_time_s)
 
 
-METHOD = Method("noise_analysis", "Noise of recordings at rest", "1.0.0", Params, Result, analyse, report)
+METHOD = Method(
+    "noise_analysis",
+    "Noise of recordings at rest",
+    "1.0.0",
+    Params,
+    Result,
+    analyse,
+    report,
+    inspection=lambda _params, _count: LAUNCH,
+)

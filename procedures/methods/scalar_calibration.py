@@ -4,7 +4,7 @@ For recordings at several stations, or for one long recording of a unit turned b
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, Self
 
 import numpy as np
@@ -24,6 +24,7 @@ from procedures.analysis.calibration.station_means import station_means
 from procedures.analysis.calibration.station_noise import outputs_covariance
 from procedures.analysis.calibration.still import StillSettings, pose_excess, pose_means, still_stretches
 from procedures.analysis.calibration.triad_analysis import noise_of_means, scatter_covariance
+from procedures.analysis.fitness.watched import Inspection
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
@@ -32,9 +33,10 @@ from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import TRIADS, Recording, rates, require_finite
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
-from procedures.procedure import Evidence, Method, Outcome, Parameters
+from procedures.procedure import STATIONS, Evidence, Method, Outcome, Parameters, RecordedParameters
 
-
+TURNED = replace(STATIONS.settings, at_rest=False, beside_others=False)
+"""One recording of a unit that is turned by hand from pose to pose."""
 LEAST_TO_JUDGE = 6
 """Poses from which on a channel that none of them changes is dead, or not turned; of fewer the rank says enough."""
 
@@ -49,7 +51,7 @@ class Still(Parameters):
     margin_s: float = Field(0.25, ge=0.0, le=60.0, description="cut from both ends of each pose")
 
 
-class Params(Parameters):
+class Params(RecordedParameters):
     """Which triad, and the magnitude it is held against: gravity has no default, it depends on the place."""
 
     triad: Literal["accelerometer", "gyro"] = "accelerometer"
@@ -263,4 +265,19 @@ def _warnings(fit: ScalarFit, params: Params, misfit: Misfit) -> tuple[str, ...]
     return (*found, *misfit.sentences)
 
 
-METHOD = Method("scalar_calibration", "Scalar calibration", "1.1.0", Params, Result, analyse, report, calibrations)
+def inspection(params: Params, count: int) -> Inspection:
+    """Of the triad: poses at rest beside one another, or one recording of a unit that is turned by hand."""
+    return replace(STATIONS, channels=TRIADS[params.triad]) if count > 1 else Inspection(TURNED, TRIADS[params.triad])
+
+
+METHOD = Method(
+    "scalar_calibration",
+    "Scalar calibration",
+    "1.1.0",
+    Params,
+    Result,
+    analyse,
+    report,
+    calibrations,
+    inspection=inspection,
+)

@@ -29,7 +29,7 @@ def coefficient_table(title: str, coefficients: Sequence[Coefficient], note: str
 
 
 def _coefficient_row(c: Coefficient, sources: Sequence[str]) -> tuple[str | float, ...]:
-    name = c.name.split(".")[1]
+    name = c.name.symbol
     zero = 1.0 if name in ("K11", "K22", "K33") and c.unit == "1" else 0.0
     unit, size = ("ppm", units.PPM) if c.unit == "1" else units.DISPLAY.get(c.unit, (c.unit, 1.0))
     parts = (c.standard_uncertainty, c.from_noise, c.from_table, *(c.from_table_source[s] for s in sources))

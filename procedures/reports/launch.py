@@ -48,15 +48,33 @@ def _summary(launches: Sequence[LaunchNoise], averaging_time_s: float | None) ->
 def side_by_side(summaries: Sequence[ChannelSummary], launches: Sequence[LaunchNoise]) -> Table:
     """The launches beside one another, by the likelihood fit (Tables 4.1 and 4.2)."""
     rows = [
-        (s.channel, TITLES[m.process], unit, *(_shown(v, size) for v in m.values), _of(m.mean, size), _of(m.sd, size))
+        (
+            s.channel,
+            TITLES[m.process],
+            unit,
+            *(_shown(v, size) for v in m.values),
+            _of(m.mean, size),
+            _of(m.sd, size),
+            _channel_of(s.channel, launches)[0].bandwidth_hz if m.process == "random_walk" else None,
+        )
         for s in summaries
         for m in s.means
         for unit, size in (NOISE_DISPLAY[s.rate_unit][m.process],)
     ]
-    columns = ("channel", "process", "unit", *(launch.label for launch in launches), "mean", "± standard uncertainty")
+    columns = (
+        "channel",
+        "process",
+        "unit",
+        *(launch.label for launch in launches),
+        "mean",
+        "± standard uncertainty",
+        "bandwidth, Hz",
+    )
     note = (
         "Efficient estimates. A dash: not observed; “<” is what it stays below (95 %). The mean counts a process that "
-        "was not observed as zero; its uncertainty is the greater of what the fits claim and what the launches scatter."
+        "was not observed as zero; its uncertainty is the greater of what fits claim and launches scatter. "
+        "Bandwidth: half of the sample rate. Samples picked out of faster ones, not averaged, have a random walk that "
+        "is too large by the root of how many were passed over."
     )
     return Table("Noise coefficients, launch by launch", columns, tuple(rows), note)
 
@@ -227,7 +245,9 @@ def _ways(c: Coefficient, size: float) -> tuple[Cell, ...]:
 def _shown(reading: Reading, size: float) -> Cell:
     if reading.value is not None:
         return reading.value / size
-    return None if reading.upper_limit is None else f"– (< {reading.upper_limit / size:.2g})"
+    if reading.upper_limit is None:
+        return None
+    return f"{'–' if reading.described else 'not described'} (< {reading.upper_limit / size:.2g})"
 
 
 def _of(value: float | None, size: float) -> float | None:

@@ -10,6 +10,8 @@ import pytest
 import typer
 import yaml
 
+from bench_service.api.http.door import may_listen
+from bench_service.bench.stop.messages import split_address
 from bench_service.cli.commands import app, run_command_line
 from bench_service.jobs.engine import SHUT_DOWN_S
 from bench_service.settings import Settings
@@ -73,5 +75,24 @@ def test_the_api_drives_nothing_and_listens_on_this_host_only() -> None:
     api = OURS["api"]
     assert parsed(api["command"])[1]["no_worker"] is True
     assert all(port.startswith("127.0.0.1:") for port in api["ports"])
+    settings = Settings.from_environ({name: str(value) for name, value in api["environment"].items()})
+    assert may_listen(settings), "else the service does not start"
+    assert settings.published == "loopback", "which is true as long as the line above is"
+    assert all("ports" not in service for name, service in OURS.items() if name != "api")
     assert "/readyz" in api["healthcheck"]["test"][-1]
     compile(api["healthcheck"]["test"][-1], "healthcheck", "exec")
+
+
+def test_a_stop_reaches_each_bench_without_the_database() -> None:
+    secret = OURS["api"]["environment"]["BENCH_STOP_SECRET_FILE"]
+    whole = yaml.safe_load(FILE.read_text())
+    assert all(service["secrets"] == ["stop"] for service in OURS.values())
+    assert secret == "/run/secrets/stop"
+    assert "file" in whole["secrets"]["stop"]
+    names = {id(service): name for name, service in SERVICES.items()}
+    for supervisor in of_bench("supervise").values():
+        settings = Settings.from_environ({name: str(value) for name, value in supervisor["environment"].items()})
+        host, port = split_address(settings.stop_listen)
+        assert host == names[id(supervisor)], "the name by which the API's container finds it"
+        assert port > 0
+        assert str(settings.stop_secret_in()) == secret

@@ -258,7 +258,9 @@ class Clients(Thread):
             said = None if seen is None or seen.status_code == 404 else seen.json()["stopped"]
             if said is None:
                 continue
-            self.ask("POST", f"/api/v1/benches/{bench}/release", (200, 409))
+            for one in seen.json()["stops"] if seen is not None else []:
+                path = f"/api/v1/benches/{bench}/stops/{one['id']}/release"
+                self.ask("POST", path, (200, 409), json={"by": "a person", "remark": "looked at it"})
             known = [stop for stop in self.stops if (stop.bench, stop.said) == (bench, said)]
             if not known:
                 self.stops.append(Stop(bench, said, 0.0))

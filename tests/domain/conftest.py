@@ -3,18 +3,15 @@
 import pytest
 
 from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
-from procedures.core.recording import ACCELEROMETER, GYRO, Channel, Quantity
+from procedures.core.recording import Channel
 from procedures.core.unit import TriadRecord, Unit
 from procedures.procedure import Context
-from tests.domain.forward_model import ACCELEROMETER_NOISE, GYRO_NOISE, SITE
+from tests.kit.forward_model import ACCELEROMETER_NOISE, CHANNELS, GYRO_NOISE, SITE
 
 
 @pytest.fixture
 def channels() -> tuple[Channel, ...]:
-    return (
-        *(Channel(name, Quantity.ANGULAR_RATE, "rad/s") for name in GYRO),
-        *(Channel(name, Quantity.SPECIFIC_FORCE, "m/s^2") for name in ACCELEROMETER),
-    )
+    return CHANNELS
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from procedures.core.recording import Channel, MemoryRecording, RecordingInfo
 from procedures.core.unit import Unit
 from procedures.methods.initial_alignment_of_recording import METHOD
 from procedures.procedure import DatedCalibration, Evidence
-from tests.domain.forward_model import (
+from tests.kit.forward_model import (
     B_ACCELEROMETER,
     B_GYRO,
     GYRO_NOISE,

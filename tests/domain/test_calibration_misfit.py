@@ -10,7 +10,7 @@ from procedures.core.limits import Verdict
 from procedures.core.recording import MemoryRecording
 from procedures.core.unit import Unit
 from procedures.procedure import Context
-from tests.domain.forward_model import random_table, station_recordings
+from tests.kit.forward_model import random_table, station_recordings
 
 CALIBRATION = catalog.discover()["calibration_12_orientations"]
 NOISE = np.array([2e-6] * 3 + [2e-4] * 3)

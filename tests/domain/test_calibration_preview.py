@@ -13,7 +13,7 @@ from procedures.core import units
 from procedures.core.imu_model import triad_calibration
 from procedures.core.unit import Unit
 from procedures.procedure import Context
-from tests.domain.forward_model import B_ACCELEROMETER, B_GYRO, K_ACCELEROMETER, K_GYRO
+from tests.kit.forward_model import B_ACCELEROMETER, B_GYRO, K_ACCELEROMETER, K_GYRO
 
 CALIBRATION = catalog.discover()["calibration_12_orientations"]
 VERIFICATION = catalog.discover()["verification_9_orientations"]

@@ -2,6 +2,7 @@
 
 import inspect
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,37 +10,28 @@ from pydantic import ValidationError
 
 from procedures import catalog, methods
 from procedures.core.errors import BadParameter, DomainError, Undetermined
+from procedures.core.imu_model import triad_calibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import MemoryRecording, RecordingInfo
 from procedures.core.report import Figure
-from procedures.core.unit import TriadRecord, Unit
+from procedures.core.unit import Unit
 from procedures.methods.scalar_calibration import METHOD as SCALAR
 from procedures.procedure import Context, Evidence
-from tests.domain.forward_model import (
-    ACCELEROMETER_NOISE,
+from tests.kit.forward_model import (
     B_ACCELEROMETER,
     B_GYRO,
-    GYRO_NOISE,
     K_ACCELEROMETER,
     K_GYRO,
     SITE,
     random_table,
+    station_noise,
     station_recordings,
 )
+from tests.kit.procedures import require_form, simulated_context
 
 CALIBRATION = catalog.discover()["calibration_12_orientations"]
 VERIFICATION = catalog.discover()["verification_9_orientations"]
-OURS = (
-    "calibration_12_orientations",
-    "verification_9_orientations",
-    "converter_bench",
-    "no_operation",
-    "initial_alignment",
-    "scale_factor_whole_turns",
-    "static_run",
-    "table_program",
-    "thermal_cycle",
-)
+OURS = tuple(catalog.discover())
 
 
 @pytest.mark.parametrize("name", OURS)
@@ -58,13 +50,21 @@ def test_a_method_is_named_as_its_file_and_has_a_schema(name: str):
     json.dumps(method.result.model_json_schema())
 
 
+@pytest.fixture
+def calibrated() -> Context:
+    """The simulated bench, which has a chamber, and its unit with a calibration: what every procedure can plan with."""
+    triads = (("gyro", "rad/s", B_GYRO, K_GYRO), ("accelerometer", "m/s^2", B_ACCELEROMETER, K_ACCELEROMETER))
+    made = tuple(
+        triad_calibration(triad, unit, unit, np.column_stack([bias, matrix]), 1e-14 * np.eye(12))
+        for triad, unit, bias, matrix in triads
+    )
+    context = simulated_context()
+    return replace(context, unit=replace(context.unit, calibrations=made, calibration_id="c-1"))
+
+
 @pytest.mark.parametrize("name", OURS)
-def test_defaults_are_valid_and_resolved_ones_too(name: str, context: Context):
-    procedure = catalog.discover()[name]
-    resolved = procedure.resolve(procedure.params(), context)
-    assert procedure.params.model_validate_json(resolved.model_dump_json()) == resolved
-    assert procedure.resolve(resolved, context) == resolved
-    assert [s.index for s in procedure.schedule(resolved)] == list(range(len(procedure.schedule(resolved))))
+def test_a_procedure_keeps_the_form_that_every_one_has(name: str, calibrated: Context):
+    require_form(catalog.discover()[name], calibrated)
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_calibrate_store_verify(context: Context):
     rng = np.random.default_rng(17)
     params = CALIBRATION.resolve(CALIBRATION.params(), context)
     table = random_table(rng, 3.0, 5.0, 2.0, 10.0)
-    noise = drawn_covariances(CALIBRATION.schedule(params))
+    noise = station_noise(CALIBRATION.schedule(params), context.unit)
     recordings = station_recordings(CALIBRATION.schedule(params), context.unit.channels, rng, table, noise)
     result = CALIBRATION.analyse(recordings, params, context)
     assert result.verdict is Verdict.PASS, result.checks
@@ -144,7 +144,7 @@ def test_calibrate_store_verify(context: Context):
     unit = Unit("S-1", 400.0, context.unit.channels, context.unit.gyro, context.unit.accelerometer, 70.0, calibrations)
     later = Context(unit, context.bench)
     params = VERIFICATION.resolve(VERIFICATION.params(), later)
-    noise = drawn_covariances(VERIFICATION.schedule(params))
+    noise = station_noise(VERIFICATION.schedule(params), context.unit)
     recordings = station_recordings(VERIFICATION.schedule(params), unit.channels, rng, table, noise)
     verified = VERIFICATION.analyse(recordings, params, later)
     assert verified.verdict is Verdict.PASS, verified.checks
@@ -162,7 +162,7 @@ def test_scalar_and_linear_differ_by_what_is_claimed(context: Context, weighting
     rng, sigmas = np.random.default_rng(18), []
     params = CALIBRATION.resolve(CALIBRATION.params(weighting=weighting), context)
     stations = CALIBRATION.schedule(params)
-    noise = drawn_covariances(stations)
+    noise = station_noise(stations, context.unit)
     for _ in range(40):
         table = random_table(rng, 3.0, 5.0, 2.0, 10.0)
         recordings = station_recordings(stations, context.unit.channels, rng, table, noise)
@@ -180,7 +180,7 @@ def test_a_unit_of_unknown_noise_in_counts_is_calibrated_and_the_result_says_so(
         unknown.unit.channels,
         np.random.default_rng(2),
         None,
-        drawn_covariances(CALIBRATION.schedule(params)),
+        station_noise(CALIBRATION.schedule(params), context.unit),
     )
     result = CALIBRATION.analyse(recordings, params, unknown)
     assert all(t.p_value is None for t in result.triads)
@@ -235,16 +235,3 @@ def test_gravity_has_no_silent_default():
     with pytest.raises(ValidationError, match="gravity_m_s2"):
         SCALAR.params()
     assert SCALAR.params(triad="gyro").gravity_m_s2 is None
-
-
-def drawn_covariances(stations: object) -> tuple[np.ndarray, np.ndarray]:
-    """Covariances of the means at the windows that `station_recordings` gives: 70 s from 10 s on, 5 s between."""
-    from procedures.analysis.calibration.station_noise import triad_covariance
-
-    n = len(stations)  # pyright: ignore
-    windows = [[10.0 + 75.0 * i, 80.0 + 75.0 * i] for i in range(n)]
-    records = (TriadRecord((GYRO_NOISE,) * 3), TriadRecord((ACCELEROMETER_NOISE,) * 3))
-    gyro, accelerometer = (triad_covariance(r, windows) for r in records)
-    assert gyro is not None
-    assert accelerometer is not None
-    return gyro, accelerometer

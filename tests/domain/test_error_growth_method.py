@@ -10,7 +10,7 @@ from procedures.core.limits import Verdict
 from procedures.core.unit import TriadRecord, Unit
 from procedures.methods.error_growth import METHOD, Declared
 from procedures.procedure import DatedCalibration, Evidence
-from tests.domain.forward_model import ACCELEROMETER_NOISE, GYRO_NOISE
+from tests.kit.forward_model import ACCELEROMETER_NOISE, GYRO_NOISE
 
 NEARLY_NOTHING = dict.fromkeys(Declared.model_fields, 0.0)
 W0 = np.sqrt(9.80665 / 6_371_000.0)

@@ -13,7 +13,7 @@ from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
 from procedures.methods.field_calibration import METHOD
 from procedures.procedure import Evidence
-from tests.domain.forward_model import SITE, turn
+from tests.kit.forward_model import SITE, turn
 
 G = 9.81
 UP = np.array([0.0, G, 0.0])

@@ -24,7 +24,7 @@ from procedures.methods.initial_alignment_of_recording import METHOD
 from procedures.procedure import Context, Evidence
 from simulators.truth import BenchTruth, SiteTruth, declared_unit, default_bench, default_unit
 from simulators.world import WorldConfig
-from tests.domain.forward_model import (
+from tests.kit.forward_model import (
     ACCELEROMETER_NOISE,
     B_ACCELEROMETER,
     B_GYRO,

@@ -21,7 +21,7 @@ from procedures.core.recording import Channel, MemoryRecording, Quantity, Record
 from procedures.core.unit import TriadRecord, Unit
 from procedures.methods.kalman_calibration import METHOD
 from procedures.procedure import Evidence
-from tests.domain.forward_model import GYRO_NOISE
+from tests.kit.forward_model import GYRO_NOISE
 
 DEG_H = units.DEG_PER_HOUR
 

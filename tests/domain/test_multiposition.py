@@ -14,10 +14,11 @@ from procedures.analysis.calibration.table_errors import TableErrors, TableUncer
 from procedures.core.errors import Undetermined
 from procedures.core.frames import orientation_beta_gamma
 from procedures.core.recording import Station
-from tests.domain.forward_model import (
+from tests.kit.forward_model import (
     ACCELEROMETER_NOISE,
     B_ACCELEROMETER,
     B_GYRO,
+    BETA_GAMMA,
     GYRO_NOISE,
     K_ACCELEROMETER,
     K_GYRO,
@@ -28,8 +29,6 @@ from tests.domain.forward_model import (
 from tests.validation.bounds import bayesian_bound, cramer_rao_bound
 
 N = 250
-BETA_GAMMA = [(0, -90), (0, 90), (90, 0), (-90, 0), (0, 0), (180, 0)]
-BETA_GAMMA += [(-90, -45), (90, 45), (180, -45), (0, 45), (135, 0), (-45, 0)]
 STATIONS = [Station(i, "", orientation_beta_gamma(b, g)) for i, (b, g) in enumerate(BETA_GAMMA)]
 ANGLES = [orientation_beta_gamma(b, g) for b, g in BETA_GAMMA]
 WINDOWS = np.array([[10.0 + 80.0 * i, 80.0 + 80.0 * i] for i in range(12)])

@@ -87,7 +87,7 @@ def test_the_information_is_that_of_the_whole_gaussian_record(scenario: Scenario
     """240 cells, the bound by 239 × 239 matrices: taking the modes for independent costs or feigns less than 5 %."""
     n = 240
     cells = np.random.default_rng(1).normal(size=n)
-    spectrum = agreed(slow_powers(cells, 1.0), None)[0].used.only(ENDS)
+    spectrum = agreed(slow_powers(cells, 1.0), None).joined.used.only(ENDS)
     squares = np.array([scenario.of(p) ** 2 for p in ("quantization", "random_walk", "bias_instability")])
     squares = np.append(squares, scenario.of("rate_random_walk") ** 2)
     free = np.flatnonzero(squares)

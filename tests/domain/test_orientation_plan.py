@@ -28,7 +28,7 @@ from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
 from procedures.methods.plan_orientations import METHOD
 from procedures.procedure import Evidence
-from tests.domain.forward_model import SITE, Table
+from tests.kit.forward_model import SITE, Table
 
 TABLE = TableUncertainty(3.0, 1.0, 1.0, 5.0)
 LIMITS = Requirements(0.015 * units.DEG_PER_HOUR, 1e-5, 5e-5)

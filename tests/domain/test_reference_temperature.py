@@ -20,7 +20,7 @@ from procedures.core.thermal_correction import AxisCorrection, Form, Temperature
 from procedures.core.unit import TriadRecord
 from simulators.chamber.behaviour import response
 from simulators.truth.thermal import REFERENCE_C, AccelerometerThermalTruth, ConverterTruth, UnitThermalTruth
-from tests.domain.forward_model import ACCELEROMETER_NOISE, B_ACCELEROMETER, K_ACCELEROMETER, SITE, Table
+from tests.kit.forward_model import ACCELEROMETER_NOISE, B_ACCELEROMETER, K_ACCELEROMETER, SITE, Table
 
 LAG_S = 5.0
 OFFSET_C = (0.4, -0.3)

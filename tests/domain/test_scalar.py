@@ -16,8 +16,7 @@ from procedures.analysis.calibration.scalar import (
 from procedures.core.errors import Undetermined
 from procedures.core.frames import orientation_beta_gamma, orientation_gamma_beta
 from procedures.core.table_angles import TableAngles
-from tests.domain.forward_model import B_ACCELEROMETER, K_ACCELEROMETER, SITE
-from tests.domain.test_multiposition import BETA_GAMMA
+from tests.kit.forward_model import B_ACCELEROMETER, BETA_GAMMA, K_ACCELEROMETER, SITE
 
 G = SITE.gravity_m_s2
 ANGLES = [orientation_beta_gamma(b, g) for b, g in BETA_GAMMA]

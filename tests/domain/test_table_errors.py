@@ -8,7 +8,7 @@ from procedures.analysis.calibration.table_errors import TableUncertainty, table
 from procedures.core import units
 from procedures.core.recording import Station
 from procedures.core.table_angles import TableAngles
-from tests.domain.forward_model import SITE, Table
+from tests.kit.forward_model import SITE, Table
 
 ANGLES = [TableAngles(20.0, -50.0, 110.0), TableAngles(-75.0, 33.0, 5.0)]
 SMALL = 1e-4  # deg; the second order is then 1e-6 of the first

@@ -18,7 +18,7 @@ from procedures.core.limits import Verdict
 from procedures.core.recording import Channel, MemoryRecording, Quantity, Recording, RecordingInfo, Station
 from procedures.core.table_angles import TableAngles
 from procedures.procedure import Context
-from tests.domain.forward_model import turn
+from tests.kit.forward_model import turn
 
 PROCEDURE = discover()["table_program"]
 APPENDIX = """\

@@ -10,7 +10,7 @@ from procedures.analysis.least_squares.chi_square import chi_square, tail_probab
 from procedures.core.imu_model import triad_calibration
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord
-from tests.domain.forward_model import ACCELEROMETER_NOISE, B_ACCELEROMETER, K_ACCELEROMETER, SITE
+from tests.kit.forward_model import ACCELEROMETER_NOISE, B_ACCELEROMETER, K_ACCELEROMETER, SITE
 
 ANGLES = [TableAngles(20.0 * i, 10.0 * i, 40.0 * i) for i in range(9)]
 VECTORS = reference_vectors("accelerometer", ANGLES, SITE)

@@ -20,7 +20,7 @@ from procedures.core.recording import MemoryRecording, RecordingInfo, Station
 from procedures.core.turn import Turn
 from procedures.core.unit import TriadRecord, Unit
 from procedures.procedure import Context
-from tests.domain.forward_model import B_GYRO, GYRO_NOISE, K_GYRO, SITE, turn
+from tests.kit.forward_model import B_GYRO, GYRO_NOISE, K_GYRO, SITE, turn
 
 PPM, ARCSEC = 1e-6, units.ARCSEC
 REFERENCE = 50.0 * units.DEG

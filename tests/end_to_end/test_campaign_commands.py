@@ -13,7 +13,7 @@ import pytest
 from junitparser import JUnitXml
 
 from tests.end_to_end.bench_process import BenchProcess
-from tests.end_to_end.test_command_line import Command, Done, command_in, environment, one_line
+from tests.kit.command_line import Command, Done, command_in, environment, one_line
 
 pytestmark = pytest.mark.timeout(120)
 

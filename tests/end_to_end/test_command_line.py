@@ -1,11 +1,8 @@
 """The command line as an operating system process: what it prints, its exit codes, and how it ends."""
 
 import json
-import os
 import socket
-import subprocess
-import sys
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
@@ -15,48 +12,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.end_to_end.bench_process import BenchProcess
+from tests.kit.command_line import Command, command_in, one_line
 
 pytestmark = pytest.mark.timeout(240)
 
 FAST = ("--set", "dwell_s=5.0", "--set", "settle_s=0.5")
-ROOT = Path(__file__).parents[2]
-
-
-class Done:
-    """A command that has ended."""
-
-    def __init__(self, code: int, out: str, err: str) -> None:
-        self.code, self.out, self.err = code, out, err
-        assert "Traceback" not in out + err, err
-
-    def json(self) -> Any:
-        return json.loads(self.out)
-
-
-Command = Callable[..., Done]
-
-
-def environment(folder: Path, **settings: str) -> dict[str, str]:
-    """An environment with settings of ours alone."""
-    outer = {k: v for k, v in os.environ.items() if not k.startswith("BENCH_")}
-    given = {"BENCH_DATABASE_URL": f"sqlite:///{folder / 'bench.sqlite'}", **settings}
-    return {**outer, "COLUMNS": "200", "PYTHONPATH": str(ROOT), **given}
-
-
-def command_in(folder: Path) -> Command:
-    def run(*arguments: object, **settings: str) -> Done:
-        done = subprocess.run(
-            [sys.executable, "-m", "bench_service", *map(str, arguments)],
-            env=environment(folder, **settings),
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
-        return Done(done.returncode, done.stdout, done.stderr)
-
-    return run
 
 
 @pytest.fixture
@@ -77,14 +37,6 @@ def calibrated(folder: Path) -> Any:
     done = command_in(folder)("run", "calibration_12_orientations", "--unit", "SIM-0001", "--seed", 3, *FAST, "--json")
     assert done.code == {"pass": 0, "fail": 1}[done.json()["job"]["verdict"]], done.err
     return done.json()
-
-
-def one_line(done: Done, *words: str) -> None:
-    """A refusal: exit code 2, nothing said to standard output, one line to standard error."""
-    assert (done.code, done.out) == (2, ""), done.err
-    assert len(done.err.strip().splitlines()) == 1, done.err
-    assert done.err.startswith("bench: ")
-    assert all(word in done.err for word in words), done.err
 
 
 def test_the_demonstration_prints_coefficients_verdicts_and_addresses(bench: Command, free_port: int) -> None:

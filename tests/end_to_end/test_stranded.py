@@ -12,12 +12,14 @@ import pytest
 
 from bench_service.persistence import open_stores
 from bench_service.wall_clock import monotonic_s, now, pause
+from tests.stops import release_all
 
 ROOT = Path(__file__).resolve().parents[2]
 SERVE = """
 import sys
 from bench_service.__main__ import main
 from bench_service.jobs import engine
+from tests.stops import release_all
 engine.PROCEDURE_ABI, engine.MAX_RECOVERIES = sys.argv.pop(1), int(sys.argv.pop(1))
 main()
 """
@@ -136,7 +138,7 @@ def test_a_job_that_takes_the_service_down_too_often_or_never_began(
     chosen = second.submit(procedure="no_operation")
     second.end()
     stores, database = open_stores(sqlite_url)
-    stores.benches.release_bench("sim")
+    release_all(stores.benches, "sim")
     entry = stores.queue.look("sim", now()).next()
     assert entry is not None
     assert stores.queue.claim(entry, stores.jobs.get(chosen).context, now()) is not None  # and here the process died

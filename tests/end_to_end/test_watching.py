@@ -12,7 +12,7 @@ from junitparser import JUnitXml
 
 from bench_service.wall_clock import pause
 from tests.end_to_end.bench_process import BenchProcess
-from tests.end_to_end.test_command_line import Done, environment
+from tests.kit.command_line import Done, environment
 
 pytestmark = pytest.mark.timeout(200)
 

@@ -1,6 +1,9 @@
 """A page as a test reads it."""
 
+import html
+import re
 from html.parser import HTMLParser
+from xml.etree import ElementTree
 
 from tests.service.client import Client
 
@@ -49,3 +52,16 @@ def page(client: Client, path: str) -> Page:
     assert "Undefined" not in read.words
     assert "The emergency stop is a hardware circuit" in read.words
     return read
+
+
+def drawn(client: Client, text: str) -> int:
+    """How many figures a page shows; each is fetched as a browser does, and is a drawing that runs nothing."""
+    addresses = [html.unescape(found) for found in re.findall(r'<img src="([^"]*)"', text)]
+    for address in addresses:
+        answer = client.http.get(address)
+        assert (answer.status_code, answer.headers["content-type"]) == (200, "image/svg+xml"), answer.text
+        assert "immutable" in answer.headers["cache-control"]
+        root = ElementTree.fromstring(answer.text)
+        assert root.tag == "{http://www.w3.org/2000/svg}svg"
+        assert not [e for e in root.iter() if e.tag.endswith("}script") or any(a.startswith("on") for a in e.attrib)]
+    return len(addresses)

@@ -7,6 +7,7 @@ import pytest
 
 from bench_service.cli.client import connect
 from bench_service.settings import Settings
+from tests.kit.registered import register_bench
 from tests.service.client import Client
 
 BODY = {"procedure": "no_operation", "unit": "SIM-0001", "labels": {"lot": "7"}}
@@ -97,7 +98,9 @@ def test_where_the_entry_cannot_be_written_the_outcome_is_told_all_the_same(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     file = tmp_path / "bench.sqlite"
-    with connect(Settings(database_url=f"sqlite:///{file}"), None, drive=True) as http:
+    settings = Settings(database_url=f"sqlite:///{file}")
+    register_bench(settings)
+    with connect(settings, None, drive=False) as http:
         other = sqlite3.connect(file)
         other.execute("CREATE TRIGGER full BEFORE INSERT ON audit BEGIN SELECT RAISE(ABORT, 'no room'); END")
         other.commit()

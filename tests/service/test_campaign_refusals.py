@@ -8,6 +8,7 @@ import pytest
 
 from bench_service.cli.client import connect
 from bench_service.settings import Settings
+from tests.kit.registered import register_bench
 from tests.service.campaigns import SHORT, add, ended, named, start
 from tests.service.client import Client
 
@@ -172,8 +173,7 @@ def test_where_benches_have_other_names_than_this_process_expects_a_campaign_is_
     """An HTTP process without a bench of its own; a run must still name its bench."""
     settings = Settings(database_url=f"sqlite:///{tmp_path / 'bench.sqlite'}")
     for bench in ("east", "west"):
-        with connect(settings.model_copy(update={"bench_id": bench}), None, drive=True) as http:
-            assert http.get(f"/api/v1/benches/{bench}").is_success
+        register_bench(settings.model_copy(update={"bench_id": bench}))
     with connect(settings, None, drive=False) as http:
         add(Client(http), named("somewhere", {}))
         refused = http.post("/api/v1/campaigns/somewhere/runs", json={"unit": "SIM-0001"})

@@ -11,10 +11,10 @@ import pytest
 from bench_service.cli.client import connect
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, now, pause
+from tests.kit.metrics import scraped
 from tests.service.campaigns import add, ended, named, run_of, start
 from tests.service.client import Client
 from tests.service.jumping_clock import JumpingClock
-from tests.service.test_metrics import scraped
 
 NO_MOVE = {"seed": 1, "rules": [{"verb": "turntable.move_to", "kind": "fault", "probability": 1.0}]}
 JUMPS = [{"hours": 2}, {"hours": -2}, {"days": 1}, {"days": -1}]

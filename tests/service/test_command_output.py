@@ -8,61 +8,8 @@ import pytest
 from bench_service.cli.commands import run_command_line
 from bench_service.cli.options import console, errors
 from bench_service.settings import Settings
+from tests.kit.odd_answers import BELOW, CAMPAIGN, ENDED, EVIL, JOB, JOB_ENDED, RESULT, RUN, SCHEDULE, TOO_FEW
 from tests.service.answering import Answer, answering
-
-EVIL = "cable [/dev/ttyS0] [red]x[/] :smile:"
-BELOW = "trend of gyro.b_x over 10 results: one point beyond 3σ"
-TOO_FEW = "3 earlier results, 8 are needed to judge it"
-LIMIT = {"minimum": 1.0, "maximum": None, "unit": EVIL}
-STEP = {
-    "name": EVIL,
-    "does": EVIL,
-    "state": "succeeded",
-    "verdict": "fail",
-    "checks": [{"name": EVIL, "passed": False}, {"name": "other", "passed": True}],
-    "warnings": [BELOW, TOO_FEW],
-    "reason": f"why: {EVIL}",
-    "started_at": "2026-01-01T00:00:00Z",
-    "finished_at": "2026-01-01T00:00:00Z",
-}
-RUN = {
-    "id": "r1",
-    "campaign": EVIL,
-    "unit": EVIL,
-    "state": "running",
-    "verdict": None,
-    "steps": [{**STEP, "state": "running", "finished_at": None}],
-    "waiting": f"bench stopped: {EVIL}",
-    "reason": "",
-    "warnings": [EVIL],
-    "created_at": "2026-01-01T00:00:00Z",
-}
-ENDED = {**RUN, "state": "succeeded", "verdict": "fail", "steps": [STEP], "waiting": EVIL, "reason": EVIL}
-JOB = {
-    "id": "j1",
-    "procedure": EVIL,
-    "unit": EVIL,
-    "state": "running",
-    "verdict": None,
-    "progress": {"station": 0, "stations": 1},
-    "page": "/jobs/j1",
-    "result": None,
-    "error": None,
-    "created_at": "2026-01-01T00:00:00Z",
-}
-JOB_ENDED = {**JOB, "state": "succeeded", "verdict": "fail", "result": "x"}
-CHECK = {"name": EVIL, "passed": False, "value": 0.5, "limit": LIMIT}
-RESULT = {"id": "x", "verdict": "fail", "document": {"checks": [CHECK], "warnings": [EVIL]}}
-CAMPAIGN = {"name": EVIL, "shipped": False, "campaign": {"title": EVIL, "steps": [{"name": EVIL}]}}
-SCHEDULE = {
-    "id": "s1",
-    "campaign": EVIL,
-    "unit": EVIL,
-    "cron": "* * * * *",
-    "time_zone": EVIL,
-    "next_at": None,
-    "last_outcome": EVIL,
-}
 
 
 def service(method: str, path: str) -> Answer:
@@ -93,8 +40,8 @@ def _a_wide_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     ("arguments", "code", "shown", "beside_the_bar"),
     [
         (("jobs",), 0, 2, 0),
-        (("run", "no_operation", "--unit", "U"), 1, 2, 2),
-        (("analyse", "noise_analysis"), 1, 2, 0),
+        (("run", "no_operation", "--unit", "U"), 1, 3, 2),
+        (("analyse", "noise_analysis"), 1, 3, 0),
         (("campaign", "list"), 0, 3, 0),
         (("campaign", "runs"), 0, 6, 0),
         (("schedule", "list"), 0, 4, 0),

@@ -12,8 +12,8 @@ from bench_service.cli.commands import run_command_line
 from bench_service.cli.patience import patiently
 from bench_service.cli.refusal import Away, Refused
 from bench_service.settings import Settings
+from tests.kit.odd_answers import ENDED, JOB, JOB_ENDED, RESULT, RUN
 from tests.service.answering import Answer, answering
-from tests.service.test_command_output import ENDED, JOB, JOB_ENDED, RESULT, RUN
 
 JSON = "application/json"
 PROXY = (502, "text/html", "<h1>Bad Gateway</h1>")

@@ -10,8 +10,10 @@ from typing import Any
 import pytest
 
 from bench_service.bench import session
+from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.processes import Driving
 from bench_service.bench.session import BenchSession, ShuttingDown
+from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.supervisor import Supervisor
 from bench_service.cli.client import connect
 from bench_service.drivers.registered import RegisteredDevices
@@ -48,7 +50,9 @@ def test_a_supervisor_makes_the_bench_of_a_dead_worker_safe_and_says_so_later(
     register, watch = abandoned(tmp_path), Watch(Driving(identity(worker)))
     books = SqlSafetyBooks(postgres.url, "sim")
     take_lease = partial(acquire_lease, postgres.url, "sim", "supervisor")
-    supervisor = Supervisor("sim", RegisteredDevices(register), watch, books, take_lease)
+    channel, heartbeat = StopChannel(tmp_path, "sim"), HeartbeatFile(tmp_path, "sim")
+    channel.prepare()
+    supervisor = Supervisor("sim", RegisteredDevices(register), watch, books, take_lease, channel, heartbeat)
     ending = Event()
     thread = Thread(target=supervisor.run, args=(ending, False), daemon=True)
     thread.start()

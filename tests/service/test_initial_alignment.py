@@ -9,7 +9,9 @@ import pytest
 from bench_service.cli.client import connect
 from bench_service.settings import Settings
 from simulators.truth import default_bench, save_bench
+from tests.kit.registered import register_bench
 from tests.service.client import Client
+from tests.service.page import drawn
 
 PLAN = {
     "orientations": [[0, 0, 0], [-75, 5, -8]],
@@ -65,8 +67,9 @@ def test_the_result_rests_on_the_calibration(sqlite_client: Client, calibration:
     assert result["document"]["basis"] == f"Aligned with calibration {calibration}"
     assert calibration in str(result)
     page = sqlite_client.http.get(result["page"]).text
-    for text in ("Errors found and predicted", "thesis 1.1", "Expected of one alignment, by source", "<svg"):
+    for text in ("Errors found and predicted", "thesis 1.1", "Expected of one alignment, by source"):
         assert text in page
+    assert drawn(sqlite_client, page) >= 1
 
 
 def test_the_preview_predicts_both_ways(sqlite_client: Client, result: dict[str, Any]) -> None:
@@ -109,7 +112,8 @@ def test_a_bench_at_the_pole_is_refused(tmp_path: Path) -> None:
     )
     save_bench(pole, tmp_path / "pole.toml")
     settings = Settings(database_url=f"sqlite:///{tmp_path / 'bench.sqlite'}", bench_truth=tmp_path / "pole.toml")
-    with connect(settings, None, drive=True) as http:
+    register_bench(settings)
+    with connect(settings, None, drive=False) as http:
         answer = Client(http).preview("initial_alignment")
     assert answer.status_code == 422
     (error,) = answer.json()["errors"]

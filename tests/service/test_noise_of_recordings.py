@@ -12,6 +12,7 @@ import pytest
 from bench_service.cli.client import connect
 from bench_service.settings import Settings
 from tests.service.client import Client
+from tests.service.page import drawn
 
 AXES = "xyz"
 MPU6050 = {
@@ -68,7 +69,7 @@ def test_a_real_unit_at_rest_is_analysed_end_to_end(client: Client, result: dict
         # σ(1 s)² holds B² and K² beside N², and has at least 449 degrees of freedom: 3.3 % one sigma
         assert 0.6 * at_1_s < walk["value"] < at_1_s * (1.0 + 4.0 / np.sqrt(2.0 * 449.0))
     page = client.http.get(result["page"]).text
-    assert page.count("<svg") >= 2 * 6
+    assert drawn(client, page) >= 2 * 6
     assert "resolution is 4 counts" in page  # of the accelerometers, which is true of this file
 
 

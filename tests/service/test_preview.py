@@ -6,6 +6,7 @@ import httpx
 import pytest
 
 from tests.service.client import Client
+from tests.service.page import drawn
 
 CALIBRATION = "calibration_12_orientations"
 
@@ -107,7 +108,7 @@ def test_launches_are_compared_and_what_the_calibrations_cannot_resolve_is_said(
     notes = {c["name"]: c["note"] for c in result["document"]["checks"]}
     assert notes["gyro scale factor x run to run"] == "beneath the uncertainty of the calibrations: not resolved"
     assert notes["accelerometer bias x run to run"] == ""
-    assert sqlite_client.http.get(result["page"]).text.count("<svg") == 12
+    assert drawn(sqlite_client, sqlite_client.http.get(result["page"]).text) == 12
 
 
 def test_a_comparison_of_simulated_calibrations_is_itself_simulated(sqlite_client: Client) -> None:

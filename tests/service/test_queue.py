@@ -81,9 +81,10 @@ def test_jobs_of_others_wait_for_the_holder(client: Client, what: dict[str, str]
 
 
 def test_a_reservation_ends_by_itself_and_its_job_becomes_an_ordinary_one(stopped: Client) -> None:
-    kept = reserve(stopped, unit="SIM-0001", until=(now() + timedelta(seconds=0.5)).isoformat())
+    assert stopped.preview("no_operation").is_success  # the catalogue is read before time counts
+    kept = reserve(stopped, unit="SIM-0001", until=(now() + timedelta(seconds=2.0)).isoformat())
     job = stopped.submit("no_operation", reservation=kept["id"])
-    pause(0.6)
+    pause(2.1)
     expired = stopped.http.post(
         "/api/v1/jobs", json={"procedure": "no_operation", "unit": "SIM-0001", "reservation": kept["id"]}
     )

@@ -18,7 +18,7 @@ from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
 from bench_service.evidence.catalogue import Catalogue
 from bench_service.jobs.dispatcher import Dispatcher, Unfinished
 from bench_service.jobs.planning import Planner
-from bench_service.jobs.queue import RunningJob
+from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.runner import JobRunner, StepOutcome
 from bench_service.jobs.worker import Worker
 from bench_service.model.errors import NotReady
@@ -39,7 +39,7 @@ class IdleEngine:
 
     def run(self, job: Job) -> None: ...
 
-    def unfinished(self, job: RunningJob) -> Unfinished:
+    def unfinished(self, job: QueueEntry) -> Unfinished:
         return Unfinished()
 
     def shut_down(self) -> None: ...
@@ -122,7 +122,9 @@ def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], b
     service = BenchService(stores, driver, planner, worker, "test", safety_of(stores, driver))
     service.register()
     service.begin()
-    job = service.jobs.submit(JobRequest("calibration_12_orientations", "SIM-0001", parameters=FAST, seed=1))
+    job = service.jobs.submit(
+        JobRequest(procedure="calibration_12_orientations", unit="SIM-0001", parameters=FAST, seed=1)
+    )
     entry = stores.queue.look("sim", now()).next()
     assert entry is not None
     assert runner.claim(entry) is not None
@@ -187,7 +189,7 @@ def test_a_job_that_was_queued_again_while_the_dispatcher_looked_stays_queued(st
     asked = Event()
 
     class EndingEngine(IdleEngine):
-        def unfinished(self, job: RunningJob) -> Unfinished:
+        def unfinished(self, job: QueueEntry) -> Unfinished:
             if not asked.is_set():
                 why = Failure("Disconnected", "a test")
                 stores.queue.requeue(job.id, now(), now() + timedelta(minutes=4), why, spend=False)

@@ -100,6 +100,14 @@ def test_of_a_bench_on_another_host_only_that_host_can_say_that_it_is_safe(
     said = reader.get(BENCH).json()["safety"]
     assert said["safe"] is True
     assert "last commanded by the supervisor, process 1 on bench-host" in said["explanation"]
+    later = reader.post(STOP, json={"reason": "another"}).json()["stop"]
+    assert reader.get(BENCH).json()["safety"]["safe"] is None, "what was seen before the last stop says nothing of it"
+    path, body = f"{BENCH}/stops/{later}/release", {"by": "Bo", "remark": "looked"}
+    assert reader.post(path, json=body).status_code == 409
+    stores, database = open_stores(url)
+    stores.benches.confirm_safe("sim", now(), "the supervisor, process 1 on bench-host")
+    database.dispose()
+    assert reader.post(path, json=body).status_code == 200
     assert reader.post(RELEASE).json()["stopped"] is None
 
 

@@ -11,6 +11,7 @@ from bench_service.cli.client import connect
 from bench_service.settings import Settings
 from procedures.core.units import ARCSEC, DEG_PER_SQRT_HOUR, MICRO_G
 from tests.service.client import Client
+from tests.service.page import drawn
 
 LAUNCH = {"launches": 2, "duration_s": 3600.0, "off_time_s": 60.0}
 TRUE_Q = {  # tests' own copy of the default unit's truth: thesis Tables 4.1 and 4.2, means of four launches
@@ -104,7 +105,7 @@ def test_the_page_shows_tables_and_plots(client: Client, result: dict[str, Any])
     page = client.http.get(result["page"]).text
     for title in ("Noise coefficients, launch by launch", "Step by step", "Averaging time", "three ways, launch 2"):
         assert title in page
-    assert page.count("<svg") >= 2 * 6
+    assert drawn(client, page) >= 2 * 6
     unit = client.http.get("/units/SIM-0001").text
     assert f"result {result['id']}" in unit
 

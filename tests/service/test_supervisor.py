@@ -7,16 +7,21 @@ import sys
 from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from bench_service import wall_clock
-from bench_service.bench.devices import DeviceState
+from bench_service.bench.devices import BenchDevices, DeviceState
+from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.processes import Driving, ProcessIdentity
+from bench_service.bench.stop.channel import StopChannel
+from bench_service.bench.stop.word import StopWord
 from bench_service.bench.supervisor import Supervisor
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.model.errors import BenchBusy, StorageFailure
+from bench_service.model.records import BenchStop
 from bench_service.wall_clock import monotonic_s, pause
 from procedures.bench.errors import DeviceFault
 from tests.service.test_safety import abandoned
@@ -30,6 +35,8 @@ class Books:
     def __init__(self) -> None:
         self.answers = True
         self.is_stopped = False
+        self.by_hand = BenchStop("sim", wall_clock.now(), "a test")
+        self.entered: dict[str, BenchStop] = {}
         self.said: list[str] = []
         self.confirmed = ""
 
@@ -37,15 +44,20 @@ class Books:
         if not self.answers:
             raise StorageFailure("the database failed: it is restarted")
 
-    def stopped(self) -> bool:
+    def standing(self) -> tuple[BenchStop, ...]:
         self._ask()
-        return self.is_stopped
+        by_hand = (self.by_hand,) if self.is_stopped else ()
+        return (*by_hand, *self.entered.values())
+
+    def enter(self, word: StopWord) -> None:
+        self._ask()
+        self.entered[word.id] = BenchStop("sim", word.at, word.reason, by=word.by, id=word.id)
 
     def confirm_safe(self, by: str) -> None:
         self._ask()
         self.confirmed = by
 
-    def stop(self, reason: str) -> None:
+    def stop(self, reason: str, by: str) -> None:
         self._ask()
         self.is_stopped = True
         self.said.append(f"stopped: {reason}")
@@ -106,7 +118,7 @@ def state(folder: Path) -> DeviceState:
 
 def test_the_lease_is_taken_the_bench_made_safe_the_lease_given_back_and_all_of_it_noted(tmp_path: Path) -> None:
     devices, books, lease = RegisteredDevices(abandoned(tmp_path, "job-1")), Books(), Lease()
-    supervisor = Supervisor("sim", devices, Watch(GONE), books, lease.take)
+    supervisor = supervised(tmp_path, devices, Watch(GONE), books, lease.take)
     assert supervisor.look(companion=True)
     assert state(tmp_path).safe
     assert (lease.taken, lease.given_back) == (1, 1)
@@ -128,7 +140,7 @@ def test_a_database_that_does_not_answer_keeps_no_bench_from_being_safe(tmp_path
             raise StorageFailure("no route")
         raise BenchBusy("bench 'sim' is driven by 'bench sim process pid 1 on nowhere'")
 
-    supervisor = Supervisor("sim", devices, Watch(GONE), books, take)
+    supervisor = supervised(tmp_path, devices, Watch(GONE), books, take)
     begun = monotonic_s()
     supervisor.look()
     assert state(tmp_path).safe
@@ -143,7 +155,7 @@ def test_a_database_that_does_not_answer_keeps_no_bench_from_being_safe(tmp_path
 def test_a_worker_that_lives_is_left_alone(tmp_path: Path, worker: subprocess.Popen[bytes]) -> None:
     devices, lease = RegisteredDevices(abandoned(tmp_path)), Lease()
     watch = Watch(Driving(identity(worker)))
-    supervisor = Supervisor("sim", devices, watch, Books(), lease.take)
+    supervisor = supervised(tmp_path, devices, watch, Books(), lease.take)
     assert supervisor.look(companion=True)
     assert not state(tmp_path).safe
     assert lease.taken == 0
@@ -159,7 +171,7 @@ def test_only_a_stop_that_is_not_answered_kills_and_only_the_process_that_is_mea
 ) -> None:
     devices, books = RegisteredDevices(abandoned(tmp_path)), Books()
     meant = Driving(identity(worker))
-    supervisor = Supervisor("sim", devices, Watch(meant), books, Lease().take, hung_s=0.3)
+    supervisor = supervised(tmp_path, devices, Watch(meant), books, Lease().take, hung_s=0.3)
     for _ in range(5):
         supervisor.look()
         pause(0.1)
@@ -178,7 +190,10 @@ def test_only_a_stop_that_is_not_answered_kills_and_only_the_process_that_is_mea
     supervisor.look()
     assert state(tmp_path).safe
     supervisor.look()
-    assert "left a stop unanswered for 0.3 s (the table moves, the unit is on): killed" in books.said[0]
+    assert (
+        "has seen a stop and not made the bench safe within 0.3 s (the table moves, the unit is on): killed"
+        in books.said[0]
+    )
     pause(0.5)
     supervisor.look()
     assert "the supervisor" in books.confirmed
@@ -196,7 +211,7 @@ def test_devices_that_do_not_obey_stop_the_bench_once_and_are_tried_again(tmp_pa
                 raise ExceptionGroup("not safe", [DeviceFault("the brake does not close")])
             return super().make_safe(by)
 
-    supervisor = Supervisor("sim", Jammed(register), Watch(GONE), books, Lease().take)
+    supervisor = supervised(tmp_path, Jammed(register), Watch(GONE), books, Lease().take)
     deadline = monotonic_s() + 20
     while not state(tmp_path).safe and monotonic_s() < deadline:
         assert supervisor.look(companion=True), "left a bench that is not safe"
@@ -207,6 +222,15 @@ def test_devices_that_do_not_obey_stop_the_bench_once_and_are_tried_again(tmp_pa
         "stopped: could not be made safe: the brake does not close"
     ]
     assert books.is_stopped, "a person must look, though it obeyed in the end"
+
+
+def supervised(
+    folder: Path, devices: BenchDevices, watch: Watch, books: Books, take_lease: Any, **how: float
+) -> Supervisor:
+    """A supervisor with the channel and the heartbeat of a folder."""
+    channel = StopChannel(folder, "sim")
+    channel.prepare()
+    return Supervisor("sim", devices, watch, books, take_lease, channel, HeartbeatFile(folder, "sim"), **how)
 
 
 def until_safe(supervisor: Supervisor, folder: Path) -> None:
@@ -220,7 +244,7 @@ def until_safe(supervisor: Supervisor, folder: Path) -> None:
 def test_a_device_whose_link_is_lost_keeps_the_bench_stopped_and_is_made_safe_once_it_is_back(tmp_path: Path) -> None:
     register, books = abandoned(tmp_path, "job-1"), Books()
     register.cables.cut("supply", "")
-    supervisor = Supervisor("sim", RegisteredDevices(register), Watch(GONE), books, Lease().take)
+    supervisor = supervised(tmp_path, RegisteredDevices(register), Watch(GONE), books, Lease().take)
     for _ in range(3):
         assert supervisor.look(companion=True)
         pause(1.1)
@@ -246,7 +270,7 @@ def test_a_worker_that_could_not_reach_a_device_is_not_killed_and_its_stopped_be
     with pytest.raises(ExceptionGroup):
         devices.make_safe("the worker")
     before = register.journal.entries()
-    supervisor = Supervisor("sim", devices, Watch(Driving(identity(worker))), books, lease.take, hung_s=0.3)
+    supervisor = supervised(tmp_path, devices, Watch(Driving(identity(worker))), books, lease.take, hung_s=0.3)
     for _ in range(15):
         supervisor.look()
         pause(0.1)
@@ -272,8 +296,8 @@ def test_a_companion_leaves_after_an_orderly_end_at_once_and_after_a_crash_when_
     devices = RegisteredDevices(register)
     devices.make_safe("a test")
     ended = Watch(Driving(GONE.process, ended=True))
-    assert not Supervisor("sim", devices, ended, Books(), Lease().take).look(companion=True)
-    crashed = Supervisor("sim", devices, Watch(GONE), Books(), Lease().take, linger_s=0.3)
+    assert not supervised(tmp_path, devices, ended, Books(), Lease().take).look(companion=True)
+    crashed = supervised(tmp_path, devices, Watch(GONE), Books(), Lease().take, linger_s=0.3)
     assert crashed.look(companion=True)
     pause(0.4)
     assert not crashed.look(companion=True)
@@ -285,7 +309,7 @@ def test_a_wall_clock_that_jumps_changes_no_judgement(
 ) -> None:
     devices, books = RegisteredDevices(abandoned(tmp_path)), Books()
     books.is_stopped = True
-    supervisor = Supervisor("sim", devices, Watch(Driving(identity(worker))), books, Lease().take, hung_s=5.0)
+    supervisor = supervised(tmp_path, devices, Watch(Driving(identity(worker))), books, Lease().take, hung_s=5.0)
     real = wall_clock.now
     for days in (400, -400, 0):
         monkeypatch.setattr(wall_clock, "now", lambda days=days: real() + timedelta(days=days))

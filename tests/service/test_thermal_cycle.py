@@ -13,6 +13,7 @@ from bench_service.cli.client import connect
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from tests.service.client import ENDED, Client
+from tests.service.page import drawn
 
 
 def leg(target_c: float) -> dict[str, float]:
@@ -95,7 +96,7 @@ def test_the_page_shows_tables_and_plots(client: Client, result: dict[str, Any])
     page = client.http.get(result["page"]).text
     for title in ("3σ before and after", "Ways to correct", "Evidence for each soak", "Gyros against temperature"):
         assert title in page
-    assert page.count("<svg") == 3 * 5 + 3 + 1
+    assert drawn(client, page) == 3 * 5 + 3 + 1
 
 
 def test_the_preview_tells_twelve_hours_a_run(client: Client) -> None:

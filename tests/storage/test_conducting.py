@@ -16,6 +16,7 @@ from bench_service.model.records import BenchStop
 from bench_service.model.request import JobRequest
 from bench_service.wall_clock import now
 from procedures.core.limits import Verdict
+from tests.stops import release_all
 from tests.storage.campaigns import NOW, Laboratory, campaign, new_run, value_check
 
 PASS, FAIL = Verdict.PASS, Verdict.FAIL
@@ -93,7 +94,7 @@ def test_a_job_that_a_person_cancels_is_not_tried_again_one_of_a_stopped_bench_i
         assert run.steps[0].reason == f"job {job.id} was cancelled"
     else:
         assert (run.state, states(run), len(laboratory.jobs())) == (JobState.RUNNING, ["queued"], 1)
-        laboratory.stores.benches.release_bench("sim")
+        release_all(laboratory.stores.benches, "sim")
         laboratory.conductor().advance(run.id)
         assert [j.state for j in laboratory.jobs()] == [JobState.CANCELLED, JobState.QUEUED]
 
@@ -171,7 +172,7 @@ def test_a_stopped_bench_is_waited_for_and_said(laboratory: Laboratory) -> None:
     revision = run.revision
     laboratory.conductor().advance(run.id)
     assert campaigns.run(run.id).revision == revision  # it does not say so again and again
-    benches.release_bench("sim")
+    release_all(benches, "sim")
     laboratory.conductor().advance(run.id)
     assert (len(laboratory.jobs()), campaigns.run(run.id).waiting) == (1, "")
 

@@ -20,8 +20,8 @@ from bench_service.persistence import Database
 from bench_service.wall_clock import monotonic_s, now, pause
 from procedures.core.errors import UnfitRecording
 from procedures.core.limits import Verdict
+from tests.kit.fuse import Fuse, Killed, positions
 from tests.storage.campaigns import Laboratory, campaign, new_run
-from tests.storage.test_conductor_killed import Fuse, Killed, positions
 
 METHOD = {"procedure": None, "method": "run_to_run", "calibrations_of": ["a"]}
 NewResult = Callable[..., StoredResult]

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -13,28 +12,8 @@ from bench_service.model.request import JobRequest
 from bench_service.persistence import Database
 from procedures.core.errors import BadParameter
 from procedures.core.limits import Verdict
+from tests.kit.fuse import Fuse, Killed, positions
 from tests.storage.campaigns import Laboratory, campaign, new_run
-
-
-class Killed(BaseException):
-    """The process is gone."""
-
-
-class Fuse:
-    """Kills the process at its n-th touch of the world, once; after one touch is before the next."""
-
-    def __init__(self, at: int) -> None:
-        self.left, self.blown = at, False
-
-    def around(self, work: Callable[..., Any]) -> Callable[..., Any]:
-        def guarded(*given: Any, **named: Any) -> Any:
-            self.left -= 1
-            if self.left == 0:
-                self.blown = True
-                raise Killed
-            return work(*given, **named)
-
-        return guarded
 
 
 def fragile(laboratory: Laboratory, fuse: Fuse, monkeypatch: pytest.MonkeyPatch) -> Conductor:
@@ -75,11 +54,6 @@ def conduct(
             else:
                 laboratory.end(job)
     raise AssertionError(campaigns.run(run_id))
-
-
-def positions(database: Database) -> range:
-    """Every touch on SQLite, every third on Postgres: the decisions are the same, only the row's lock is another."""
-    return range(1, 60, 3 if database.is_postgres else 1)
 
 
 def test_killed_at_every_touch(

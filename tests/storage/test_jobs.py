@@ -17,6 +17,7 @@ from bench_service.persistence import Database
 from bench_service.persistence.stores import stores_of
 from bench_service.wall_clock import new_id, now
 from procedures.core.limits import Verdict
+from tests.stops import release_all
 from tests.storage.conftest import NOW
 
 NewJob = Callable[..., Job]
@@ -67,7 +68,6 @@ def test_a_job_through_its_life(stores: Stores, new_job: NewJob) -> None:
     job = stores.jobs.add(new_job())
     start = job.created_at
     stores.jobs.transition(job.id, JobState.RUNNING, at=start + LATER)
-    stores.jobs.set_context(job.id, {"bench": "mounted"})
     stores.jobs.station_done(job.id, 0, start + 2 * LATER, {"recording": "r0"})
     stores.jobs.station_done(job.id, 0, start + 2 * LATER, {"recording": "r0"})
     stores.jobs.station_done(job.id, 2, start + 3 * LATER, {})
@@ -88,7 +88,6 @@ def test_a_job_through_its_life(stores: Stores, new_job: NewJob) -> None:
         verdict=Verdict.PASS,
         result_id="r-1",
         stations_done=3,
-        context={"bench": "mounted"},
         attempt=2,
         queued_at=start + 6 * LATER,
         started_at=start + LATER,
@@ -196,7 +195,7 @@ def test_people_who_stop_a_bench_at_once_all_stop_it(stores: Stores, new_job: Ne
             stop = stores.benches.bench_stop("sim")
             assert stop is not None
             assert stop.reason.startswith("person")
-            stores.benches.release_bench("sim")
+            release_all(stores.benches, "sim")
 
 
 def test_a_bench_stays_stopped_until_it_is_released(stores: Stores) -> None:
@@ -206,7 +205,7 @@ def test_a_bench_stays_stopped_until_it_is_released(stores: Stores) -> None:
     assert stores.benches.bench_stop("b-1") == stop
     assert stores.benches.bench_stop("b-2") is None
     for _ in range(2):
-        stores.benches.release_bench("b-1")
+        release_all(stores.benches, "b-1")
     assert stores.benches.bench_stop("b-1") is None
 
 
@@ -221,7 +220,6 @@ def test_what_does_not_exist_is_not_found(stores: Stores) -> None:
         lambda: stores.jobs.resume("x", moment),
         lambda: stores.jobs.transition("x", JobState.RUNNING, at=moment),
         lambda: stores.jobs.station_done("x", 0, moment, {}),
-        lambda: stores.jobs.set_context("x", {}),
         lambda: stores.jobs.note("x", "note", moment, {}),
     )
     for ask in asks:

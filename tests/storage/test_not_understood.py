@@ -10,7 +10,7 @@ from bench_service.campaigns.stores import Stores
 from bench_service.cli.client import connect
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs.dispatcher import Dispatcher, Unfinished
-from bench_service.jobs.queue import QueueEntry, RunningJob
+from bench_service.jobs.queue import QueueEntry
 from bench_service.model.errors import IllegalTransition, NotUnderstood
 from bench_service.model.job import Failure, Job, JobState
 from bench_service.model.records import Page
@@ -126,7 +126,7 @@ class ReadingRunner:
         self._stores = stores
 
     def claim(self, entry: QueueEntry) -> Job | None:
-        self._stores.jobs.get(entry.job)
+        self._stores.jobs.get(entry.id)
         return self._stores.queue.claim(entry, {}, NOW)
 
 
@@ -140,7 +140,7 @@ class CancellingEngine:
     def run(self, job: Job) -> None:
         self._stores.jobs.transition(job.id, JobState.CANCELLED, at=NOW)
 
-    def unfinished(self, job: RunningJob) -> Unfinished:
+    def unfinished(self, job: QueueEntry) -> Unfinished:
         return self._found
 
 
@@ -183,7 +183,9 @@ def test_a_bench_that_runs_it_is_seen_and_stopped_all_the_same(
     """As by an API beside a worker of another version."""
     job = spoil(stores.jobs.add(new_job(state=JobState.RUNNING)))
     stores.benches.put_bench(SimulatedDriver("sim").description, [])
-    assert stores.queue.running("sim") == RunningJob(job.id, 1, job.procedure, job.unit)
+    running = stores.queue.running("sim")
+    assert running is not None
+    assert (running.id, running.attempt, running.procedure, running.unit) == (job.id, 1, job.procedure, job.unit)
     with connect(Settings(database_url=database_url), None, drive=False) as http:
         (bench,) = http.get("/api/v1/benches").json()
         assert (bench["state"], bench["job"]) == ("busy", job.id)

@@ -15,6 +15,7 @@ from bench_service.model.records import BenchStop, Idempotency
 from bench_service.persistence import Database
 from bench_service.persistence.stores import stores_of
 from bench_service.wall_clock import new_id
+from tests.stops import release_all
 from tests.storage.conftest import NOW
 
 NewJob = Callable[..., Job]
@@ -100,7 +101,7 @@ def test_a_stopped_bench_gives_no_job(stores: Stores, new_job: NewJob) -> None:
     assert place is not None
     assert place.waiting == "bench sim is stopped: smoke"
     assert claim_next(stores) is None
-    stores.benches.release_bench("sim")
+    release_all(stores.benches, "sim")
     assert claim_next(stores) is not None
 
 
@@ -155,7 +156,7 @@ def test_a_wish_of_a_person_goes_before_a_retry(stores: Stores, new_job: NewJob)
 def test_a_priority_changes_the_order_while_the_job_is_queued(stores: Stores, new_job: NewJob) -> None:
     jobs = [stores.jobs.add(new_job(queued_at=NOW + k * SECOND)) for k in range(3)]
     assert stores.queue.set_priority(jobs[2].id, 1, NOW).priority == 1
-    assert [e.job for e in stores.queue.look("sim", NOW).entries] == [jobs[2].id, jobs[0].id, jobs[1].id]
+    assert [e.id for e in stores.queue.look("sim", NOW).entries] == [jobs[2].id, jobs[0].id, jobs[1].id]
     assert stores.jobs.events(jobs[2].id)[-1].data == {"priority": 1, "before": 10}
     assert claim_next(stores) is not None
     with pytest.raises(IllegalTransition, match="is running; only a queued one"):

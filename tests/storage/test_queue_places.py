@@ -15,6 +15,7 @@ from bench_service.model.records import BenchStop
 from bench_service.persistence import Database
 from bench_service.persistence.jobs.queue_store import FIRST_PAGE, LONGER
 from bench_service.wall_clock import new_id
+from tests.stops import release_all
 from tests.storage.conftest import NOW
 
 SECOND = timedelta(seconds=1)
@@ -36,7 +37,8 @@ RESERVATIONS = st.lists(
 ENTRIES = st.lists(
     st.builds(
         QueueEntry,
-        job=st.integers(0, 99).map("job {}".format),
+        id=st.integers(0, 99).map("job {}".format),
+        procedure=st.just("static_run"),
         unit=st.sampled_from(["U-1", "U-2"]),
         priority=st.integers(1, 3),
         queued_at=SOON,
@@ -45,7 +47,7 @@ ENTRIES = st.lists(
         reservation=st.none() | st.sampled_from(["R-1", "R-2", "R-3", "one that is over"]),
     ),
     max_size=12,
-    unique_by=lambda entry: entry.job,
+    unique_by=lambda entry: entry.id,
 )
 
 
@@ -54,9 +56,9 @@ def queues(draw: st.DrawFn) -> BenchQueue:
     return BenchQueue(
         bench="sim",
         at=NOW,
-        entries=tuple(sorted(draw(ENTRIES), key=lambda entry: (entry.priority, entry.queued_at, entry.job))),
+        entries=tuple(sorted(draw(ENTRIES), key=lambda entry: (entry.priority, entry.queued_at, entry.id))),
         running=draw(st.none() | st.just("the running one")),
-        stop=draw(st.none() | st.just(BenchStop("sim", NOW, "smoke"))),
+        stops=draw(st.just(()) | st.just((BenchStop("sim", NOW, "smoke"),))),
         reservations=tuple(draw(RESERVATIONS)),
     )
 
@@ -66,7 +68,7 @@ def walked(queue: BenchQueue, job_id: str, driven: bool) -> Place:
     ahead = [] if queue.running is None else [queue.running]
     for number, entry in enumerate(queue.entries, start=1):
         hold = queue.hold(entry)
-        if entry.job == job_id:
+        if entry.id == job_id:
             if hold is not None:
                 waiting = hold
             elif not driven:
@@ -79,18 +81,18 @@ def walked(queue: BenchQueue, job_id: str, driven: bool) -> Place:
                 waiting = f"behind {len(ahead)} jobs; the last of them is {ahead[-1]}"
             return Place(number, len(ahead), waiting)
         if hold is None:
-            ahead.append(entry.job)
+            ahead.append(entry.id)
     raise AssertionError(f"{job_id} is not in the queue")
 
 
 @given(queue=queues(), driven=st.booleans())
 def test_all_places_at_once_are_those_of_a_walk_for_each(queue: BenchQueue, driven: bool) -> None:
-    expected = {entry.job: walked(queue, entry.job, driven) for entry in queue.entries}
+    expected = {entry.id: walked(queue, entry.id, driven) for entry in queue.entries}
     assert queue.places(driven) == expected
-    assert list(queue.places(driven)) == [entry.job for entry in queue.entries]
+    assert list(queue.places(driven)) == [entry.id for entry in queue.entries]
     assert queue.place("not in it", driven) is None
     if queue.entries:
-        last = queue.entries[-1].job
+        last = queue.entries[-1].id
         assert queue.place(last, driven) == expected[last]
 
 
@@ -102,7 +104,7 @@ def test_all_places_hold_each_job_against_the_rules_once() -> None:
             Counted.held += 1
             return super().hold(entry)
 
-    entries = tuple(QueueEntry(f"job {number}", "U-1", 10, NOW, 1) for number in range(500))
+    entries = tuple(QueueEntry(f"job {number}", "static_run", "U-1", 10, NOW, 1) for number in range(500))
     assert len(Counted("sim", NOW, entries).places(True)) == 500
     assert Counted.held == 500
 
@@ -125,18 +127,18 @@ def test_the_front_knows_the_next_job_however_many_are_passed_over(stores: Store
     assert front.next() == look.next()
     assert front.entries == look.entries[: len(front.entries)]
     assert len(front.entries) < len(look.entries)
-    assert next(entry.job for entry in front.entries if front.hold(entry) is None) == free[0].id
+    assert next(entry.id for entry in front.entries if front.hold(entry) is None) == free[0].id
 
 
 def test_the_front_is_read_only_as_far_as_it_must_be(stores: Stores, new_job: Callable[..., Job]) -> None:
     jobs = queued(stores, new_job, FIRST_PAGE + 5)
     front = stores.queue.front("sim", NOW)
-    assert [entry.job for entry in front.entries] == [job.id for job in jobs[:FIRST_PAGE]]
+    assert [entry.id for entry in front.entries] == [job.id for job in jobs[:FIRST_PAGE]]
     stores.benches.stop_bench(BenchStop("sim", NOW, "smoke"))
     stopped = stores.queue.front("sim", NOW)
     assert (len(stopped.entries), stopped.next()) == (FIRST_PAGE, None)
-    assert stopped.stop == stores.queue.look("sim", NOW).stop
-    stores.benches.release_bench("sim")
+    assert stopped.stops == stores.queue.look("sim", NOW).stops
+    release_all(stores.benches, "sim")
     assert stores.queue.claim(front.entries[0], {}, NOW) is not None
     assert stores.queue.front("sim", NOW) == BenchQueue("sim", NOW, (), running=jobs[0].id)
 
@@ -147,7 +149,7 @@ def test_a_claim_reads_its_own_job_and_the_running_one_and_no_other(
     kept = stores.reservations.add(Reservation(new_id(), Reserved.BENCH, "sim", "Ann", NOW, NOW + 60 * SECOND))
     theirs = queued(stores, new_job, 3)[0]
     hers = queued(stores, new_job, 1, reservation=kept.id)[0]
-    entries = {entry.job: entry for entry in stores.queue.look("sim", NOW).entries}
+    entries = {entry.id: entry for entry in stores.queue.look("sim", NOW).entries}
     asked: list[str] = []
     event.listen(database.engine, "before_cursor_execute", lambda _connection, _cursor, sql, *_: asked.append(sql))
     assert stores.queue.claim(entries[theirs.id], {}, NOW) is None, "the bench is Ann's"

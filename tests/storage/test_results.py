@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench_service.campaigns.stores import Stores
-from bench_service.model.errors import IdempotencyConflict, NotFound
+from bench_service.model.errors import IdempotencyConflict, NotFound, UnfitValue
 from bench_service.model.job import Job
 from bench_service.model.records import Idempotency, NewRecording, StoredResult
 from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
@@ -78,7 +78,7 @@ def test_a_result_of_something_that_does_not_exist_leaves_nothing(stores: Stores
 
 
 def test_one_calibration_is_current(stores: Stores, new_result: NewResult) -> None:
-    assert stores.results.current_calibration("U-1") is None
+    assert stores.results.calibrations("U-1").items == ()
     triads = [_triad("gyro", 1), _triad("accelerometer", 2)]
     first = stores.results.add(new_result(), triads)
     stores.results.add(new_result(unit="U-2"), [_triad("gyro", 9)])
@@ -87,7 +87,7 @@ def test_one_calibration_is_current(stores: Stores, new_result: NewResult) -> No
     history = stores.results.calibrations("U-1").items
     assert [(c.result_id, c.current) for c in history] == [(third.id, True), (second.id, False), (first.id, False)]
     assert history[2].triads == tuple(triads), "to the last bit"
-    assert stores.results.current_calibration("U-1") == history[0]
+    assert [c for c in history if c.current] == [history[0]]
     assert stores.results.calibration(history[1].id) == history[1]
     page = stores.results.calibrations("U-1", limit=2)
     assert page.items == history[:2]
@@ -136,6 +136,19 @@ def test_results_are_listed_newest_first(stores: Stores, new_result: NewResult) 
     assert stores.results.list(unit="U-1").items == (made[3], made[1])
 
 
+def test_a_value_that_no_database_holds_is_refused_as_one_that_never_will_be(
+    stores: Stores, new_result: NewResult, new_recording: Callable[..., NewRecording]
+) -> None:
+    """Not as a failure of the database, which is answered by trying again."""
+    unit = Unit("U-1", 400.0, new_recording().channels, averaging_time_s=float("nan"))
+    for store in (lambda: stores.units.put_unit(unit), lambda: stores.results.add(new_result(document={"a": [1e999]}))):
+        with pytest.raises(UnfitValue, match=r"a value cannot be stored.*Out of range float values"):
+            store()
+    with pytest.raises(NotFound):
+        stores.units.unit("U-1")
+    assert stores.results.list().items == ()
+
+
 def test_a_unit_comes_back_with_its_current_calibration(
     stores: Stores, new_result: NewResult, new_recording: Callable[..., NewRecording]
 ) -> None:
@@ -149,8 +162,7 @@ def test_a_unit_comes_back_with_its_current_calibration(
     assert stores.units.unit("U-1") == unit, "the calibrations of the record are not stored"
     stores.results.add(new_result(), [_triad("gyro", 4)])
     stores.results.add(new_result(), [_triad("gyro", 5)])
-    current = stores.results.current_calibration("U-1")
-    assert current is not None
+    (current,) = (c for c in stores.results.calibrations("U-1").items if c.current)
     assert stores.units.unit("U-1") == replace(unit, calibrations=(_triad("gyro", 5),), calibration_id=current.id)
     other = replace(unit, serial="A-1", gyro=None)
     stores.units.put_unit(other)

@@ -34,7 +34,7 @@ from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
 from procedures.methods.plan_orientations import METHOD as PLAN
 from procedures.procedure import Evidence
-from tests.domain.forward_model import ACCELEROMETER_NOISE, GYRO_NOISE, K_GYRO, SITE, random_table, turn
+from tests.kit.forward_model import ACCELEROMETER_NOISE, GYRO_NOISE, K_GYRO, SITE, random_table, turn
 from tests.validation.judgement import FAMILY_LEVEL, LEVEL, Check, spread_limits
 
 G, R, EARTH, LATITUDE = 9.81, 6_371_000.0, u.EARTH_RATE, np.radians(50.45)

@@ -22,6 +22,7 @@ from bench_service.campaigns.campaign import NAME as CAMPAIGN_NAME
 from bench_service.campaigns.campaign import Campaign
 from bench_service.campaigns.lineage import lineage_of
 from bench_service.campaigns.run import RunRequest
+from bench_service.mapping import copied
 from bench_service.model.job import JobState
 from procedures.core.errors import BadParameter
 
@@ -84,14 +85,7 @@ def preview_campaign(name: CampaignName, body: CampaignOn, service: Service) -> 
     """What the campaign would do on a unit: steps left out, times, limits out of reach. Nothing moves."""
     campaign = service.campaigns.campaign(name)
     found = service.campaigns.examine(campaign, body.unit, body.bench)
-    return CampaignPreview(
-        campaign=name,
-        unit=body.unit,
-        steps=list(found.steps),
-        duration_s=found.duration_s,
-        data_bytes=found.data_bytes,
-        warnings=list(found.warnings),
-    )
+    return copied(CampaignPreview, found, campaign=name, unit=body.unit)
 
 
 @router.post(
@@ -103,7 +97,7 @@ def start_campaign(
     name: CampaignName, body: RunSubmission, service: Service, response: Response, key: IdempotencyKey = None
 ) -> CampaignRunView:
     """Queue a run of the campaign. A bench does one campaign run at a time, in the order of asking."""
-    request = RunRequest(name, body.unit, body.bench, body.seed, body.labels, body.parameters)
+    request = copied(RunRequest, body, campaign=name)
     run = service.campaigns.start(request, key)
     response.headers["Location"] = f"/api/v1/campaign-runs/{run.id}"
     return CampaignRunView.of(run)

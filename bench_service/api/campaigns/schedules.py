@@ -11,6 +11,7 @@ from bench_service.api.http.errors import made, problems
 from bench_service.api.http.fields import NAME, Labels, Request
 from bench_service.campaigns.schedule import Missed, Overlap
 from bench_service.campaigns.scheduler import ScheduleRequest
+from bench_service.mapping import copied
 
 router = APIRouter(prefix="/api/v1/schedules", tags=["campaigns"])
 OF_A_SCHEDULE = ("read_schedule", "change_schedule", "remove_schedule")
@@ -63,7 +64,7 @@ def add_schedule(
     body: ScheduleSubmission, service: Service, response: Response, key: IdempotencyKey = None
 ) -> ScheduleView:
     """Start a campaign at given times. A time that never comes is refused, and a run that could not begin now."""
-    request = ScheduleRequest(**{name: getattr(body, name) for name in ScheduleSubmission.model_fields})
+    request = copied(ScheduleRequest, body)
     schedule = service.campaigns.schedules.add(request, key)
     response.headers["Location"] = f"/api/v1/schedules/{schedule.id}"
     return ScheduleView.of(schedule)

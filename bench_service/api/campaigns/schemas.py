@@ -12,6 +12,7 @@ from bench_service.campaigns.run import CampaignRun, StepState
 from bench_service.campaigns.schedule import Missed, Overlap, Schedule
 from bench_service.campaigns.shipped import shipped
 from bench_service.evidence.trend import Trend, TrendPoint
+from bench_service.mapping import copied
 from bench_service.model.job import JobState
 from procedures.analysis.control_chart import ControlLimits, Signal
 from procedures.core.limits import Check, Verdict
@@ -47,12 +48,7 @@ class CampaignMade(BaseModel):
 
     @classmethod
     def of(cls, campaign: Campaign, examination: Examination) -> "CampaignMade":
-        return cls(
-            name=campaign.name,
-            campaign=campaign,
-            duration_s=examination.duration_s,
-            warnings=list(examination.warnings),
-        )
+        return copied(cls, examination, name=campaign.name, campaign=campaign)
 
 
 class CampaignPreview(BaseModel):
@@ -113,27 +109,9 @@ class CampaignRunView(BaseModel):
 
     @classmethod
     def of(cls, run: CampaignRun) -> "CampaignRunView":
-        steps = [
-            StepRunView(
-                **{name: getattr(step, name) for name in _SAME_IN_STEP},
-                job=step.job_id,
-                result=step.result_id,
-            )
-            for step in run.steps
-        ]
-        return cls(
-            **{name: getattr(run, name) for name in _SAME_IN_RUN},
-            campaign=run.campaign.name,
-            steps=steps,
-            schedule=run.schedule_id,
-            page=f"/campaign-runs/{run.id}",
-        )
-
-
-_SAME_IN_STEP = tuple(name for name in StepRunView.model_fields if name not in ("job", "result"))
-_SAME_IN_RUN = tuple(
-    name for name in CampaignRunView.model_fields if name not in ("campaign", "steps", "schedule", "page")
-)
+        steps = [copied(StepRunView, step, job=step.job_id, result=step.result_id) for step in run.steps]
+        given = {"campaign": run.campaign.name, "schedule": run.schedule_id, "page": f"/campaign-runs/{run.id}"}
+        return copied(cls, run, steps=steps, **given)
 
 
 class CampaignRunPage(BaseModel):
@@ -179,7 +157,7 @@ class ScheduleView(BaseModel):
 
     @classmethod
     def of(cls, schedule: Schedule) -> "ScheduleView":
-        return cls(**{name: getattr(schedule, name) for name in cls.model_fields})
+        return copied(cls, schedule)
 
 
 class SchedulePage(BaseModel):
@@ -203,5 +181,4 @@ class TrendView(BaseModel):
 
     @classmethod
     def of(cls, trend: Trend) -> "TrendView":
-        same = {name: getattr(trend, name) for name in cls.model_fields if name != "serial"}
-        return cls(serial=trend.unit_serial, **same)
+        return copied(cls, trend, serial=trend.unit_serial)

@@ -42,5 +42,13 @@ RequestedBy = Annotated[
         description="Who asks, for the job and the audit trail; without it, the trail has the client's address",
     ),
 ]
+
+
+async def _client_name(request: Request, requested_by: RequestedBy = None) -> str:
+    return requested_by or (request.client.host if request.client else "local")
+
+
+ClientName = Annotated[str, Depends(_client_name)]
+"""Who asks: what the client calls itself, or the address that it asks from."""
 After = Annotated[str | None, Query(max_length=100, description="Cursor: `next` of the page before")]
 Limit = Annotated[int, Query(ge=1, le=500)]

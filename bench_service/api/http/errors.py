@@ -13,6 +13,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from bench_service.api.http.bodies import BODY_BYTES
+from bench_service.api.http.headers import SECURITY_HEADERS
 from bench_service.formats.plain_json import A_NUMBER, NOT_SO_DEEP, is_finite, shown
 from bench_service.model.errors import (
     AlreadyReserved,
@@ -26,7 +27,9 @@ from bench_service.model.errors import (
     NotReady,
     NotSafe,
     NotUnderstood,
+    Overloaded,
     ServiceError,
+    SeveralStops,
     StorageFailure,
     StorageFull,
 )
@@ -42,8 +45,10 @@ STATUS: dict[type[Exception], int] = {
     NameTaken: 409,
     NotDriving: 503,
     NotReady: 503,
+    Overloaded: 503,
     NotMounted: 422,
     NotSafe: 409,
+    SeveralStops: 409,
     NotUnderstood: 409,
     DomainError: 422,
     BenchError: 502,
@@ -78,6 +83,8 @@ class Problem(BaseModel):
     lost: list[Shown] = Field(default_factory=list[Shown], description="Combinations that a plan cannot determine")
 
 
+RETRY_AFTER_S = "2"
+"""When a request that was too much may be sent again."""
 MOST_FIELDS = 100
 """Of a megabyte of wrong fields so many are told."""
 _NO_BODY = FieldError(field="body", message="UTF-8 text of one JSON document is expected")
@@ -87,8 +94,10 @@ _UNREAD: dict[type, str] = {RecursionError: NOT_SO_DEEP, ValueError: A_NUMBER}
 
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """The `responses` of a route: these statuses answer with a problem document; 400, 422 and 503 always can."""
-    wanted = sorted({*statuses, 400, 422, 503})
+    """The `responses` of a route: these statuses answer with a problem document. Those of the door (401, 403, 421), of
+    a body or an address that is not understood, and of a service that is not ready are possible everywhere.
+    """
+    wanted = sorted({*statuses, 400, 401, 403, 421, 422, 503})
     return {
         status: {
             "description": HTTPStatus(status).phrase,
@@ -171,8 +180,13 @@ def _on_known(request: Request, error: Exception) -> Response:
         fields = [FieldError(field=error.field, message=error.allowed, value=_jsonable(error.value))]
     if isinstance(error, NotReady):
         fields = [FieldError(field="service", message=reason) for reason in error.reasons]
+    if isinstance(error, SeveralStops):
+        fields = [FieldError(field="stop_id", message=text, value=stop) for stop, text in error.stops]
     lost = list(error.lost) if isinstance(error, Undetermined) else []
-    return respond(request, status_of(error), str(error), type(error).__name__, fields, lost)
+    response = respond(request, status_of(error), str(error), type(error).__name__, fields, lost)
+    if isinstance(error, Overloaded):
+        response.headers["Retry-After"] = RETRY_AFTER_S
+    return response
 
 
 def _on_request_validation(request: Request, error: Exception) -> Response:
@@ -220,7 +234,9 @@ def _on_http(request: Request, error: Exception) -> Response:
 
 
 def _on_unknown(request: Request, error: Exception) -> Response:
-    return respond(request, 500, "a defect of the service; its log has the details", "InternalError")
+    response = respond(request, 500, "a defect of the service; its log has the details", "InternalError")
+    response.headers.update(SECURITY_HEADERS)  # this answer is made outside of all that adds to answers
+    return response
 
 
 def respond(

@@ -22,6 +22,7 @@ from bench_service.api.jobs.schemas import (
 from bench_service.api.results import ResultPage, ResultView
 from bench_service.bench.prompts import Answer
 from bench_service.jobs.events.hub import EventHub
+from bench_service.mapping import copied
 from bench_service.model.errors import NotUnderstood
 from bench_service.model.job import Job, JobState
 from bench_service.model.request import JobRequest
@@ -61,22 +62,7 @@ def submit(
     requested_by: RequestedBy = None,
 ) -> JobView:
     """Queue a job. The same `Idempotency-Key` with the same body gives the job that the first one made."""
-    job = service.jobs.submit(
-        JobRequest(
-            body.procedure,
-            body.unit,
-            body.bench,
-            body.parameters,
-            body.priority,
-            body.labels,
-            body.seed,
-            body.deadline_at,
-            body.retries,
-            body.reservation,
-        ),
-        key,
-        requested_by or "",
-    )
+    job = service.jobs.submit(copied(JobRequest, body), key, requested_by or "")
     response.headers["Location"] = f"/api/v1/jobs/{job.id}"
     return _view(service, job)
 

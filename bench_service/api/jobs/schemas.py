@@ -10,6 +10,7 @@ from bench_service.api.procedures import PreviewRequest
 from bench_service.bench.driver import TrueTriad
 from bench_service.bench.live.values import LiveJob
 from bench_service.jobs.queue_service import Standing
+from bench_service.mapping import copied
 from bench_service.model.job import Event, Failure, Job, JobState
 from procedures.core.limits import Verdict
 
@@ -130,8 +131,9 @@ class JobView(BaseModel):
         eta_s = job.duration_s * (1 - fraction) if open_state else None
         if live is not None:
             fraction, eta_s = max(fraction, live.fraction), live.eta_s
-        return cls(
-            **{name: getattr(job, name) for name in _SAME_IN_JOB},
+        return copied(
+            cls,
+            job,
             progress=Progress(
                 station=job.stations_done,
                 stations=stations,
@@ -141,16 +143,12 @@ class JobView(BaseModel):
                 bench_time_s=None if live is None else live.bench_time_s,
                 label=None if live is None else live.label,
             ),
-            queue=None if place is None else PlaceView(position=place.position, ahead=place.ahead),
+            queue=None if place is None else copied(PlaceView, place),
             waiting=None if standing is None else standing.waiting,
-            resumable=job.resumable,
             error=job.failure,
             result=job.result_id,
             page=f"/jobs/{job.id}",
         )
-
-
-_SAME_IN_JOB = tuple(name for name in JobView.model_fields if name in Job.__dataclass_fields__)
 
 
 class JobPage(BaseModel):
@@ -178,4 +176,4 @@ class EventView(BaseModel):
 
     @classmethod
     def of(cls, event: Event) -> "EventView":
-        return cls(sequence=event.sequence, at=event.at, kind=event.kind, data=event.data)
+        return copied(cls, event)

@@ -6,6 +6,7 @@ from pydantic import BaseModel, Field
 
 from bench_service.api.http.fields import Request
 from bench_service.evidence.corrections import StoredCorrection
+from bench_service.mapping import copied
 from bench_service.model.records import StoredCalibration
 from procedures.core.converter import ConverterTriad
 from procedures.core.imu_model import TriadCalibration
@@ -40,13 +41,9 @@ class UnitView(BaseModel):
 
     @classmethod
     def of(cls, unit: Unit) -> "UnitView":
-        return cls(
-            serial=unit.serial,
-            sample_rate_hz=unit.sample_rate_hz,
-            channels=list(unit.channels),
-            gyro=unit.gyro,
-            accelerometer=unit.accelerometer,
-            averaging_time_s=unit.averaging_time_s,
+        return copied(
+            cls,
+            unit,
             calibration=unit.calibration_id,
             thermal_correction=unit.thermal_correction_id,
             converter=unit.converter_id,
@@ -66,15 +63,7 @@ class CalibrationView(BaseModel):
 
     @classmethod
     def of(cls, stored: StoredCalibration) -> "CalibrationView":
-        return cls(
-            id=stored.id,
-            unit=stored.unit,
-            result=stored.result_id,
-            made_at=stored.made_at,
-            current=stored.current,
-            simulated=stored.simulated,
-            triads=list(stored.triads),
-        )
+        return copied(cls, stored, result=stored.result_id)
 
 
 class CalibrationPage(BaseModel):
@@ -100,18 +89,7 @@ class CorrectionView(BaseModel):
 
     @classmethod
     def of(cls, stored: StoredCorrection, results: tuple[str, ...] | None = None) -> "CorrectionView":
-        return cls(
-            id=stored.id,
-            unit=stored.unit,
-            kind=stored.correction.kind,
-            result=stored.result_id,
-            made_at=stored.made_at,
-            current=stored.current,
-            simulated=stored.simulated,
-            thermal=stored.correction.thermal,
-            converter=stored.correction.converter,
-            results=None if results is None else list(results),
-        )
+        return copied(cls, stored, stored.correction, result=stored.result_id, results=results)
 
 
 class CorrectionPage(BaseModel):

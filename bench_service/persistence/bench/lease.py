@@ -10,8 +10,9 @@ import hashlib
 import os
 import socket
 import threading
+from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import Protocol
+from typing import Any
 
 from sqlalchemy import URL, Connection, create_engine, make_url, text
 from sqlalchemy.exc import SQLAlchemyError
@@ -22,20 +23,60 @@ from bench_service import wall_clock
 from bench_service.model.errors import BenchBusy
 from bench_service.persistence.database import TCP, Database, storage_errors
 
-
-class BenchLease(Protocol):
-    """The right to drive a bench, held for a process's life, and whether it is still ours."""
-
-    def held(self) -> bool: ...
-
-    def regain(self) -> bool: ...
-
-    def release(self) -> None: ...
-
-
 PASSING_S = 5.0
 """How long a process that starts waits for a supervisor that makes the bench safe at this moment [s]."""
 SUPERVISOR = "supervisor"
+
+
+class BenchLease(ABC):
+    """The right to drive a bench, held for a process's life, and whether it is still ours."""
+
+    def __init__(self, bench_id: str, role: str) -> None:
+        """Take the bench. Raises `BenchBusy`."""
+        self._bench_id = bench_id
+        self._role = role
+        self._mutex = threading.Lock()
+        self._given_back = False
+        self._right: Any = self._take()
+        """That by which it is held, an open file or a connection; None: nothing."""
+
+    def held(self) -> bool:
+        """Whether the bench is still ours."""
+        with self._mutex:
+            return self._right is not None and self._is_ours(self._right)
+
+    def regain(self) -> bool:
+        """Take the bench again, after it was taken away; False where somebody else was first or it cannot be now."""
+        with self._mutex:
+            self._drop()
+            if self._given_back:  # a thread that looks once more while the process ends
+                return False
+            try:
+                self._right = self._take()
+            except (BenchBusy, OSError, SQLAlchemyError):
+                return False
+            return True
+
+    def release(self) -> None:
+        """Give the bench back, for good; a second time does nothing."""
+        with self._mutex:
+            self._given_back = True
+            self._drop()
+
+    def _drop(self) -> None:
+        right, self._right = self._right, None
+        if right is not None:
+            self._end(right)
+
+    @abstractmethod
+    def _take(self) -> Any:
+        """Raises `BenchBusy`, and what file or database raise."""
+
+    @abstractmethod
+    def _is_ours(self, right: Any) -> bool: ...
+
+    @abstractmethod
+    def _end(self, right: Any) -> None: ...
 
 
 def acquire_lease(database_url: str, bench_id: str, role: str = "process") -> BenchLease:
@@ -71,55 +112,28 @@ def _written_holder(file: int) -> str:
     return ""
 
 
-class FileLease:
+class FileLease(BenchLease):
     """A locked file, with the holder's process id in it."""
 
     def __init__(self, path: Path, bench_id: str, role: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._mutex = threading.Lock()
-        self._given_back = False
         self._path = path
-        self._bench_id = bench_id
-        self._role = role
-        self._file: int | None = self._locked()
+        super().__init__(bench_id, role)
 
-    def held(self) -> bool:
+    def _is_ours(self, right: int) -> bool:
         """Whether the locked file is still the one that others would lock."""
-        with self._mutex:
-            if self._file is None:
-                return False
-            try:
-                there = self._path.stat()
-            except OSError:
-                return False
-            here = os.fstat(self._file)
-            return (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino)
+        try:
+            there = self._path.stat()
+        except OSError:
+            return False
+        here = os.fstat(right)
+        return (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino)
 
-    def regain(self) -> bool:
-        """Lock the file that is there now, after ours was taken away; False where somebody else was first."""
-        with self._mutex:
-            self._drop()
-            if self._given_back:  # a thread that looks once more while the process ends
-                return False
-            try:
-                self._file = self._locked()
-            except (BenchBusy, OSError):
-                return False
-            return True
+    def _end(self, right: int) -> None:
+        os.close(right)
 
-    def release(self) -> None:
-        """Give the bench back, for good; a second time does nothing."""
-        with self._mutex:
-            self._given_back = True
-            self._drop()
-
-    def _drop(self) -> None:
-        if self._file is not None:
-            os.close(self._file)
-            self._file = None
-
-    def _locked(self) -> int:
-        """The file, locked, with our process id in it. Raises `BenchBusy`."""
+    def _take(self) -> int:
+        """The file, locked, with our process id in it."""
         file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
             self._lock(file)
@@ -141,13 +155,10 @@ class FileLease:
             wall_clock.pause(0.01)  # it may only be somebody who looks whether it is taken: `lease_holder`
 
 
-class ServerLease:
+class ServerLease(BenchLease):
     """An advisory lock of a connection of its own."""
 
     def __init__(self, url: URL, bench_id: str, role: str) -> None:
-        self._mutex = threading.Lock()
-        self._given_back = False
-        self._bench_id = bench_id
         self._key = lease_key(bench_id)
         self._engine = create_engine(
             url,
@@ -158,40 +169,23 @@ class ServerLease:
                 "application_name": f"bench {bench_id} {role} pid {os.getpid()} on {socket.gethostname()}"[:63],
             },
         )
-        self._connection: Connection | None = self._locked()
+        super().__init__(bench_id, role)
 
-    def held(self) -> bool:
+    def _is_ours(self, right: Connection) -> bool:
         """Ask the server over the connection that has the lock: while it answers, the lock is ours."""
-        with self._mutex:
-            if self._connection is None:
-                return False
-            try:
-                self._connection.execute(text("SELECT 1"))
-            except SQLAlchemyError:
-                self._drop()
-                return False
-            return True
-
-    def regain(self) -> bool:
-        """Lock again over a new connection, after the old one ended; False where that cannot be done now."""
-        with self._mutex:
+        try:
+            right.execute(text("SELECT 1"))
+        except SQLAlchemyError:
             self._drop()
-            if self._given_back:  # a thread that looks once more while the process ends
-                return False
-            try:
-                self._connection = self._locked()
-            except (BenchBusy, SQLAlchemyError):
-                return False
-            return True
+            return False
+        return True
 
-    def release(self) -> None:
-        """Give the bench back, for good; a second time does nothing."""
-        with self._mutex:
-            self._given_back = True
-            self._drop()
+    def _end(self, right: Connection) -> None:
+        right.invalidate()
+        right.close()
 
-    def _locked(self) -> Connection:
-        """A connection that has the lock. Raises `BenchBusy`, and the driver's errors."""
+    def _take(self) -> Connection:
+        """A connection that has the lock."""
         connection = self._engine.connect()
         try:
             if not connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": self._key}):
@@ -200,12 +194,6 @@ class ServerLease:
             connection.close()
             raise
         return connection
-
-    def _drop(self) -> None:
-        if self._connection is not None:
-            self._connection.invalidate()
-            self._connection.close()
-            self._connection = None
 
 
 def lease_holder(database: Database, database_url: str, bench_id: str) -> str | None:

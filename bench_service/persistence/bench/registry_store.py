@@ -1,21 +1,26 @@
-"""Benches in SQL, as their workers registered them, and the stops that stand."""
+"""Benches in SQL, as their workers registered them, and their stops."""
 
 from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
 from pydantic import TypeAdapter
-from sqlalchemy import delete, select, update
+from sqlalchemy import select, update
+from sqlalchemy.orm import Session
 
 from bench_service import wall_clock
-from bench_service.model.errors import NotFound
-from bench_service.model.records import BenchStop
+from bench_service.model.errors import IllegalTransition, NotFound
+from bench_service.model.records import BenchStop, Page
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict
+from bench_service.persistence.pages import page
 from bench_service.persistence.tables.bench import BenchRow, BenchStopRow
 from procedures.bench import BenchDescription
 
 BENCH = TypeAdapter(BenchDescription)
+_STANDS = BenchStopRow.released_at.is_(None)
+_FIELDS = tuple(column.key for column in BenchStopRow.__table__.columns)
+"""Columns of a stop; the fields of `BenchStop` have the same names."""
 
 
 class SqlBenchRegistry:
@@ -54,23 +59,60 @@ class SqlBenchRegistry:
     def stop_bench(self, stop: BenchStop) -> None:
         def once() -> None:
             with self._database.write() as session:
-                if session.get(BenchStopRow, stop.bench) is None:
-                    row = BenchStopRow(bench=stop.bench, at=stop.at, reason=stop.reason)
-                    row.safe_at, row.safe_by = stop.safe_at, stop.safe_by
-                    session.add(row)
+                if session.get(BenchStopRow, stop.id) is None:
+                    session.add(_row_of_stop(stop))
 
         again_after_conflict(once)
 
+    def stop_bench_once(self, stop: BenchStop) -> None:
+        same = select(BenchStopRow.id).where(BenchStopRow.bench == stop.bench, BenchStopRow.reason == stop.reason)
+        with self._database.write() as session:
+            self._database.one_at_a_time(session, f"stop bench {stop.bench}")
+            if session.scalar(same.where(_STANDS).limit(1)) is None:
+                session.add(_row_of_stop(stop))
+
     def confirm_safe(self, bench_id: str, at: datetime, by: str) -> None:
-        query = update(BenchStopRow).where(BenchStopRow.bench == bench_id, BenchStopRow.safe_at.is_(None))
+        unconfirmed = BenchStopRow.safe_at.is_(None)
+        query = update(BenchStopRow).where(BenchStopRow.bench == bench_id, _STANDS, unconfirmed)
         with self._database.write() as session:
             session.execute(query.values(safe_at=at, safe_by=by))
 
-    def release_bench(self, bench_id: str) -> None:
+    def release_stop(self, bench_id: str, stop_id: str, at: datetime, by: str, remark: str) -> BenchStop:
         with self._database.write() as session:
-            session.execute(delete(BenchStopRow).where(BenchStopRow.bench == bench_id))
+            row = session.get(BenchStopRow, stop_id, with_for_update=True)
+            if row is None or row.bench != bench_id:
+                raise NotFound("stop", stop_id, f"bench {bench_id} has none of that id")
+            if row.released_at is None:
+                row.released_at, row.released_by, row.remark = at, by, remark
+            elif (row.released_by, row.remark) != (by, remark):
+                when = row.released_at.isoformat()
+                raise IllegalTransition(f"stop {stop_id} was released before, at {when} by {row.released_by}")
+            return _stop_of_row(row)
+
+    def standing_stops(self, bench_id: str) -> tuple[BenchStop, ...]:
+        with self._database.read() as session:
+            return standing_stops(session, bench_id)
 
     def bench_stop(self, bench_id: str) -> BenchStop | None:
         with self._database.read() as session:
-            row = session.get(BenchStopRow, bench_id)
-            return None if row is None else BenchStop(row.bench, row.at, row.reason, row.safe_at, row.safe_by)
+            return next(iter(standing_stops(session, bench_id, limit=1)), None)
+
+    def stops(self, bench_id: str, *, after: str | None = None, limit: int = 50) -> Page[BenchStop]:
+        query = select(BenchStopRow).where(BenchStopRow.bench == bench_id)
+        with self._database.read() as session:
+            return page(session, query, BenchStopRow.id, after, limit, _stop_of_row)
+
+
+def standing_stops(session: Session, bench_id: str, limit: int | None = None) -> tuple[BenchStop, ...]:
+    """The stops of a bench that stand, oldest first."""
+    query = select(BenchStopRow).where(BenchStopRow.bench == bench_id, _STANDS)
+    ordered = query.order_by(BenchStopRow.at, BenchStopRow.id).limit(limit)
+    return tuple(map(_stop_of_row, session.scalars(ordered)))
+
+
+def _row_of_stop(stop: BenchStop) -> BenchStopRow:
+    return BenchStopRow(**{name: getattr(stop, name) for name in _FIELDS})
+
+
+def _stop_of_row(row: BenchStopRow) -> BenchStop:
+    return BenchStop(**{name: getattr(row, name) for name in _FIELDS})

@@ -6,16 +6,22 @@ supervisor works without one that does not answer.
 
 from functools import cached_property
 
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, select
 
 from bench_service import wall_clock
+from bench_service.bench.stop.messages import Listening
+from bench_service.bench.stop.word import StopWord
+from bench_service.jobs.stop_entry import StopEntry
 from bench_service.model.errors import NotFound
 from bench_service.model.records import BenchStop
 from bench_service.persistence.bench.registry_store import SqlBenchRegistry
+from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.database import Database, connect
 from bench_service.persistence.jobs.job_store import SqlJobStore
+from bench_service.persistence.jobs.queue_store import SqlQueueStore
 from bench_service.persistence.tables.bench import BenchStopRow
 from bench_service.persistence.tables.telemetry import AuditRow
+from bench_service.persistence.telemetry.audit_store import SqlAuditTrail
 
 
 class SqlSafetyBooks:
@@ -29,16 +35,24 @@ class SqlSafetyBooks:
     def _database(self) -> Database:
         return connect(self._url)
 
-    def stopped(self) -> bool:
-        with self._database.read() as session:
-            query = select(BenchStopRow.bench).where(BenchStopRow.bench == self._bench_id)
-            return session.scalar(query) is not None
+    def standing(self) -> tuple[BenchStop, ...]:
+        return SqlBenchRegistry(self._database).standing_stops(self._bench_id)
+
+    def enter(self, word: StopWord) -> None:
+        database = self._database
+        stores = SqlBenchRegistry(database), SqlQueueStore(database), SqlJobStore(database), SqlAuditTrail(database)
+        StopEntry(*stores).enter(self._bench_id, word)
+
+    def say_listening(self, at: Listening) -> None:
+        SqlStopAddresses(self._database).say(self._bench_id, at)
 
     def confirm_safe(self, by: str) -> None:
-        SqlBenchRegistry(self._database).confirm_safe(self._bench_id, wall_clock.now(), by)
+        if self._stands(BenchStopRow.released_at.is_(None), BenchStopRow.safe_at.is_(None)):
+            SqlBenchRegistry(self._database).confirm_safe(self._bench_id, wall_clock.now(), by)
 
-    def stop(self, reason: str) -> None:
-        SqlBenchRegistry(self._database).stop_bench(BenchStop(self._bench_id, wall_clock.now(), reason))
+    def stop(self, reason: str, by: str) -> None:
+        stop = BenchStop(self._bench_id, wall_clock.now(), reason, by=by)
+        SqlBenchRegistry(self._database).stop_bench_once(stop)
 
     def note(self, by: str, text: str, job: str | None) -> None:
         at = wall_clock.now()
@@ -59,6 +73,12 @@ class SqlSafetyBooks:
                 SqlJobStore(self._database).note(job, "note", at, {"text": text, "by": by})
             except NotFound:
                 return
+
+    def _stands(self, *conditions: ColumnElement[bool]) -> bool:
+        """Whether the bench has a stop of which all this is true."""
+        query = select(BenchStopRow.id).where(BenchStopRow.bench == self._bench_id, *conditions).limit(1)
+        with self._database.read() as session:
+            return session.scalar(query) is not None
 
     def close(self) -> None:
         """Close the database's connections."""

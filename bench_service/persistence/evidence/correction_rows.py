@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from bench_service import wall_clock
 from bench_service.evidence.corrections import StoredCorrection
+from bench_service.mapping import copied
 from bench_service.model.errors import NotFound
 from bench_service.model.records import StoredResult
 from bench_service.persistence.tables.evidence import CorrectionRow, ResultCorrectionRow
@@ -19,7 +20,7 @@ CORRECTION = TypeAdapter(UnitCorrection)
 def correction_of_row(row: CorrectionRow) -> StoredCorrection:
     """The correction that a row keeps."""
     correction = CORRECTION.validate_python(row.document)
-    return StoredCorrection(row.id, row.unit, row.result_id, row.made_at, row.is_current, correction, row.simulated)
+    return copied(StoredCorrection, row, current=row.is_current, correction=correction)
 
 
 def check_corrections(session: Session, result: StoredResult) -> None:

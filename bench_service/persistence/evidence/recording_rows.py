@@ -1,8 +1,11 @@
 """A recording as a row and back. Knows the two shapes only; no transaction begins here."""
 
+from datetime import datetime
+
 import numpy as np
 from pydantic import TypeAdapter
 
+from bench_service.mapping import copied
 from bench_service.model.records import NewRecording, RecordingState, StoredRecording
 from bench_service.persistence.tables.evidence import RecordingRow
 from procedures.core.recording import Channel, RecordingInfo, Station
@@ -18,49 +21,37 @@ def station_of_row(row: RecordingRow) -> Station | None:
 
 def info_of_row(row: RecordingRow) -> RecordingInfo:
     """What a recording is, from its row."""
-    return RecordingInfo(
-        id=row.id,
-        unit=row.unit,
+    return copied(
+        RecordingInfo,
+        row,
         channels=CHANNELS.validate_python(row.channels),
-        rate_hz=row.rate_hz,
         count=row.samples,
-        start_s=row.start_s,
         station=station_of_row(row),
-        content_hash=row.content_hash,
-        simulated=row.simulated,
-        launched_s=row.launched_s,
     )
 
 
 def stored_of_row(row: RecordingRow) -> StoredRecording:
     """The recording that a row keeps."""
-    return StoredRecording(
-        info=info_of_row(row),
-        state=RecordingState(row.state),
-        created_at=row.created_at,
-        job_id=row.job_id,
-        bench=row.bench,
-        stored_bytes=row.stored_bytes,
-        chunks=row.chunks,
-        dtype=row.sample_type,
-        source=row.source,
+    info, state = info_of_row(row), RecordingState(row.state)
+    return copied(StoredRecording, row, info=info, state=state, dtype=row.sample_type)
+
+
+def row_of_new(new: NewRecording, recording_id: str, created_at: datetime, chunk_rows: int) -> RecordingRow:
+    """The row of a recording before its first sample."""
+    return copied(
+        RecordingRow,
+        new,
+        id=recording_id,
+        state=RecordingState.OPEN.value,
+        created_at=created_at,
+        chunk_rows=chunk_rows,
+        station_index=None if new.station is None else new.station.index,
+        station=None if new.station is None else STATION.dump_python(new.station, mode="json"),
+        channels=CHANNELS.dump_python(new.channels, mode="json"),
+        sample_type=np.dtype(new.dtype).name,
+        samples=0,
+        chunks=0,
+        stored_bytes=0,
+        content_hash="",
+        checkpoint=None,
     )
-
-
-def fill_row(row: RecordingRow, new: NewRecording) -> None:
-    """What is known of a recording before its first sample."""
-    row.unit = new.unit
-    row.bench = new.bench
-    row.job_id = new.job_id
-    row.station_index = None if new.station is None else new.station.index
-    row.station = None if new.station is None else STATION.dump_python(new.station, mode="json")
-    row.channels = list(CHANNELS.dump_python(new.channels, mode="json"))
-    row.rate_hz = new.rate_hz
-    row.start_s = new.start_s
-    row.launched_s = new.launched_s
-    row.sample_type = np.dtype(new.dtype).name
-    row.simulated = new.simulated
-    row.source = new.source
-    row.samples = row.chunks = row.stored_bytes = 0
-    row.content_hash = ""
-    row.checkpoint = None

@@ -24,7 +24,7 @@ from bench_service.formats.content_hash import ContentHash
 from bench_service.model.errors import StorageFailure, StorageFull
 from bench_service.model.records import NewRecording, RecordingState
 from bench_service.persistence.database import Conflict, Database
-from bench_service.persistence.evidence.recording_rows import fill_row, info_of_row
+from bench_service.persistence.evidence.recording_rows import info_of_row, row_of_new
 from bench_service.persistence.idempotency import made_before, remember
 from bench_service.persistence.tables.evidence import ChunkRow, RecordingRow
 from procedures.core.errors import BadParameter, UnfitRecording
@@ -142,9 +142,7 @@ class SqlRecordingWriter:
     def _row(self, session: Session) -> RecordingRow:
         """This recording's row, made with its first chunk; still open, or somebody closed it in between."""
         if not self._chunks:
-            row = RecordingRow(id=self.id, state=RecordingState.OPEN.value, created_at=self._created_at)
-            row.chunk_rows = self._rows
-            fill_row(row, self._new)
+            row = row_of_new(self._new, self.id, self._created_at, self._rows)
             session.add(row)
             session.flush()
             return row

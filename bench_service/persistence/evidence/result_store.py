@@ -138,12 +138,6 @@ class SqlResultStore:
                 raise NotFound("calibration", calibration_id)
             return calibration_of_row(row)
 
-    def current_calibration(self, unit: str) -> StoredCalibration | None:
-        query = select(CalibrationRow).where(CalibrationRow.unit == unit, CalibrationRow.is_current)
-        with self._database.read() as session:
-            row = session.scalar(query)
-            return None if row is None else calibration_of_row(row)
-
 
 def _itself(row: ResultRow) -> ResultRow:
     return row

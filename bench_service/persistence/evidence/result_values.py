@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 from sqlalchemy import Row, Select, and_, select
 from sqlalchemy.orm import Session
 
+from bench_service.mapping import copied
 from bench_service.model.errors import NotFound
 from bench_service.model.quantities import Quantity, quantity
 from bench_service.model.records import ResultValue
@@ -55,7 +56,8 @@ def newest_first(
 
 def value_of_row(row: Row[*tuple[Any, ...]], name: str) -> ResultValue:
     """What one result says of the quantity."""
-    return ResultValue(row.id, row.job_id, row.created_at, row.simulated, row.code_version, _quantity(row, name))
+    about = {"result": row.id, "job": row.job_id, "at": row.created_at}
+    return copied(ResultValue, row, **about, quantity=_quantity(row, name))
 
 
 def _quantity(row: Row[*tuple[Any, ...]], name: str) -> Quantity | None:

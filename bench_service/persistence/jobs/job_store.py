@@ -116,12 +116,6 @@ class SqlJobStore:
                 append_event(session, job_id, "station", at, {"station": station, **data})
             return job_of_row(row)
 
-    def set_context(self, job_id: str, context: dict[str, Any]) -> Job:
-        with self._database.write() as session:
-            row = found_job(session, job_id, lock=True)
-            row.context = context
-            return job_of_row(row)
-
     def request_cancel(self, job_id: str, at: datetime) -> Job:
         with self._database.write() as session:
             row = found_job(session, job_id, lock=True)

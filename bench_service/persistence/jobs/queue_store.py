@@ -7,15 +7,16 @@ from typing import Any
 from sqlalchemy import bindparam, func, select, tuple_
 from sqlalchemy.orm import Session
 
-from bench_service.jobs.queue import BenchQueue, QueueEntry, RunningJob
+from bench_service.jobs.queue import BenchQueue, QueueEntry
+from bench_service.mapping import copied
 from bench_service.model.errors import IllegalTransition
 from bench_service.model.job import Failure, Job, JobState
-from bench_service.model.records import BenchStop
+from bench_service.persistence.bench.registry_store import standing_stops
 from bench_service.persistence.database import Database
 from bench_service.persistence.jobs.job_changes import append_event, found_job, move_job
 from bench_service.persistence.jobs.job_rows import failure_document, job_of_row
 from bench_service.persistence.jobs.reservation_store import active_reservations, reservation_of_row
-from bench_service.persistence.tables.bench import BenchStopRow
+from bench_service.persistence.tables.columns import columns
 from bench_service.persistence.tables.jobs import JobRow, ReservationRow
 
 QUEUED, RUNNING = JobState.QUEUED.value, JobState.RUNNING.value
@@ -23,29 +24,14 @@ FIRST_PAGE, LONGER = 20, 4
 """How many entries are read to find the one that starts next, and how much more each time that none of them may."""
 
 _ORDER = (JobRow.priority, JobRow.queued_at, JobRow.id)
-_ENTRY = (
-    JobRow.id,
-    JobRow.unit,
-    JobRow.priority,
-    JobRow.queued_at,
-    JobRow.attempt,
-    JobRow.not_before,
-    JobRow.reservation,
-)
-"""The fields of a `QueueEntry`."""
+_ENTRY = columns(JobRow, QueueEntry)
 _OF_BENCH = JobRow.bench == bindparam("bench")
 _OPEN_JOBS = select(*_ENTRY, JobRow.state).where(_OF_BENCH, JobRow.state.in_((QUEUED, RUNNING))).order_by(*_ORDER)
 """Those that wait, in the order of the queue, and the one that runs."""
 _FRONT = select(*_ENTRY).where(_OF_BENCH, JobRow.state == QUEUED).order_by(*_ORDER).limit(bindparam("limit"))
 _FURTHER = _FRONT.where(tuple_(*_ORDER) > tuple_(*(bindparam(f"last_{c.key}", type_=c.type) for c in _ORDER)))
 """Those that wait, from the first on, and from one on: in the order of an index, so the others are not touched."""
-_RUNNING = (
-    select(JobRow.id, JobRow.attempt, JobRow.procedure, JobRow.unit)
-    .where(_OF_BENCH, JobRow.state == RUNNING)
-    .order_by(JobRow.id)
-    .limit(1)
-)
-_STOP = select(BenchStopRow.at, BenchStopRow.reason).where(BenchStopRow.bench == bindparam("bench"))
+_RUNNING = select(*_ENTRY).where(_OF_BENCH, JobRow.state == RUNNING).order_by(JobRow.id).limit(1)
 
 
 class SqlQueueStore:
@@ -64,16 +50,16 @@ class SqlQueueStore:
             first = () if running is not None else _entries(session, bench, FIRST_PAGE)
             queue = _queue(session, bench, at, first, running)
             wanted = FIRST_PAGE
-            while len(queue.entries) == wanted and queue.stop is None and queue.next() is None:
+            while len(queue.entries) == wanted and not queue.stops and queue.next() is None:
                 more = _entries(session, bench, wanted * (LONGER - 1), queue.entries[-1])
                 queue, wanted = replace(queue, entries=queue.entries + more), wanted * LONGER
             return queue
 
     def claim(self, entry: QueueEntry, context: dict[str, Any], at: datetime) -> Job | None:
         with self._database.write() as session:
-            row = found_job(session, entry.job, lock=True)
+            row = found_job(session, entry.id, lock=True)
             self._database.one_at_a_time(session, f"claim a job of bench {row.bench}")
-            current = QueueEntry(*(getattr(row, column.key) for column in _ENTRY))
+            current = copied(QueueEntry, row)
             if row.state != QUEUED or current.attempt != entry.attempt or _running(session, row.bench) is not None:
                 return None
             if _queue(session, row.bench, at, (current,)).next() is None:
@@ -85,10 +71,10 @@ class SqlQueueStore:
             move_job(session, row, JobState.RUNNING, at)
             return job_of_row(row)
 
-    def running(self, bench: str) -> RunningJob | None:
+    def running(self, bench: str) -> QueueEntry | None:
         with self._database.read() as session:
             row = session.execute(_RUNNING, {"bench": bench}).first()
-            return None if row is None else RunningJob(*row)
+            return None if row is None else QueueEntry(*row)
 
     def requeue(self, job_id: str, at: datetime, not_before: datetime | None, why: Failure, spend: bool) -> Job:
         with self._database.write() as session:
@@ -137,9 +123,7 @@ def _queue(
     """These entries, with everything that may keep them from starting."""
     if not entries:
         return BenchQueue(bench, at, (), running)
-    stop = session.execute(_STOP, {"bench": bench}).first()
-    held = None if stop is None else BenchStop(bench, stop.at, stop.reason)
-    return BenchQueue(bench, at, entries, running, held, active_reservations(session, at))
+    return BenchQueue(bench, at, entries, running, standing_stops(session, bench), active_reservations(session, at))
 
 
 def _running(session: Session, bench: str) -> str | None:
@@ -151,7 +135,7 @@ def _entries(session: Session, bench: str, limit: int, after: QueueEntry | None 
     """The first that wait for a bench, or the next after one of them."""
     asked: dict[str, Any] = {"bench": bench, "limit": limit}
     if after is not None:
-        asked |= {"last_priority": after.priority, "last_queued_at": after.queued_at, "last_id": after.job}
+        asked |= {"last_priority": after.priority, "last_queued_at": after.queued_at, "last_id": after.id}
     return tuple(QueueEntry(*row) for row in session.execute(_FRONT if after is None else _FURTHER, asked))
 
 

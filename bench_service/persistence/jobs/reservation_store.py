@@ -6,6 +6,7 @@ from sqlalchemy import bindparam, select
 from sqlalchemy.orm import Session
 
 from bench_service.jobs.reservation import Reservation, Reserved
+from bench_service.mapping import copied
 from bench_service.model.errors import AlreadyReserved, NotFound
 from bench_service.model.records import Idempotency, Page
 from bench_service.persistence.database import Database
@@ -74,22 +75,11 @@ def active_reservations(session: Session, at: datetime) -> tuple[Reservation, ..
 
 def reservation_of_row(row: ReservationRow) -> Reservation:
     """The reservation that a row keeps."""
-    return Reservation(
-        row.id, Reserved(row.kind), row.name, row.holder, row.created_at, row.until, row.note, row.ended_at
-    )
+    return copied(Reservation, row, kind=Reserved(row.kind))
 
 
 def _row(reservation: Reservation) -> ReservationRow:
-    return ReservationRow(
-        id=reservation.id,
-        kind=reservation.kind.value,
-        name=reservation.name,
-        holder=reservation.holder,
-        note=reservation.note,
-        created_at=reservation.created_at,
-        until=reservation.until,
-        ended_at=reservation.ended_at,
-    )
+    return copied(ReservationRow, reservation, kind=reservation.kind.value)
 
 
 def _found(session: Session, reservation_id: str) -> ReservationRow:

@@ -3,6 +3,7 @@
 from datetime import datetime
 from typing import Any
 
+from sqlalchemy import Index, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from bench_service.persistence.tables.columns import Id, Table
@@ -17,15 +18,29 @@ class BenchRow(Table):
 
 
 class BenchStopRow(Table):
-    """A bench that was stopped and not released yet."""
+    """A stop of a bench; it stands while `released_at` is empty."""
 
     __tablename__ = "bench_stops"
+    __table_args__ = (
+        Index(None, "bench", "id"),
+        Index(
+            "ix_bench_stops_standing",
+            "bench",
+            sqlite_where=text("released_at IS NULL"),
+            postgresql_where=text("released_at IS NULL"),
+        ),
+    )
 
-    bench: Mapped[str] = mapped_column(Id, primary_key=True)
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    bench: Mapped[str] = mapped_column(Id)
     at: Mapped[datetime]
     reason: Mapped[str]
+    by: Mapped[str]
     safe_at: Mapped[datetime | None]
     safe_by: Mapped[str]
+    released_at: Mapped[datetime | None]
+    released_by: Mapped[str]
+    remark: Mapped[str]
 
 
 class BenchLiveRow(Table):

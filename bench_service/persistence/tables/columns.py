@@ -14,8 +14,10 @@ from sqlalchemy import (
     MetaData,
     String,
 )
-from sqlalchemy.orm import DeclarativeBase
+from sqlalchemy.orm import DeclarativeBase, InstrumentedAttribute
 from sqlalchemy.types import TypeDecorator
+
+from bench_service.mapping import field_names
 
 
 class UtcDateTime(TypeDecorator[datetime]):
@@ -58,3 +60,8 @@ class Table(DeclarativeBase):
         dict[str, Any]: Document,
         list[Any]: Document,
     }
+
+
+def columns(table: type[Table], shape: type) -> tuple[InstrumentedAttribute[Any], ...]:
+    """The columns of a table that a shape is made of, in the order of its fields."""
+    return tuple(getattr(table, name) for name in field_names(shape))

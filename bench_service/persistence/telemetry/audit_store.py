@@ -2,6 +2,7 @@
 
 from sqlalchemy import or_, select
 
+from bench_service.mapping import copied
 from bench_service.model.records import Page
 from bench_service.persistence.database import Database
 from bench_service.persistence.pages import page
@@ -17,17 +18,7 @@ class SqlAuditTrail:
 
     def add(self, entry: AuditEntry) -> None:
         with self._database.write() as session:
-            session.add(
-                AuditRow(
-                    id=entry.id,
-                    at=entry.at,
-                    who=entry.who,
-                    action=entry.action,
-                    target=entry.target,
-                    outcome=entry.outcome,
-                    detail=entry.detail,
-                )
-            )
+            session.add(copied(AuditRow, entry))
 
     def list(
         self, *, who: str | None = None, target: str | None = None, after: str | None = None, limit: int = 50
@@ -49,4 +40,4 @@ class SqlAuditTrail:
 
 
 def _entry(row: AuditRow) -> AuditEntry:
-    return AuditEntry(row.id, row.at, row.who, row.action, row.target, row.outcome, row.detail)
+    return copied(AuditEntry, row)

@@ -9,6 +9,7 @@ from sqlalchemy import func, or_, select
 from bench_service.model.job import FINAL
 from bench_service.model.records import RecordingState
 from bench_service.persistence.database import Database
+from bench_service.persistence.tables.columns import columns
 from bench_service.persistence.tables.evidence import RecordingRow
 from bench_service.persistence.tables.jobs import JobRow
 from bench_service.telemetry.tallies import Ending
@@ -22,16 +23,7 @@ class SqlTallyStore:
 
     def endings(self, since: datetime | None, after: str, limit: int) -> tuple[Ending, ...]:
         query = (
-            select(
-                JobRow.id,
-                JobRow.procedure,
-                JobRow.state,
-                JobRow.verdict,
-                JobRow.created_at,
-                JobRow.started_at,
-                JobRow.finished_at,
-                JobRow.stations_done,
-            )
+            select(*columns(JobRow, Ending))
             .where(JobRow.finished_at.is_not(None), JobRow.state.in_([state.value for state in FINAL]))
             .order_by(JobRow.finished_at, JobRow.id)
             .limit(limit)
@@ -40,11 +32,7 @@ class SqlTallyStore:
             later = or_(JobRow.finished_at > since, JobRow.id > after)
             query = query.where(JobRow.finished_at >= since, later)
         with self._database.read() as session:
-            return tuple(
-                Ending(id_, procedure, state, verdict or "", created, started, finished, done)
-                for id_, procedure, state, verdict, created, started, finished, done in session.execute(query)
-                if finished is not None
-            )
+            return tuple(Ending(*row) for row in session.execute(query))
 
     def stations_of_open_jobs(self) -> int:
         open_states = ("queued", "running", "paused", "interrupted")

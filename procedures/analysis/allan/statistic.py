@@ -84,6 +84,17 @@ def decade_sizes(largest: int, step: float) -> Sizes:
     return np.unique(np.round(10.0 ** np.arange(0.0, log10(max(largest, 1)) + 1e-9, step)).astype(np.int64))
 
 
+def octave_sizes(largest: int) -> Sizes:
+    """Cluster sizes 1, 2, 4 … up to `largest`."""
+    return 1 << np.arange(max(largest, 1).bit_length(), dtype=np.int64)
+
+
+def one_two_four_sizes(largest: int) -> Sizes:
+    """Cluster sizes 1, 2, 4, 10, 20, 40 … up to `largest`."""
+    sizes = np.array([d * 10**e for e in range(len(str(max(largest, 1)))) for d in (1, 2, 4)], np.int64)
+    return sizes[sizes <= max(largest, 1)]
+
+
 def checked_sizes(sizes: Sequence[int] | Sizes | None, count: int, statistic: Statistic) -> Sizes:
     """The cluster sizes asked for, ascending, or the default ones. Raises `UnfitRecording` and `BadParameter`."""
     if count < FEWEST_SAMPLES:

@@ -150,7 +150,9 @@ def fit_scalar(
     Where the noise is not known it is scaled up, never down, to what the residuals show.
     """
     directions = (outputs - start[:3]) @ correction_matrix(start).T
-    condition = require_scalar_determined(what, directions / np.linalg.norm(directions, axis=1)[:, None])
+    # A pose in the middle of all, such as the only one, shows no direction: it is a row of zeros, which adds no rank.
+    lengths = np.linalg.norm(directions, axis=1)[:, None]
+    condition = require_scalar_determined(what, directions / np.where(lengths > 0.0, lengths, 1.0))
     parameters = start
     for _ in range(_PASSES):
         weights = whitener(_magnitude_covariance(parameters, outputs, noise_covariance))

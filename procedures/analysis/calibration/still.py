@@ -10,7 +10,7 @@ import numpy as np
 
 from procedures.analysis.calibration.slow_noise import slow_excess
 from procedures.core.arrays import Array
-from procedures.core.errors import UnfitRecording
+from procedures.core.errors import BadParameter, UnfitRecording
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,8 @@ def still_stretches(samples: Array, rate_hz: float, settings: StillSettings | No
     """Stretches of (n, 3) samples during which the unit rested, in order.
 
     Still is where ``√Σ_c var_c² ≤ factor·√Σ_c var_c²(initial)``, the variances over the moving window. Raises
-    `UnfitRecording` where the recording is shorter than its still beginning.
+    `UnfitRecording` where the recording is shorter than its still beginning, `BadParameter` where that is shorter than
+    two windows. A stretch of a single sample is none: it shows no scatter.
     """
     s = settings or StillSettings()
     width = max(2, round(s.window_s * rate_hz))
@@ -50,13 +51,16 @@ def still_stretches(samples: Array, rate_hz: float, settings: StillSettings | No
         raise UnfitRecording(
             f"{len(samples) / rate_hz:.4g} s are too short for a still beginning of {s.initial_s:g} s and one window"
         )
+    if initial < 2 * width:
+        allowed = f"at least {2 * width / rate_hz:g} s, two windows of still.window_s"
+        raise BadParameter("still.initial_s", s.initial_s, allowed)
     variance = np.linalg.norm(moving_variance(samples, width), axis=1)
     threshold = s.factor * float(np.median(variance[width // 2 : initial - width // 2]))
     still = np.concatenate([[False], variance <= threshold, [False]])
     edges = np.flatnonzero(still[1:] != still[:-1]).reshape(-1, 2)
     margin = round(s.margin_s * rate_hz)
     cut = [Stretch(int(a) + margin, int(b) - margin) for a, b in edges]
-    return tuple(c for c in cut if c.stop - c.start >= s.shortest_s * rate_hz)
+    return tuple(c for c in cut if c.stop - c.start >= max(2.0, s.shortest_s * rate_hz))
 
 
 def moving_variance(samples: Array, width: int) -> Array:
@@ -76,14 +80,15 @@ def pose_means(samples: Array, stretches: tuple[Stretch, ...], batches: int = 10
     """Mean of every stretch and its standard uncertainty, both (poses, 3).
 
     The uncertainty is the scatter of the means of `batches` equal parts of the stretch, over √batches: it allows for
-    noise correlated over less than a part, and for a hand that creeps.
+    noise correlated over less than a part, and for a hand that creeps. A stretch of fewer samples has a part for each.
     """
     means, sds = [], []
     for stretch in stretches:
         pose = samples[stretch.start : stretch.stop]
-        parts = np.array([part.mean(axis=0) for part in np.array_split(pose, batches)])
+        count = min(batches, len(pose))
+        parts = np.array([part.mean(axis=0) for part in np.array_split(pose, count)])
         means.append(pose.mean(axis=0))
-        sds.append(parts.std(axis=0, ddof=1) / np.sqrt(batches))
+        sds.append(parts.std(axis=0, ddof=1) / np.sqrt(count))
     return np.array(means).reshape(-1, 3), np.array(sds).reshape(-1, 3)
 
 

@@ -10,6 +10,7 @@ from procedures.analysis.calibration.misfit import residual_misfit
 from procedures.analysis.calibration.multiposition import TriadFit
 from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, observable_derivative, scalar_parameters
 from procedures.analysis.calibration.verification import Magnitudes
+from procedures.core.coefficient_name import CoefficientName
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
 
 
@@ -17,8 +18,7 @@ from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
 class Coefficient:
     """One coefficient of ``U = b + K·v`` with its standard uncertainty and what that is made of."""
 
-    name: str
-    """"gyro.b_x", "accelerometer.K11", …"""
+    name: CoefficientName
     unit: str
     estimate: float
     standard_uncertainty: float
@@ -124,7 +124,7 @@ def _coefficients(fit: TriadFit) -> tuple[Coefficient, ...]:
     sources = fit.table.by_source()
     return tuple(
         Coefficient(
-            f"{fit.triad}.{name}",
+            CoefficientName(fit.triad, name),
             coefficient_unit(name, fit.output_unit, fit.input_unit),
             float(fit.coefficients[i]),
             float(total[i]),

@@ -1,6 +1,9 @@
 """Is a recording fit to be analysed: one pass over its raw samples, in bounded memory, a sentence for every flaw.
 
-`stream` the entry, `findings` what comes out, `pieces` the samples cut alike however they came; then one file a
-question: `edges` saturated, `bits` stuck or coarse, `repeats` hung data link, `jumps` outliers and steps,
-`plausibility` wrong unit.
+`watched` the entry: recordings that are inspected while an analysis reads them; `stream` the inspection itself,
+`findings` what comes out, `grouped` the same of many stations, `pieces` the samples cut alike however they came.
+
+One file a question: `edges` saturated, `bits` stuck or coarse, `wraps` jumps of 2^n, `repeats` rows sent twice,
+`copies` two rates, `stalls` runs that stand still, `jumps` outliers and sharp steps, `levels` and `changes` steps and
+noise, `plausibility` wrong unit or rate. `raw_flaws`, `time_flaws` and `wording` put them into words.
 """

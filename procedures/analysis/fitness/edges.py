@@ -13,6 +13,8 @@ NEIGHBOURS = 8
 """Levels that must exist beside the outermost one: a counter that says −1, 0, 1 has no tail to be cut off."""
 STEEPEST = 2.5
 """The outermost level may hold so many times its neighbours: more than the √2 + 1 of a sine wave's crest."""
+ALONE = 0.4
+"""Part of the samples of the outermost `NEIGHBOURS` + 1 levels that the first may hold: a sine's crest holds 1/3."""
 CLIFF = 4.0
 """Where the next level holds so many times those behind it, the noise is narrower than a level: no tail either."""
 BUSY = 0.3
@@ -78,7 +80,8 @@ class Edge:
         """Whether the outermost level holds more than a tail can, beyond chance.
 
         A tail does not rise outwards: of the n samples at the outermost level and the fullest of the next three the
-        former holds at most ``STEEPEST/(1 + STEEPEST)``, binomial. `repeats`: exact repeats in the whole channel.
+        former holds at most ``STEEPEST/(1 + STEEPEST)``, and of all levels that are kept `ALONE`, binomial.
+        `repeats`: exact repeats in the whole channel.
         """
         if len(self.levels) <= NEIGHBOURS:
             return False
@@ -86,7 +89,9 @@ class Edge:
         inside = count - outermost - other.count
         if repeats - self.pairs - other.pairs > BUSY * inside or next_one > CLIFF * max(behind):
             return False
-        return bool(binom.sf(outermost - 1, outermost + self.near, STEEPEST / (1.0 + STEEPEST)) < CHANCE)
+        steep = binom.sf(outermost - 1, outermost + self.near, STEEPEST / (1.0 + STEEPEST))
+        alone = binom.sf(outermost - 1, sum(self.levels.values()), ALONE)
+        return bool(min(steep, alone) < CHANCE)
 
     def _merge(self, found: Levels) -> None:
         """Levels, ascending, that are whole as far inward as the kept ones reach."""

@@ -31,6 +31,12 @@ class Kind(StrEnum):
     OUTLIER = "outlier"
     STEP = "step"
     WRONG_UNIT = "wrong_unit"
+    WRONG_RATE = "wrong_rate"
+    UNLIKELY_RATE = "unlikely_rate"
+    STANDS_STILL = "stands_still"
+    COPIED = "copied"
+    WRAPPED = "wrapped"
+    NOISE_CHANGE = "noise_change"
 
 
 @dataclass(frozen=True)
@@ -45,6 +51,8 @@ class Finding:
     """Sample where it is first seen, counted from 0; None where it is of the whole recording."""
     count: int = 0
     """Samples concerned."""
+    of_row: bool = False
+    """Whether whole rows are concerned, whatever the channel: such a finding is never of a channel alone."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +81,17 @@ class FitnessSettings:
     a dwell of a calibration may well be silent. A static run that is silent has nothing to analyse."""
     at_rest: bool = True
     """The unit neither turns faster than the Earth nor is accelerated but by gravity: units and jumps can be judged."""
+    beside_others: bool = False
+    """The recording is one of several stations: a channel that reads one value is judged over all of them (see
+    `station_means`), so a counter that is silent is not even warned of, and samples that are constant are."""
+    means_only: bool = False
+    """The analysis takes means: rows sent more than once and copied samples leave these right, and are warned of."""
+    seeks_scale: bool = False
+    """The analysis is to find scale factors: a reading that is off by a factor is warned of, not refused."""
+    reads_gravity: bool = True
+    """The accelerometers feel gravity, not a current that is fed into their converter."""
+    mends_outliers: bool = False
+    """Outliers that are few will be replaced by the mean of their neighbours, and the sentence says so."""
     gravity_m_s2: float | None = None
     """Of the site [m/s²]; None: standard gravity."""
     gyro_rest_rad_s: float = 0.5
@@ -82,7 +101,7 @@ class FitnessSettings:
 
     def __post_init__(self) -> None:
         for name, value, low, high in (
-            ("least_samples", self.least_samples, 2, 10**9),
+            ("least_samples", self.least_samples, 1, 10**9),
             ("gravity_m_s2", self.gravity_m_s2 or 9.8, 9.7, 9.9),
             ("gyro_rest_rad_s", self.gyro_rest_rad_s, 7.3e-5, 1e3),
         ):

@@ -1,11 +1,13 @@
 """Outliers and steps: a sample far from both its neighbours, and a level that shifts between two samples."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from procedures.analysis.fitness.pieces import MARGIN, Piece, Samples, largest
 from procedures.core.arrays import Array
 
-SIGMAS = 20.0
+SIGMAS = 12.0
 """Standard deviations that no noise of a unit reaches."""
 WHITE = 2.0 / np.sqrt(np.pi)
 """Mean magnitude of the difference of two samples of white noise of unit standard deviation."""
@@ -16,21 +18,34 @@ STRIDE = 8
 TRUSTED = 1024
 """Fewer differences than these are judged together with those of the piece before."""
 SHARP = 0.75
-"""Part of a step that lies between two samples; a motion takes longer."""
+"""Part of a step, and of either side of an outlier, that lies between two samples; a motion takes longer."""
 LOOKED_AT = 256
 """Jumps of a piece that are told apart; where there are more the channel is no quiet one, and they are not steps."""
+LONELY = 3.0
+"""An outlier is so many times farther away than any of the samples about it is from its neighbours."""
+KEPT = 1000
+"""Outliers and steps that are kept of a channel; the others are counted."""
+
+
+@dataclass(frozen=True)
+class Jump:
+    """One outlier, or one step."""
+
+    index: int
+    """The sample that is out, or the first behind the step."""
+    size: float
+    """Raw: from the mean of its two neighbours, or the height."""
+    noise: float
+    """Raw standard deviation that it was judged against."""
 
 
 class Jumps:
     """Outliers and steps of all channels of a recording, against noise estimated piece by piece."""
 
     def __init__(self, channels: int) -> None:
-        self.outliers = np.zeros(channels, np.int64)
-        self.steps = np.zeros(channels, np.int64)
-        self.first_outlier: list[tuple[int, float, float] | None] = [None] * channels
-        """Index, the sample's distance from the mean of its neighbours, and the noise, raw."""
-        self.first_step: list[tuple[int, float, float] | None] = [None] * channels
-        """Index of the first sample behind the step, its height, and the noise, raw."""
+        self.outlier_count = np.zeros(channels, np.int64)
+        self.outliers: list[list[Jump]] = [[] for _ in range(channels)]
+        self.steps: list[list[Jump]] = [[] for _ in range(channels)]
         self._magnitudes = np.zeros(channels)
         self._noise_count = 0
 
@@ -41,7 +56,7 @@ class Jumps:
         if not differences.shape[1]:
             return
         limit = np.maximum(SIGMAS * noise, LEVELS * resolution)
-        for c in np.flatnonzero(largest(differences) > limit / 2.0):
+        for c in np.flatnonzero(largest(differences) > SHARP * limit):
             self._channel(piece, int(c), float(noise[c]), float(limit[c]))
 
     def _noise(self, d: Samples) -> Array:
@@ -59,23 +74,33 @@ class Jumps:
             magnitudes = np.abs(d)
             limit = max(limit, LEVELS * float(np.min(magnitudes[magnitudes > 0.0], initial=np.inf)))
         begin, end = MARGIN if piece.history else 0, len(d) if piece.last else len(d) - MARGIN
-        at = begin + np.flatnonzero(np.abs(d[begin:end]) > limit / 2.0)
+        at = begin + np.flatnonzero(np.abs(d[begin:end]) > SHARP * limit)
         first = piece.start - piece.history
         centres = at[at + 2 < len(x)] + 1
         away = x[centres] - (x[centres - 1] + x[centres + 1]) / 2.0
         apart = np.abs(x[centres + 1] - x[centres - 1])
         lonely = (np.abs(away) > limit) & (apart < np.abs(away) / 2.0)
-        if lonely.any():
-            self.outliers[c] += np.count_nonzero(lonely)
-            k = int(np.argmax(lonely))
-            self.first_outlier[c] = self.first_outlier[c] or (first + int(centres[k]), float(away[k]), noise)
+        for k in np.flatnonzero(lonely).tolist():
+            if not _alone(d, int(centres[k]), float(away[k])):
+                continue
+            self.outlier_count[c] += 1
+            if len(self.outliers[c]) < KEPT:
+                self.outliers[c].append(Jump(first + int(centres[k]), float(away[k]), noise))
         if len(at) > LOOKED_AT:
             return
         for j in at.tolist():
             height = _height(x, j)
-            if abs(height) > limit and abs(d[j]) > SHARP * abs(height):
-                self.steps[c] += 1
-                self.first_step[c] = self.first_step[c] or (first + j + 1, height, noise)
+            if abs(height) > limit and abs(d[j]) > SHARP * abs(height) and len(self.steps[c]) < KEPT:
+                self.steps[c].append(Jump(first + j + 1, height, noise))
+
+
+def _alone(d: Samples, centre: int, away: float) -> bool:
+    """Whether the differences about an outlier, but for its own two, are small beside it: no burst of noise."""
+    about = np.concatenate([d[max(centre - MARGIN, 0) : centre - 1], d[centre + 1 : centre + MARGIN]])
+    if not len(about):
+        return True
+    # One other outlier may stand there: it makes two large differences.
+    return bool(np.sort(np.abs(about))[max(len(about) - 3, 0)] * LONELY < abs(away))
 
 
 def _height(x: Samples, j: int) -> float:

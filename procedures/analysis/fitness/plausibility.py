@@ -1,13 +1,15 @@
-"""Wrong unit: what a unit at rest reads against gravity and against the rate of a turning Earth."""
+"""Wrong unit or rate: what a unit at rest reads against gravity and against the rate of a turning Earth."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from procedures.analysis.fitness.findings import FitnessSettings
 from procedures.analysis.fitness.pieces import Samples
 from procedures.core import units
-from procedures.core.recording import ACCELEROMETER, GYRO, TRIADS, Channel, NominalScale, Quantity
+from procedures.core.arrays import Array
+from procedures.core.recording import ACCELEROMETER, GYRO, INCREMENTS, TRIADS, Channel, NominalScale, Quantity
 
 BURST = 128
 """Samples that are averaged before a magnitude is taken, so that noise does not pass for a reading."""
@@ -17,7 +19,27 @@ TOLERANCE = 0.3
 """Of the magnitude of gravity, relative: nominal scales are known to some per cent, but the thesis's own unit (its
 table 5.1) gives 0.81 … 0.86 of its input; the nearest wrong unit, feet, is a factor of 3.3 away."""
 COLDEST_C, HOTTEST_C = -100.0, 200.0
+FACTORS = (2.0, 4.0, 5.0)
+"""Of a rate, or of the number of samples that were summed; of a range that was set otherwise than declared."""
+FACTOR_TOLERANCE = 0.12
+"""Relative: nominal scales are known to some per cent, and the nearest two factors are 25 % apart."""
+DOUBTFUL_RATE_RAD_S = 0.1
+"""A gyro that reads more at rest, 5.7 °/s or 1370 times the Earth's rate, is doubted."""
+DOUBTFUL_WALK = 10.0 * units.DEG_PER_SQRT_HOUR
+"""A gyro's random walk from its sample noise that is doubted: poor MEMS have 3 deg/√h, and degrees that were taken for
+radians make 17 deg/√h and more of ordinary ones."""
+SLOWEST_HZ, FASTEST_HZ = 0.5, 40_000.0
+"""Rates of inertial units; the fastest MEMS send 32 000 samples a second."""
 GYRO_QUANTITIES = (Quantity.ANGLE_INCREMENT, Quantity.ANGULAR_RATE)
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A sentence about channels; `certain`: the figures are wrong by a known factor. `of_rate`: the rate is wrong."""
+
+    sentence: str
+    certain: bool
+    of_rate: bool = False
 
 
 class Readings:
@@ -47,40 +69,64 @@ class Readings:
             self._magnitudes[name] += float(np.sort(np.linalg.norm(means[rows], axis=0))[bursts // 2])
         self._pieces += 1
 
-    def doubts(self, settings: FitnessSettings) -> dict[str, tuple[str, bool]]:
-        """For each channel in doubt: a sentence, and whether it is certain to be wrong."""
+    def doubts(self, settings: FitnessSettings, mean: Array, noise: Array) -> dict[str, Doubt]:
+        """What is doubted, channel by channel; `mean` of each and `noise`, the standard deviation of white one, raw."""
         if not self._pieces or not settings.at_rest:
             return self._temperatures() if self._pieces else {}
-        return {**self._temperatures(), **self._accelerometers(settings), **self._gyros(settings)}
+        return {**self._temperatures(), **self._gyros(settings, mean, noise), **self._accelerometers(settings)}
 
-    def _temperatures(self) -> dict[str, tuple[str, bool]]:
-        found: dict[str, tuple[str, bool]] = {}
+    def _temperatures(self) -> dict[str, Doubt]:
+        found: dict[str, Doubt] = {}
         for channel, total in zip(self._channels, self._sums, strict=True):
             mean = float(total) / self._pieces
             if channel.unit == "degC" and not COLDEST_C <= mean <= HOTTEST_C:
                 kelvin = ": it looks like kelvins" if HOTTEST_C < mean < 500.0 else ""
                 told = f"{COLDEST_C:g} … {HOTTEST_C:g} °C were expected{kelvin}"
-                found[channel.name] = (f"channel {channel.name} reads {mean:.4g} °C where {told}", True)
+                found[channel.name] = Doubt(f"channel {channel.name} reads {mean:.4g} °C where {told}", True)
         return found
 
-    def _accelerometers(self, settings: FitnessSettings) -> dict[str, tuple[str, bool]]:
+    def _accelerometers(self, settings: FitnessSettings) -> dict[str, Doubt]:
         rows = self._triads.get("accelerometer")
-        if rows is None:
+        if rows is None or not settings.reads_gravity:
             return {}
         gravity = settings.gravity_m_s2 or units.STANDARD_GRAVITY
         read = self._magnitudes["accelerometer"] / self._pieces
         if abs(read / gravity - 1.0) <= TOLERANCE:
             return {}
+        factor = _factor(read / gravity)
+        if factor is not None:
+            return self._by_factor(rows, read, gravity, factor)
         candidates = {
             "g": 1.0 / units.STANDARD_GRAVITY,
             "mg": 1e3 / units.STANDARD_GRAVITY,
             "µg": 1e6 / units.STANDARD_GRAVITY,
             "cm/s² (Gal)": 100.0,
             "mm/s²": 1000.0,
+            "a value divided by 1000": 1e-3,
+            "a value in m/s² multiplied by 9.81 once more": units.STANDARD_GRAVITY,
+            "a value multiplied by 57.3, degrees a radian": 1.0 / units.DEG,
+            "a value divided by 57.3, degrees a radian": units.DEG,
         }
         return self._told(rows, ACCELEROMETER, read, f"gravity, {gravity:.5g} m/s² ± 30 %", gravity, candidates)
 
-    def _gyros(self, settings: FitnessSettings) -> dict[str, tuple[str, bool]]:
+    def _by_factor(self, rows: Sequence[int], read: float, gravity: float, factor: float) -> dict[str, Doubt]:
+        """Accelerometers that read a simple multiple of gravity: the rate of increments, or the range of samples."""
+        names, rate = [self._names[r] for r in rows], self._rate_hz
+        begin = (
+            f"channels {names[0]} … {names[-1]} together read {read:.4g} m/s^2 where gravity, {gravity:.5g} m/s² "
+            f"± 30 % was expected, {factor:g} times it"
+        )
+        if any(self._channels[r].quantity not in INCREMENTS for r in rows):
+            told = f"{begin}: the scale or the range that was declared seems to be off by this factor"
+            return dict.fromkeys(names, Doubt(told, False))
+        names = [c.name for c in self._channels if c.quantity in INCREMENTS and c.unit != "count"]
+        told = (
+            f"{begin}, as if the rate were {rate / factor:.6g} Hz: the declared rate, {rate:g} Hz, or the number of "
+            f"samples summed, is wrong; this falsifies all increments ({', '.join(names)})"
+        )
+        return dict.fromkeys(names, Doubt(told, True, of_rate=True))
+
+    def _gyros(self, settings: FitnessSettings, mean: Array, noise: Array) -> dict[str, Doubt]:
         limit = settings.gyro_rest_rad_s
         rows = self._triads.get("gyro")
         if rows is not None:
@@ -95,11 +141,17 @@ class Readings:
         good = limit < 10.0 * units.EARTH_RATE
         candidates = {"deg/s": 1.0 / units.DEG, "deg/h": 1.0 / units.DEG_PER_HOUR} if good else {}
         expected = f"less than {limit:.3g} rad/s at rest"
-        found: dict[str, tuple[str, bool]] = {}
-        for group, value in read.items():
-            if value > limit:
-                names = [self._names[i] for i in group]
+        found: dict[str, Doubt] = {}
+        for group, burst in read.items():
+            # Single bursts tell a motion from a rest; what a unit at rest reads is surer from all samples.
+            value = min(burst, float(np.linalg.norm(self._scale.rates(mean)[list(group)])))
+            names = [self._names[i] for i in group]
+            walk = float(np.max((noise * np.abs(self._scale.gain))[list(group)])) / self._rate_hz**0.5
+            sampled = all(self._channels[i].quantity is Quantity.ANGULAR_RATE for i in group)
+            if value > limit and (good or value * units.DEG > limit or not sampled):
                 found.update(self._told(group, names, value, expected, units.EARTH_RATE, candidates))
+            elif value > DOUBTFUL_RATE_RAD_S or (sampled and walk > DOUBTFUL_WALK):
+                found.update(dict.fromkeys(names, _degrees(names, value, expected, walk if sampled else None)))
         return found
 
     def _told(
@@ -110,7 +162,7 @@ class Readings:
         expected: str,
         truth: float,
         candidates: dict[str, float],
-    ) -> dict[str, tuple[str, bool]]:
+    ) -> dict[str, Doubt]:
         """The sentence for channels that read `read` where `truth` is so in the unit declared."""
         unit = self._channels[rows[0]].rate_unit
         looks = [name for name, size in candidates.items() if abs(read / (truth * size) - 1.0) <= TOLERANCE]
@@ -123,10 +175,38 @@ class Readings:
         sentence = (
             f"channel{'s' if len(rows) > 1 else ''} {shown} {read:.4g} {unit} where {expected} was expected{guess}"
         )
-        return {self._names[row]: (sentence, bool(looks)) for row in rows}
+        return {self._names[row]: Doubt(sentence, bool(looks)) for row in rows}
 
     def _rows(self, triad: Sequence[str]) -> list[int]:
         """Where a triad stands, whole and in SI; nothing otherwise."""
         wanted = "rad/s" if triad == GYRO else "m/s^2"
         rows = [self._names.index(name) for name in triad if name in self._names]
         return rows if len(rows) == 3 and all(self._channels[r].rate_unit == wanted for r in rows) else []
+
+
+def unlikely_rate(rate_hz: float) -> str | None:
+    """A sentence about a rate that no inertial unit has."""
+    if SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
+        return None
+    return (
+        f"the declared rate, {rate_hz:g} Hz, is unlikely: inertial units send between {SLOWEST_HZ:g} and "
+        f"{FASTEST_HZ:g} samples a second; every time and every rate of this result rests on it"
+    )
+
+
+def _factor(ratio: float) -> float | None:
+    """The simple factor or its inverse that a ratio is near to."""
+    near = [f for g in FACTORS for f in (g, 1.0 / g) if abs(ratio / f - 1.0) <= FACTOR_TOLERANCE]
+    return min(near, key=lambda f: abs(ratio / f - 1.0), default=None)
+
+
+def _degrees(names: Sequence[str], value: float, expected: str, walk: float | None) -> Doubt:
+    """Gyros whose reading at rest or whose noise is that of a value in degrees."""
+    shown = f"channels {names[0]} … {names[-1]} together read" if len(names) > 1 else f"channel {names[0]} reads"
+    noise = "" if walk is None else f", with a random walk of about {walk / units.DEG_PER_SQRT_HOUR:.3g} deg/√h"
+    return Doubt(
+        f"{shown} {value:.4g} rad/s where {expected} was expected, {value / units.DEG_PER_HOUR:.4g} deg/h or "
+        f"{value / units.EARTH_RATE:.3g} times the Earth's rate{noise}: values in deg/s declared as "
+        "rad/s look like this",
+        False,
+    )

@@ -1,28 +1,32 @@
 """The inspection itself: blocks in, findings out, one pass and bounded memory whatever the recording's length."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from procedures.analysis.fitness import raw_flaws, time_flaws
 from procedures.analysis.fitness.bits import Bits
-from procedures.analysis.fitness.edges import RAILS, Edge, counted
+from procedures.analysis.fitness.copies import Copies
+from procedures.analysis.fitness.edges import Edge, counted
 from procedures.analysis.fitness.findings import ChannelFitness, Finding, FitnessSettings, Kind, Severity
-from procedures.analysis.fitness.jumps import SIGMAS, Jumps
+from procedures.analysis.fitness.jumps import WHITE, Jump, Jumps
+from procedures.analysis.fitness.levels import Levels
 from procedures.analysis.fitness.pieces import Mask, Piece, Pieces, Samples
-from procedures.analysis.fitness.plausibility import Readings
+from procedures.analysis.fitness.plausibility import Readings, unlikely_rate
 from procedures.analysis.fitness.repeats import Repeats
+from procedures.analysis.fitness.stalls import Stalls
+from procedures.analysis.fitness.wording import Wording
+from procedures.analysis.fitness.wraps import Wraps
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
-from procedures.core.recording import INCREMENTS, Channel, RawArray, Recording
+from procedures.core.recording import INCREMENTS, TRIADS, Channel, Quantity, RawArray, Recording
 
-SHORT_RUN = 10
-"""Rows: a data link that repeats fewer has stumbled, one that repeats more was hung."""
+_SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT)
 
-_SPOILS_NOISE = (Kind.SATURATED, Kind.REPEATED)
-
-_Look = Callable[[int, str], list[Finding]]
+FEW_SHARE = 1e-3
+"""Part of a channel's samples that may be outliers for a figure without them to be one of the channel."""
 
 
 class FitnessStream:
@@ -47,7 +51,11 @@ class FitnessStream:
         self._edges = [(Edge(+1), Edge(-1)) for _ in range(number)]
         self._bits = [Bits() for _ in range(number)]
         self._repeats = Repeats(number)
+        self._stalls = Stalls(_groups(self._channels), number)
+        self._copies = Copies(number)
         self._jumps = Jumps(number)
+        self._levels = Levels(number, count)
+        self._wraps = Wraps([c.scale if c.unit == "degC" else None for c in self._channels])
         self._readings = Readings(self._channels, rate_hz)
         self._missing = np.zeros(number, np.int64)
         self._first_missing = [0] * number
@@ -62,31 +70,43 @@ class FitnessStream:
         """What was found, channel by channel; no block may follow."""
         for piece in self._pieces.finish():
             self._inspect(piece)
-        self._repeats.finish()
-        seen, least = self._pieces.seen, self._settings.least_samples
-        looks: tuple[_Look, ...] = (self._missing_samples, self._constant)
-        if seen >= least:
-            looks = (*looks, self._saturated, self._coarse_bits, self._repeated, self._wrong_unit)
-        found: list[ChannelFitness] = []
-        for c, channel in enumerate(self._channels):
-            findings = self._length(channel.name)
-            for look in looks if seen else ():
-                findings += look(c, channel.name)
-            # Noise is not what it was where samples pile up or repeat: nothing can be said of jumps against it.
-            if seen >= least and not any(f.kind in _SPOILS_NOISE and f.severity is Severity.REFUSE for f in findings):
-                findings += self._jumped(c, channel.name)
-            found.append(ChannelFitness(channel.name, tuple(findings)))
-        return tuple(found)
+        words = Wording(self._pieces.seen, self._rate_hz)
+        found = [self._of_values(c, channel, words) for c, channel in enumerate(self._channels)]
+        if words.seen >= max(self._settings.least_samples, 2):
+            self._of_repeats(found, words)
+            self._of_readings(found, words)
+            if self._settings.at_rest:
+                self._of_course(found, words)
+        told = unlikely_rate(self._rate_hz)
+        if told is not None and any(c.quantity is not Quantity.TEMPERATURE for c in self._channels):
+            for findings in found:
+                findings.append(Finding(Kind.UNLIKELY_RATE, Severity.WARN, told, of_row=True))
+        return tuple(ChannelFitness(c.name, tuple(f)) for c, f in zip(self._channels, found, strict=True))
+
+    def outliers(self) -> dict[int, list[Jump]]:
+        """The outliers of each column that has any, where they are few enough to be left out."""
+        return {c: jumps for c, jumps in enumerate(self._jumps.outliers) if jumps and self._few(c)}
+
+    def _few(self, c: int) -> bool:
+        count = int(self._jumps.outlier_count[c])
+        return count == len(self._jumps.outliers[c]) and count <= max(FEW_SHARE * self._pieces.seen, 1.0)
 
     def _inspect(self, piece: Piece) -> None:
         x, start = piece.x, piece.start
         self._is_integer = piece.is_integer
         if x.shape[1]:
-            same = piece.d == 0
-            self._repeats.add(same, piece.missing, start + x.shape[1] - same.shape[1])
-            self._extremes(x, same, start)
+            same: Mask = piece.d == 0
             if piece.missing is not None:
+                same &= ~piece.missing[:, x.shape[1] - same.shape[1] :]
                 self._count_missing(piece.missing, start)
+            self._extremes(x, same, start)
+            zeros = np.array([np.count_nonzero(row) for row in same], np.int64)
+            self._repeats.add(same, zeros, start + x.shape[1] - same.shape[1])
+            self._stalls.add(same, zeros, start + x.shape[1] - same.shape[1])
+            resolution = self._resolution()
+            self._copies.add(piece.d, resolution)
+            self._levels.add(piece)
+            self._wraps.add(piece)
             self._readings.add(x)
         if self._settings.at_rest:
             self._jumps.add(piece, self._resolution())
@@ -114,135 +134,123 @@ class FitnessStream:
         """One count or the power of two that all values are multiples of; 0 for samples that are no integers."""
         return np.array([float(1 << b.lowest) if self._is_integer else 0.0 for b in self._bits])
 
-    def _length(self, name: str) -> list[Finding]:
-        seen, least = self._pieces.seen, self._settings.least_samples
-        found: list[Finding] = []
-        if seen < least:
-            told = f"channel {name}: {seen} samples are too few, at least {least} are needed"
-            found.append(Finding(Kind.TOO_FEW, Severity.REFUSE, told, count=seen))
-        if self._count is not None and seen != self._count:
-            told = f"channel {name}: {seen} samples where {self._count} are announced"
-            found.append(Finding(Kind.INCOMPLETE, Severity.REFUSE, told, count=seen))
-        return found
+    def _of_values(self, c: int, channel: Channel, words: Wording) -> list[Finding]:
+        """Length, missing samples, and what a channel's values alone say."""
+        settings, edges = self._settings, self._edges[c]
+        found = raw_flaws.length(channel.name, words.seen, self._count, settings)
+        if not words.seen:
+            return found
+        lost = int(self._missing[c])
+        found += raw_flaws.missing(channel.name, lost, self._first_missing[c], words, settings)
+        if raw_flaws.is_constant(edges, lost, words.seen):
+            return found + raw_flaws.constant(channel, edges[0].extreme, self._is_integer, words, settings)
+        if words.seen < settings.least_samples or lost == words.seen:
+            return found
+        wrap = self._wraps.found(c, edges[1].extreme, edges[0].extreme)
+        if wrap is not None:
+            return found + raw_flaws.wrapped(channel, wrap, words)
+        found += raw_flaws.saturated(channel.name, edges, self._is_integer, int(self._repeats.zeros[c]), words)
+        return found + (raw_flaws.coarse_bits(channel.name, self._bits[c], words.seen) if self._is_integer else [])
 
-    def _missing_samples(self, c: int, name: str) -> list[Finding]:
-        count = int(self._missing[c])
-        if not count:
-            return []
-        severity = Severity.REFUSE if self._settings.gaps == "refuse" else Severity.WARN
-        first = self._first_missing[c]
-        treated = "" if severity is Severity.REFUSE else "; they are left out as gaps"
-        told = (
-            f"channel {name}: {self._share(count)} {'are' if count > 1 else 'is'} not a finite number, "
-            f"the first is sample {self._at(first)}{treated}"
-        )
-        return [Finding(Kind.NOT_FINITE, severity, told, first, count)]
-
-    def _constant(self, c: int, name: str) -> list[Finding]:
-        top, bottom = self._edges[c]
-        seen = self._pieces.seen
-        if seen < 2 or self._missing[c] == seen or top.extreme != bottom.extreme:
-            return []
-        value = top.extreme
-        railed = self._is_integer and value in RAILS
-        rail = ", the end of its range" if railed else ""
-        told = f"channel {name} reads {value:.9g}{rail} throughout all {seen} samples; a live channel shows noise"
-        counter = self._is_integer and self._channels[c].quantity in INCREMENTS and not railed
-        silent = counter and self._settings.counters_may_rest
-        return [Finding(Kind.CONSTANT, Severity.WARN if silent else Severity.REFUSE, told, 0, seen)]
-
-    def _saturated(self, c: int, name: str) -> list[Finding]:
-        found: list[Finding] = []
-        seen, repeats = self._pieces.seen, int(self._repeats.zeros[c])
-        for edge, other in (self._edges[c], self._edges[c][::-1]):
-            if self._constant(c, name):
-                continue
-            value, count = edge.extreme, edge.count
-            word = "largest" if edge.sign > 0 else "smallest"
-            begin = f"channel {name}: {self._share(count)} {'stand' if count > 1 else 'stands'} at {value:.9g}, "
-            end = f"; saturated, first at sample {self._at(edge.first_index)}"
-            if self._is_integer and value in RAILS:
-                severity = Severity.REFUSE if count > 1 else Severity.WARN
-                found.append(
-                    Finding(Kind.SATURATED, severity, f"{begin}the end of its range{end}", edge.first_index, count)
-                )
-            elif edge.piles_up(repeats, seen, other):
-                told = f"{begin}the {word}, and no more than {edge.near} at any of the next three values"
-                found.append(Finding(Kind.SATURATED, Severity.REFUSE, f"{told}{end}", edge.first_index, count))
-        return found
-
-    def _coarse_bits(self, c: int, name: str) -> list[Finding]:
-        if not self._is_integer:
-            return []
-        bits, seen = self._bits[c], self._pieces.seen
-        found: list[Finding] = []
-        for bit, value in bits.stuck().items():
-            told = (
-                f"channel {name}: bit {bit} (of {1 << bit} counts) is stuck at {value}: "
-                "it never changes though bits above and below it do"
-            )
-            found.append(Finding(Kind.STUCK_BIT, Severity.REFUSE, told, 0, seen))
-        if bits.coarse():
-            step, rest = 1 << bits.coarse(), bits.remainder()
-            plus = f" plus {rest}" if rest else ""
-            told = f"channel {name}: all values are multiples of {step}{plus}: its resolution is {step} counts"
-            found.append(Finding(Kind.RESOLUTION, Severity.WARN, told, 0, seen))
-        return found
-
-    def _repeated(self, c: int, name: str) -> list[Finding]:
-        found: list[Finding] = []
-        hung, held = self._repeats.hung(), self._repeats.held()
-        if hung is not None and c in hung[1]:
-            run = hung[0]
-            told = (
-                f"{run.length} rows in a row repeat the one before exactly, from sample {self._at(run.first_index)}: "
-                "the data link seems to have hung"
-            )
-            severity = Severity.REFUSE if run.length >= SHORT_RUN else Severity.WARN
-            found.append(Finding(Kind.REPEATED, severity, told, run.first_index, run.length))
-        if c in held:
-            rows = self._repeats.rows
-            told = (
-                f"{self._share(rows)} repeat the row before in all channels at once, the first is "
-                f"{self._at(self._repeats.first_index)}: rows seem to be sent more than once"
-            )
-            found.append(Finding(Kind.REPEATED, Severity.REFUSE, told, self._repeats.first_index, rows))
-        return found
-
-    def _jumped(self, c: int, name: str) -> list[Finding]:
-        jumps = self._jumps
-        found: list[Finding] = []
-        outlier, step = jumps.first_outlier[c], jumps.first_step[c]
-        if outlier is not None:
-            index, away, noise = outlier
-            told = (
-                f"channel {name}: {self._share(int(jumps.outliers[c]))} far from both neighbours; the first is sample "
-                f"{self._at(index)}, {away:.6g} away where {SIGMAS:g} times the noise of {noise:.3g} was allowed"
-            )
-            found.append(Finding(Kind.OUTLIER, Severity.WARN, told, index, int(jumps.outliers[c])))
-        if step is not None:
-            index, height, noise = step
-            told = (
-                f"channel {name}: the level shifts {int(jumps.steps[c])} times between two samples; the first time at "
-                f"sample {self._at(index)}, by {height:.6g} where {SIGMAS:g} times the noise of {noise:.3g} was allowed"
-            )
-            found.append(Finding(Kind.STEP, Severity.WARN, told, index, int(jumps.steps[c])))
-        return found
-
-    def _wrong_unit(self, c: int, name: str) -> list[Finding]:
-        doubt = self._readings.doubts(self._settings).get(name)
-        if doubt is None:
-            return []
-        return [
-            Finding(Kind.WRONG_UNIT, Severity.REFUSE if doubt[1] else Severity.WARN, doubt[0], 0, self._pieces.seen)
+    def _of_repeats(self, found: list[list[Finding]], words: Wording) -> None:
+        """Rows sent more than once, copied channels, hung links, channels that stand still."""
+        sampled = np.array([c.quantity not in INCREMENTS for c in self._channels])
+        groups = self._stalls.finish(sampled | self._copies.fine())
+        rows = self._repeats.rows
+        hung = sum(run.length for group in groups if len(group.rows) == len(self._channels) for run in group.runs)
+        held = self._repeats.held(hung, self._copies.fine())
+        live = [c for c, f in enumerate(found) if not any(x.kind in (Kind.CONSTANT, Kind.SATURATED) for x in f)]
+        copied = [
+            c for c in self._copies.copied(self._stalls.inside / max(words.seen, 1)) if c in live and c not in held
         ]
+        witnesses = [c for c in live if self._repeats.zeros[c] < 0.5 * self._repeats.pairs and c not in copied]
+        for group in groups:
+            if not group.runs or any(c in held or c in copied for c in group.rows):
+                continue
+            if len(group.rows) == len(self._channels):
+                finding = time_flaws.hung(group, words)
+            else:
+                finding = time_flaws.stands_still(group, [self._channels[c].name for c in group.rows], words)
+            for c in group.rows:
+                if c in live:
+                    found[c].append(finding)
+        if held:
+            rate = self._rate_hz * (1.0 - rows / max(self._repeats.pairs, 1))
+            told = (
+                f"{words.share(rows)} repeat the row before in all channels at once, the first is "
+                f"{words.at(self._repeats.first_index)}: rows seem to be sent more than once, as if the true rate were "
+                f"{rate:.4g} Hz"
+            )
+            severity = Severity.WARN if self._settings.means_only else Severity.REFUSE
+            for c in held:
+                found[c].append(Finding(Kind.REPEATED, severity, told, self._repeats.first_index, rows, of_row=True))
+        for together in self._alike(copied):
+            names = [self._channels[c].name for c in together]
+            repeats = int(self._repeats.zeros[together[0]])
+            # A copied sample cannot have repeated by chance; of the others some did, which are no copies.
+            repeats -= round(self._copies.by_chance(together[0]) * words.seen)
+            finding = time_flaws.copied(names, repeats, not witnesses and not held, words, self._settings)
+            for c in together:
+                found[c].append(finding)
 
-    def _share(self, count: int) -> str:
-        seen = self._pieces.seen
-        return f"{count} of {seen} samples" + (f" ({100.0 * count / seen:.2g} %)" if 1000 * count >= seen else "")
+    def _alike(self, columns: Sequence[int]) -> list[list[int]]:
+        """Copied channels of one sensor, which repeat about as often."""
+        groups: list[list[int]] = []
+        for c in columns:
+            near = [g for g in groups if self._channels[g[0]].quantity is self._channels[c].quantity]
+            near = [
+                g
+                for g in near
+                if abs(self._repeats.zeros[g[0]] - self._repeats.zeros[c]) < 0.05 * self._repeats.zeros[c]
+            ]
+            if near:
+                near[0].append(c)
+            else:
+                groups.append([c])
+        return groups
 
-    def _at(self, index: int) -> str:
-        return f"{index} ({index / self._rate_hz:.6g} s)"
+    def _of_readings(self, found: list[list[Finding]], words: Wording) -> None:
+        """Units and rates that what a unit at rest reads speaks against."""
+        cells = self._levels.finish()
+        noise, mean = cells.noise, cells.means.mean(axis=1) if cells.means.shape[1] else np.full(len(found), np.nan)
+        usual = np.median(noise, axis=1) / WHITE if noise.shape[1] else np.zeros(len(found))
+        doubts = self._readings.doubts(self._settings, mean, usual)
+        for c, channel in enumerate(self._channels):
+            doubt = doubts.get(channel.name)
+            if doubt is None or any(f.kind in (Kind.WRAPPED, Kind.CONSTANT) for f in found[c]):
+                continue
+            kind = Kind.WRONG_RATE if doubt.of_rate else Kind.WRONG_UNIT
+            refused = doubt.certain and not (doubt.of_rate and self._settings.seeks_scale)
+            severity = Severity.REFUSE if refused else Severity.WARN
+            found[c].append(Finding(kind, severity, doubt.sentence, 0, words.seen, of_row=doubt.of_rate))
+
+    def _of_course(self, found: list[list[Finding]], words: Wording) -> None:
+        """Outliers, steps, changes of the noise: against noise, which is not what it was where samples pile up."""
+        cells = self._levels.finish()
+        for c, jumps in enumerate(self._jumps.outliers):
+            cells.leave_out(c, [jump.index for jump in jumps])
+        step = np.where(np.isfinite(self._copies.step), self._copies.step, 0.0)
+        level, noise = time_flaws.steps_and_noise(cells, step)
+        for c, channel in enumerate(self._channels):
+            refused = any(f.kind is Kind.SATURATED and f.severity is Severity.REFUSE for f in found[c])
+            if refused or any(f.kind in _SPOILS_NOISE for f in found[c]):
+                continue
+            jumps = self._jumps
+            count = int(jumps.outlier_count[c])
+            mended = self._settings.mends_outliers and self._few(c)
+            found[c] += time_flaws.outliers(channel, jumps.outliers[c], count, mended, words)
+            if channel.quantity is not Quantity.TEMPERATURE:
+                found[c] += time_flaws.steps(channel, jumps.steps[c], level[c], cells.size, words)
+                found[c] += time_flaws.noise_changes(channel, noise[c], cells.size * cells.group, words)
+
+
+def _groups(channels: Sequence[Channel]) -> list[tuple[int, ...]]:
+    """All channels, each whole triad, each channel alone."""
+    names = [c.name for c in channels]
+    triads = [tuple(names.index(n) for n in triad) for triad in TRIADS.values() if all(n in names for n in triad)]
+    everything = tuple(range(len(channels)))
+    larger = [everything, *(t for t in triads if len(t) < len(everything))] if len(channels) > 1 else []
+    return [*larger, *((c,) for c in everything)]
 
 
 def inspect(recording: Recording, settings: FitnessSettings | None = None) -> tuple[ChannelFitness, ...]:

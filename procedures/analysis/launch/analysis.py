@@ -11,8 +11,9 @@ from procedures.analysis.allan.correlated import Uncorrelatable
 from procedures.analysis.allan.deviation import Deviation, DeviationStream
 from procedures.analysis.allan.statistic import Sizes, decade_sizes
 from procedures.analysis.cells import Cells, CellStream, cell_samples, channel_rows
-from procedures.analysis.fitness.findings import require_fit
-from procedures.analysis.fitness.stream import FitnessStream
+from procedures.analysis.fitness.findings import FitnessSettings
+from procedures.analysis.fitness.watched import Inspection, Watched
+from procedures.analysis.launch.beside import Beside, Resolution, smooth_temperatures, temperature_names
 from procedures.analysis.launch.channel import channel_noise
 from procedures.analysis.launch.results import LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
@@ -22,6 +23,8 @@ from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.recording import Quantity, RawArray, Recording
 
+INSPECTION = Inspection(FitnessSettings())
+"""A launch is at rest throughout."""
 FEWEST_CELLS = 120
 """Fewer cells are no launch to analyse."""
 CROSSOVER = 0.03
@@ -41,11 +44,9 @@ def analyse_launch(recording: Recording, label: str, settings: LaunchSettings) -
     names = tuple(c.name for c in info.channels if c.quantity is not Quantity.TEMPERATURE)
     if not names:
         raise UnfitRecording(f"recording {info.id} has no channel whose noise could be analysed")
-    cells, findings = _first_pass(recording, names, settings)
-    signals = [
-        clean_signal(name, row, cells.cell_s, cells.since_launch_s, settings)
-        for name, row in zip(names, cells.rates, strict=True)
-    ]
+    cells, known = _first_pass(recording, names, settings)
+    rows = dict(zip(cells.channels, cells.rates, strict=True))
+    signals = [clean_signal(name, rows[name], cells.cell_s, cells.since_launch_s, settings) for name in names]
     samples = cell_samples(info.rate_hz, settings.cell_s)
     parts: list[tuple[Deviation | None, Powers | None]] = [(None, None)] * len(names)
     if settings.fast and samples >= FEWEST_A_CELL:
@@ -58,7 +59,7 @@ def analyse_launch(recording: Recording, label: str, settings: LaunchSettings) -
             except Uncorrelatable:
                 parts += _second_pass(recording, *group, settings, correlate=False)
     channels = tuple(
-        channel_noise(name, info.channels[info.column(name)].rate_unit, cells, signal, *part, findings[name], settings)
+        channel_noise(name, info.channels[info.column(name)].rate_unit, cells, signal, *part, known[name], settings)
         for name, signal, part in zip(names, signals, parts, strict=True)
     )
     return LaunchNoise(info.id, label, info.rate_hz, info.duration_s, info.since_launch_s, channels)
@@ -66,29 +67,34 @@ def analyse_launch(recording: Recording, label: str, settings: LaunchSettings) -
 
 def _first_pass(
     recording: Recording, names: Sequence[str], settings: LaunchSettings
-) -> tuple[Cells, dict[str, tuple[str, ...]]]:
-    """Cell means, and what the inspection warns of, channel by channel. Raises `UnfitRecording`."""
+) -> tuple[Cells, dict[str, Beside]]:
+    """Cell means, temperatures' too, and what else is known, channel by channel. Raises `UnfitRecording`."""
     info = recording.info
     columns = [info.column(name) for name in names]
-    fitness = FitnessStream([info.channels[c] for c in columns], info.rate_hz, info.count)
-    stream = CellStream(info, names, settings.cell_s)
+    watched = recording if isinstance(recording, Watched) else Watched(recording, INSPECTION)
+    temperatures = temperature_names(info)
+    resolution = Resolution([info.channels[c] for c in columns])
+    stream = CellStream(info, (*names, *temperatures), settings.cell_s)
 
-    def inspected() -> Iterator[RawArray]:
-        for block in recording.blocks():
-            fitness.add(block[:, columns])
+    def seen() -> Iterator[RawArray]:
+        for block in watched.blocks():
+            resolution.add(block[:, columns])
             yield block
 
-    for rows in channel_rows(info, names, inspected()):
+    for rows in channel_rows(info, (*names, *temperatures), seen()):
         stream.add(rows)
-    found = fitness.finish()
-    require_fit(info.id, found)
+    found = watched.fitness()
     cells = stream.finish()
     if cells.rates.shape[1] < FEWEST_CELLS:
         raise UnfitRecording(
             f"recording {info.id}: {cells.rates.shape[1]} cells of {cells.cell_s:g} s are too few for a noise "
             f"analysis, at least {FEWEST_CELLS} are needed"
         )
-    return cells, {f.channel: tuple(finding.sentence for finding in f.findings) for f in found}
+    coarse, warm = resolution.finish(), smooth_temperatures(cells, temperatures)
+    return cells, {
+        f.channel: Beside(tuple(finding.sentence for finding in f.findings), coarse.get(f.channel, ""), warm)
+        for f in found
+    }
 
 
 @dataclass

@@ -11,6 +11,8 @@ from procedures.analysis.allan.read_off import Line, ReadOff, read_off
 from procedures.analysis.allan.statistic import ALLAN, OVERLAPPING_ALLAN, Sizes, decade_sizes
 from procedures.analysis.averaging_time import averaging_time
 from procedures.analysis.cells import Cells
+from procedures.analysis.launch.beside import Beside
+from procedures.analysis.launch.model import found_noise
 from procedures.analysis.launch.results import (
     PROCESSES,
     Averaging,
@@ -19,6 +21,7 @@ from procedures.analysis.launch.results import (
     Coefficient,
     Curve,
     Reading,
+    SpectralLine,
     Stage,
 )
 from procedures.analysis.launch.settings import LaunchSettings
@@ -26,14 +29,17 @@ from procedures.analysis.launch.signal import CleanSignal, Step
 from procedures.analysis.noise_fit.comparison import compare
 from procedures.analysis.noise_fit.estimate import Estimate, NoiseFit
 from procedures.analysis.noise_fit.least_squares import fit_allan
-from procedures.analysis.noise_fit.likelihood import fit_noise
-from procedures.analysis.noise_fit.powers import Powers, slow_powers
-from procedures.analysis.wavelet_split import wavelet_split
+from procedures.analysis.noise_fit.powers import Powers
+from procedures.analysis.wavelet_split import most_levels, wavelet_split
 from procedures.core.arrays import Array
 from procedures.core.units import DEVIATION_DISPLAY
 
 BAND_TERMS = 8
 """The band ends where every start has about twice so many terms."""
+
+
+_ROUNDING = 1e-12
+"""Of a series, so much may differ between its parts by rounding alone."""
 
 
 def channel_noise(
@@ -43,7 +49,7 @@ def channel_noise(
     signal: CleanSignal,
     fast: Deviation | None,
     powers: Powers | None,
-    findings: Sequence[str],
+    beside: Beside,
     settings: LaunchSettings,
 ) -> ChannelNoise:
     """Everything that is found of a channel; `fast` and `powers` are of every sample, None where there are none."""
@@ -53,7 +59,8 @@ def channel_noise(
     graphical = read_off(whole)
     # from one cell on: what the notch filter leaves of the dither stands above the model at shorter times
     least_squares = fit_allan(whole, from_s=cell_s, level=settings.level, confidence=settings.confidence)
-    likelihood = fit_noise(slow_powers(series, cell_s), powers, level=settings.level, confidence=settings.confidence)
+    found = found_noise(signal, cells, powers, beside, settings)
+    likelihood, warnings = found.fit, found.warnings(rate_unit)
     last = Stage(signal.steps[-1].name, _curve(whole), _values(graphical), signal.steps[-1].note)
     stages = [*_stages(signal.steps[:-1], cell_s, settings), last, *_split(series, cell_s, rate_unit, settings)]
     return ChannelNoise(
@@ -62,7 +69,7 @@ def channel_noise(
         mean=float(np.mean(signal.steps[0].cells[signal.first_cell :])),
         used_from_s=cells.since_launch_s + signal.first_cell * cell_s,
         used_s=len(series) * cell_s,
-        findings=(*findings, *signal.findings),
+        findings=(*beside.findings, *signal.findings),
         warm_up=signal.warm_up,
         self_heating=signal.self_heating,
         trend=signal.trend,
@@ -73,8 +80,16 @@ def channel_noise(
             for p in PROCESSES
         ),
         disagreements=compare(graphical, least_squares, likelihood),
-        model=_remarks(likelihood),
+        model=(*warnings, *likelihood.notes),
+        warnings=warnings,
         averaging=_averaging(likelihood),
+        bandwidth_hz=0.5 * whole.rate_hz,
+        band_hz=likelihood.band_hz,
+        lines=tuple(SpectralLine(line.frequency_hz, line.amplitude) for line in likelihood.lines),
+        correlated=found.correlated,
+        flicker_corner_s=likelihood.flicker_corner_s,
+        temperature=found.temperature,
+        shift=found.shift,
     )
 
 
@@ -123,21 +138,26 @@ def _split(series: Array, cell_s: float, rate_unit: str, settings: LaunchSetting
     if settings.wavelet_rule is None:
         return []
     unit, size = DEVIATION_DISPLAY[rate_unit]
+    levels = min(settings.wavelet_levels, most_levels(len(series)))
+    if levels == 0:
+        return []
     split = wavelet_split(
         series,
         cell_s,
         rule=settings.wavelet_rule,
         unit_size=size if settings.wavelet_rule == "thesis" else None,
-        levels=settings.wavelet_levels,
+        levels=levels,
     )
-    scale = 2**settings.wavelet_levels * cell_s
+    scale = 2**levels * cell_s
     note = f"{settings.wavelet_rule} rule, scales up to {scale:g} s"
     if settings.wavelet_rule == "thesis":
         note += f", unit variance in {unit}"
+    if levels < settings.wavelet_levels:
+        note += f"; {levels} levels, not {settings.wavelet_levels}: {len(series)} cells allow no more"
     found: list[Stage] = []
     for name, part in (("kept", split.kept), ("removed", split.removed)):
         title = f"{name} by the wavelet split"
-        if np.all(part == part[0]):
+        if np.ptp(part) <= _ROUNDING * np.ptp(series):
             found.append(Stage(title, Curve((), (), (), (), ()), (None,) * len(PROCESSES), f"{note}: nothing"))
             continue
         curve = _deviation(part, cell_s, settings)
@@ -173,16 +193,13 @@ def _of_line(line: Line | None) -> Reading:
 def _of(estimate: Estimate) -> Reading:
     e = estimate
     limit = e.upper_limit if np.isfinite(e.upper_limit) else None
-    return Reading(e.value, e.standard_uncertainty, e.lower, e.upper, limit, e.p_value)
-
-
-def _remarks(fit: NoiseFit) -> tuple[str, ...]:
-    lines = tuple(f"a spectral line at {line.frequency_hz:.4g} Hz was cut out of the fit" for line in fit.lines)
-    return (*lines, *fit.remarks)
+    return Reading(e.value, e.standard_uncertainty, e.lower, e.upper, limit, e.p_value, described=e.described)
 
 
 def _averaging(fit: NoiseFit) -> Averaging:
     """From the efficient estimates, with their covariance."""
+    if not (fit.quantization.described and fit.random_walk.described):
+        return Averaging(None, None, "the noise model does not describe the fast part of the noise")
     covariance = np.zeros((len(PROCESSES), len(PROCESSES)))
     at = [PROCESSES.index(process) for process in fit.correlated]
     sds = np.array([fit.of(process).standard_uncertainty or 0.0 for process in fit.correlated])

@@ -25,6 +25,53 @@ class Reading:
     from_s: float | None = None
     to_s: float | None = None
     """Where on the plot a graphical value was read."""
+    described: bool = True
+    """False: the noise model does not describe the record where this is read; the limit holds whatever is there."""
+
+
+@dataclass(frozen=True)
+class SpectralLine:
+    """A line that was taken out of the record before its noise was fitted."""
+
+    frequency_hz: float
+    amplitude: float
+    """Of the sine [rate]."""
+
+
+@dataclass(frozen=True)
+class CorrelatedProcess:
+    """A Gauss–Markov process ``dx/dt = −x/τ + q·w`` beside the five."""
+
+    time_s: float
+    time_sd_s: float | None
+    driving: float
+    """q [rate/√s]."""
+    driving_sd: float | None
+    sd: float
+    """Of the process, q·√(τ/2) [rate]."""
+
+
+@dataclass(frozen=True)
+class TemperatureSlope:
+    """How the channel follows a temperature beside it."""
+
+    channel: str
+    """The temperature's."""
+    slope: float
+    """[rate/K], of a temperature in °C; else a count of it."""
+    standard_uncertainty: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class LevelShift:
+    """One shift of the level."""
+
+    at_s: float
+    """Since the launch."""
+    height: float
+    """[rate]"""
+    standard_uncertainty: float
 
 
 @dataclass(frozen=True)
@@ -153,6 +200,18 @@ class ChannelNoise:
     model: tuple[str, ...]
     """What the likelihood's model does not describe: spectral lines, frequencies left out."""
     averaging: Averaging
+    warnings: tuple[str, ...] = ()
+    """Those of `model` that a reader must know; the rest are notes on what one record does not tell apart."""
+    bandwidth_hz: float = 0.0
+    """Half of the rate of the samples: a random walk is that of noise so wide, unless a filter's edge is named."""
+    band_hz: tuple[float, float] = (0.0, 0.0)
+    """Lowest and highest frequency that the likelihood uses."""
+    lines: tuple[SpectralLine, ...] = ()
+    correlated: CorrelatedProcess | None = None
+    flicker_corner_s: float | None = None
+    """Shortest relaxation time of the flicker, where it is not the one of the noise model."""
+    temperature: TemperatureSlope | None = None
+    shift: LevelShift | None = None
 
     def coefficient(self, process: str) -> Coefficient:
         """One of the five processes."""

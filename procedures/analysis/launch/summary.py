@@ -1,7 +1,7 @@
 """What several launches say together of one channel: means, their uncertainty, and the noise to count on."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
@@ -43,6 +43,15 @@ class ChannelSummary:
     def noise(self) -> NoiseCoefficients:
         """The coefficients to count on in a plan."""
         return _coefficients(self.means)
+
+    def noise_over(self, known: NoiseCoefficients | None) -> NoiseCoefficients:
+        """The same for a unit's record: what the model does not describe stays as it is known, or is its limit."""
+        changed: dict[str, float] = {}
+        for m in self.means:
+            if m.mean is None and not all(reading.described for reading in m.values):
+                limits = [r.upper_limit for r in m.values if r.upper_limit is not None]
+                changed[m.process] = min(limits, default=0.0) if known is None else getattr(known, m.process)
+        return replace(self.noise, **changed)
 
 
 def summarise(launches: Sequence[LaunchNoise]) -> tuple[ChannelSummary, ...]:

@@ -1,119 +1,178 @@
 """Slow and fast powers in one spectrum: which part of each is fitted, and how well the model describes each octave."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, gammainc, gammaincc, ndtri
 
-from procedures.analysis.noise_fit.columns import QUANTIZATION
-from procedures.analysis.noise_fit.estimate import Octave
+from procedures.analysis.noise_fit.extensions import Extension, extension
+from procedures.analysis.noise_fit.joined import Joined, joined_at
 from procedures.analysis.noise_fit.powers import Powers
-from procedures.analysis.noise_fit.restricted import Spectrum, maximum, only_where
-from procedures.core.arrays import Array
+from procedures.analysis.noise_fit.restricted import State, maximum
 from procedures.core.errors import UnfitRecording
 
 MISFIT_LEVEL = 1e-3
-"""Probability that a fit of all fast octaves is rejected though the model holds."""
+"""Probability that a fit of all octaves is rejected though the model holds."""
 _FEWEST_BINS = 8
-_LARGEST_Z = 38.0
+_FEWEST_OCTAVES = 3
+"""So many must be left to fit."""
+_LONGEST_HOLE = 3
+"""Octaves of a part left out that has fitted ones on both sides."""
+_ROUNDS = 3
+_UNFOLDED = 4.0
+"""Of a cell's frequency: with a band that ends above, what the cells lack of the noise beyond it is below 2 %."""
+_SLOW_PART = 0.2
+"""Of a cell's frequency: up to here the slow model is chosen where no whole spectrum fits."""
 
 
 @dataclass(frozen=True)
-class Joined:
-    """Slow and fast bins in one spectrum, (b,), and which of them are fitted."""
+class Agreement:
+    """The bins to fit, and what was left out of them."""
 
-    frequency_hz: Array
-    is_fast: NDArray[np.bool_]
-    spectrum: Spectrum
-    fitted: NDArray[np.bool_]
+    joined: Joined
+    remarks: tuple[str, ...]
+    holes: NDArray[np.bool_]
+    """Bins left out that have fitted ones above them, (b,): what only they show is not described."""
+    described: bool
+    """Whether what is fitted fits."""
+    model: Extension | None = None
+    """What the model has beside the five coefficients."""
 
     @property
-    def used(self) -> Spectrum:
-        """The fitted bins."""
-        return only_where(self.fitted, self.spectrum)
-
-    def octaves(self, variances: Array, amplitudes: Array, ramp: bool) -> tuple[Octave, ...]:
-        """Chi-square of the bins in each octave, slow and fast apart, and fitted and left out apart.
-
-        A bin's power over its expectation is χ²_ν/ν; its quantile as a normal deviate z, ``χ² = Σ z²``.
-        """
-        s = self.spectrum if ramp else self.spectrum.only((1, 2))
-        explained = 2.0 * s.products @ amplitudes - np.einsum("i,bij,j->b", amplitudes, s.gram, amplitudes)
-        ratio = np.maximum(s.squares - explained, 0.0) / (s.columns @ variances)
-        half = 0.5 * s.dof
-        z = np.where(ratio < s.dof, ndtri(gammainc(half, 0.5 * ratio)), -ndtri(gammaincc(half, 0.5 * ratio)))
-        z = np.clip(z, -_LARGEST_Z, _LARGEST_Z)
-        group = np.floor(np.log2(self.frequency_hz)) * 4 + 2 * self.is_fast + ~self.fitted
-        found: list[Octave] = []
-        for key in np.unique(group):
-            own = group == key
-            frequency = self.frequency_hz[own]
-            chi_square, dof = float(np.sum(z[own] ** 2)), int(np.sum(own))
-            p_value = float(chdtrc(dof, chi_square))
-            fitted = bool(self.fitted[own][0])
-            is_fast = bool(self.is_fast[own][0])
-            found.append(Octave(float(frequency[0]), float(frequency[-1]), chi_square, dof, p_value, is_fast, fitted))
-        return tuple(found)
+    def plain(self) -> Joined:
+        """The same bins without what extends the model."""
+        return self.joined if self.model is None else self.model.taken_from(self.joined)
 
 
-def agreed(slow: Powers, fast: Powers | None) -> tuple[Joined, list[str]]:
-    """The bins to fit, and sentences on what was left out of them. Raises `UnfitRecording`."""
+def agreed(slow: Powers, fast: Powers | None) -> Agreement:
+    """The bins to fit, the model that they need, and sentences on what was left out. Raises `UnfitRecording`."""
+    ways = _ways(slow, fast)
+    found, state = _first_that_fits(ways)
+    base = ways[-1].joined.below(_SLOW_PART / slow.period_s) if found is None else found.joined
+    model = extension(base, state or _best(base))
+    if model is not None:
+        ways = tuple(replace(way, joined=model.applied(way.joined)) for way in ways)
+        found, _ = _first_that_fits(ways)
+    if found is None:
+        return replace(_cut(ways, _UNFOLDED / slow.period_s), model=model)
+    text = f"At the full rate the power is not that of white reading noise and the slower processes{found.own}."
+    return Agreement(found.joined, (text,) if found.own else (), ~found.joined.fitted, described=True, model=model)
+
+
+@dataclass(frozen=True)
+class _Way:
+    """Slow and fast bins joined in one of two ways."""
+
+    joined: Joined
+    own: str
+    """What is said of Q where the fast bins have their own."""
+
+
+def _ways(slow: Powers, fast: Powers | None) -> tuple[_Way, ...]:
+    """The ways to join them, the one that knows most first."""
     if fast is None:
-        return joined_at(slow, None, inf, inf), []
+        return (_Way(joined_at(slow, None, inf), ""),)
     crossover = float(fast.frequency_hz[0])
     if np.sum(slow.frequency_hz < crossover) < _FEWEST_BINS:
         raise UnfitRecording(f"fewer than {_FEWEST_BINS} bins below {crossover:.3g} Hz: fit the slow powers alone")
-    whole = joined_at(slow, fast, crossover, inf)
-    if fitting_octaves(whole)[0]:
-        return whole, []
-    nyquist, highest = 0.5 / slow.period_s, inf
-    while True:
-        part = joined_at(slow, fast, nyquist, highest)
-        fits, top_hz = fitting_octaves(part)
-        if fits:
+    own = f"; Q is that of readings {slow.period_s:g} s apart"
+    return _Way(joined_at(slow, fast, crossover), ""), _Way(joined_at(slow, fast, 0.5 / slow.period_s), own)
+
+
+def _first_that_fits(ways: tuple[_Way, ...]) -> tuple[_Way | None, State | None]:
+    for way in ways:
+        state = _best(way.joined)
+        if misfit(way.joined, state) <= 1.0:
+            return way, state
+    return None, None
+
+
+def _best(joined: Joined) -> State:
+    """All processes allowed, and a ramp."""
+    return maximum(joined.used, range(joined.spectrum.columns.shape[1]))
+
+
+def misfit(joined: Joined, best: State | None = None) -> float:
+    """Logarithm of the least p-value of the fitted octaves over that of the test's level; above 1 it does not fit."""
+    best = best or _best(joined)
+    if best.log_likelihood == -np.inf:
+        return inf
+    octaves = [o for o in joined.octaves(best.variances, best.amplitudes, ramp=True) if o.fitted]
+    least = max(min(o.p_value for o in octaves), 1e-300)
+    return float(np.log(least) / np.log(MISFIT_LEVEL / len(octaves)))
+
+
+def _cut(ways: tuple[_Way, ...], unfolded_hz: float) -> Agreement:
+    """Less what does not fit. Cell means fold what is faster into their band, and miss it where a filter took it away:
+    where the band ends low, only what they know without it is used, and the fast bins above."""
+    part = _parted(ways[-1].joined, ways[-1].own)
+    top = float(part.joined.frequency_hz[part.joined.fitted][-1])
+    first = ways[0].joined
+    if len(ways) == 1 or top > unfolded_hz or not np.any(first.is_fast & (first.frequency_hz < top)):
+        return part
+    below = first.below(np.nextafter(top, inf))
+    own = "; Q is not told from the edge"
+    return _told(below, own, described=True) if misfit(below) <= 1.0 else _parted(first, own)
+
+
+def _parted(joined: Joined, own: str) -> Agreement:
+    """Leaves out the fewest octaves in a row that it takes until the others fit; again, if need be, thrice at most."""
+    runs: list[range] = []
+    part, described = joined, False
+    for _ in range(_ROUNDS):
+        best, least = None, inf
+        for run in _runs(part):
+            found = misfit(part.without(run))
+            if found < least:
+                best, least = run, found
+            if found <= 1.0:
+                break
+        if best is None:
             break
-        highest = top_hz
-    text = "the power is not that of white reading noise and the slower processes"
-    if not np.any(part.is_fast & part.fitted):
-        return part, [f"Above {nyquist:.3g} Hz {text}: left out; Q is that of readings {slow.period_s:g} s apart."]
-    above = "" if highest == inf else f"; above {highest:.3g} Hz it is left out"
-    return part, [f"At the full rate {text}{above}; Q is that of readings {slow.period_s:g} s apart."]
+        runs.append(best)
+        part, described = part.without(best), least <= 1.0
+        if described:
+            break
+    for run in runs:  # what is not seen of a misfit's foot is more than its interval allows
+        wider = part.without(range(max(0, run.start - 1), run.stop + 1))
+        if len(np.unique(wider.group[wider.fitted])) >= _FEWEST_OCTAVES:
+            part = wider
+    return _told(part, own, described=described)
 
 
-def joined_at(slow: Powers, fast: Powers | None, crossover_hz: float, highest_hz: float) -> Joined:
-    """Slow bins below the crossover and fast ones above; those above `highest_hz` are there, but not fitted.
-
-    Fast bins that do not follow the slow ones at once have a quantization of their own, in a fifth column.
-    """
-    parts = [(slow, slow.frequency_hz < crossover_hz)]
-    if fast is not None:
-        parts.append((fast, fast.frequency_hz >= crossover_hz))
-    counts = [int(np.sum(keep)) for _, keep in parts]
-    is_fast = np.repeat([False, True], [*counts, 0][:2])
-    frequency = np.concatenate([p.frequency_hz[keep] for p, keep in parts])
-    columns = np.concatenate([p.columns[keep] for p, keep in parts])
-    fitted = ~is_fast | (frequency < highest_hz)
-    if fast is not None and crossover_hz > fast.frequency_hz[0] and np.any(is_fast & fitted):
-        own = np.where(is_fast, columns[:, QUANTIZATION], 0.0)
-        columns = np.column_stack([columns, own])
-        columns[is_fast, QUANTIZATION] = 0.0
-    dof = np.concatenate([p.dof[keep] for p, keep in parts])
-    power = np.concatenate([p.power[keep] for p, keep in parts])
-    products = np.concatenate([p.products[keep] for p, keep in parts])
-    gram = np.concatenate([p.gram[keep] for p, keep in parts])
-    return Joined(frequency, is_fast, Spectrum(power * dof, dof, columns, products, gram), fitted)
+def _runs(joined: Joined) -> Iterator[range]:
+    """Octaves in a row that may be left out, the shortest first; of as many, those at the upper end first."""
+    octaves = np.unique(joined.group[joined.fitted])
+    slow = set(joined.group[joined.fitted & ~joined.is_fast].tolist())
+    count = len(octaves)
+    for length in range(1, count - _FEWEST_OCTAVES + 1):
+        starts = range(count - length, -1, -1) if length <= _LONGEST_HOLE else (count - length, 0)
+        for start in starts:
+            run = range(int(octaves[start]), int(octaves[start + length - 1]) + 1)
+            if not slow <= set(run):
+                yield run
 
 
-def fitting_octaves(joined: Joined) -> tuple[bool, float]:
-    """Whether all fitted fast octaves fit, and where the highest of them begins [Hz].
-
-    The fit has all processes and a ramp. With no fast octave fitted there is nothing to object to.
-    """
-    if not np.any(joined.is_fast & joined.fitted):
-        return True, inf
-    best = maximum(joined.used, range(joined.spectrum.columns.shape[1]))
-    octaves = joined.octaves(best.variances, best.amplitudes, ramp=True)
-    fast = [o for o in octaves if o.fitted and o.is_fast]
-    return all(o.p_value >= MISFIT_LEVEL / len(fast) for o in fast), fast[-1].low_hz
+def _told(part: Joined, own: str, *, described: bool) -> Agreement:
+    """The remarks on what is left out."""
+    frequency, fitted = part.frequency_hz, part.fitted
+    top = float(frequency[fitted][-1])
+    remarks: list[str] = []
+    if frequency[-1] > top:
+        begin = "At the full rate the power" if own else "The power"
+        remarks.append(
+            f"{begin} is not that of white reading noise and the slower processes; above "
+            f"{top:.3g} Hz it is left out{own}."
+        )
+    elif own:
+        remarks.append(f"At the full rate the power is not that of the slow part{own}.")
+    holes = ~fitted & (frequency < top)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], holes, [0]]).astype(np.int8))).reshape(-1, 2)
+    for first, end in edges:
+        low, high = frequency[first], frequency[end - 1]
+        remarks.append(f"Between {low:.3g} and {high:.3g} Hz the power is not that of the noise model: left out.")
+    if not described:
+        remarks.append("The noise model describes no part of the spectrum that would tell the coefficients.")
+    return Agreement(part, tuple(remarks), holes, described)

@@ -25,10 +25,43 @@ class Estimate:
     p_value: float
     """Probability that a record without this process looks as much as if it had it."""
 
+    described: bool = True
+    """False: the noise model does not describe the part of the spectrum that this coefficient is read of."""
+
     @property
     def present(self) -> bool:
         """Whether the process was observed."""
         return self.value is not None
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A regressor of the slow part that the rate follows."""
+
+    index: int
+    """Among those given, from 0."""
+    slope: float
+    """Rate per unit of the regressor."""
+    standard_uncertainty: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class GaussMarkov:
+    """An exponentially correlated process ``dx/dt = −x/τ + q·w``, w white of unit density."""
+
+    time_s: float
+    """Correlation time τ [s]."""
+    time_sd_s: float | None
+    """Standard uncertainty; None where the record tells no more than the order of magnitude."""
+    driving: float
+    """q [rate/√s]."""
+    driving_sd: float | None
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of the process, q·√(τ/2) [rate]."""
+        return self.driving * (0.5 * self.time_s) ** 0.5
 
 
 @dataclass(frozen=True)
@@ -71,6 +104,14 @@ class NoiseFit:
     """Lowest and highest frequency used."""
     remarks: tuple[str, ...]
     """What a reader must know, a sentence each."""
+    notes: tuple[str, ...] = ()
+    """On processes that one record does not tell apart: the intervals allow for it."""
+    followed: tuple[Followed, ...] = ()
+    """The regressors beside a ramp that were kept."""
+    gauss_markov: GaussMarkov | None = None
+    """Beside the five processes."""
+    flicker_corner_s: float | None = None
+    """Shortest relaxation time of the flicker, where it is another than that of `core.noise`."""
 
     def of(self, process: str) -> Estimate:
         """The estimate of one of `PROCESSES`."""

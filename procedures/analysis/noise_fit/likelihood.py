@@ -5,28 +5,51 @@ powers hold all that the record tells; the coefficients reach the Cramér-Rao bo
 approximate stands in `powers`; the maximum in `restricted`, the presence of a process in `selection`.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
 from scipy.special import chdtri
 
-from procedures.analysis.noise_fit.bands import agreed
+from procedures.analysis.noise_fit.alternatives import Doubt, allowed_for
+from procedures.analysis.noise_fit.bands import Agreement, agreed
 from procedures.analysis.noise_fit.estimate import PROCESSES, Estimate, NoiseFit
+from procedures.analysis.noise_fit.followed import Candidate, followed
+from procedures.analysis.noise_fit.gauss_markov import gauss_markov
+from procedures.analysis.noise_fit.lines import SpectralLine
 from procedures.analysis.noise_fit.powers import Powers
 from procedures.analysis.noise_fit.restricted import Profile, Spectrum, State, information, maximum
 from procedures.analysis.noise_fit.selection import VARIANCES, Selection, inverse_information, select
+from procedures.analysis.noise_fit.undescribed import limited, undescribed
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 
 METHOD = "likelihood"
+_SAME_MODES = 3.0
+"""Modes of a segment between two frequencies below which a line that both parts show is told once."""
+_TOLD = 0.25
+"""Of a cell's frequency: lines above it are those of the fast part, or folded from there."""
+CHOSEN_BAND = 1.4
+"""Variance of an estimate from a band that its own record chose, over that from one which was given (Monte Carlo)."""
 LIMIT = 0.95
 """Probability of an upper limit."""
 
 
-def fit_noise(slow: Powers, fast: Powers | None = None, *, level: float = 0.01, confidence: float = 0.95) -> NoiseFit:
+def fit_noise(
+    slow: Powers,
+    fast: Powers | None = None,
+    *,
+    level: float = 0.01,
+    confidence: float = 0.95,
+    candidates: Sequence[Candidate] = (),
+    coarse: bool = False,
+) -> NoiseFit:
     """Q, N, B, K, R of one channel from its slow and, where there are any, its fast powers.
 
-    `level` is the probability at which each absent process is reported present; `confidence` that of the intervals.
+    `level` is the probability at which each absent process is reported present; `confidence` that of the intervals;
+    `coarse`: the noise is less than a count, and the error of reading no white noise.
+    `candidates` say when each of the slow powers' other regressors is kept.
     The fast powers are used from their first frequency up, the slow ones below. Where they disagree with the
     model (chi-square per octave, see `bands`), the reading noise at the full rate is not white: the slow
     powers are then used whole, the fast ones above them with a quantization of their own, less as many of their
@@ -37,32 +60,44 @@ def fit_noise(slow: Powers, fast: Powers | None = None, *, level: float = 0.01, 
     for name, value in (("level", level), ("confidence", confidence)):
         if not 0.0 < value < 1.0:
             raise BadParameter(name, value, f"0 < {name} < 1")
-    joined, remarks = agreed(slow, fast)
+    agreement = agreed(slow, fast)
+    reduced, follows = followed(agreement.joined, candidates)
+    agreement = replace(agreement, joined=reduced)
+    joined, model = agreement.joined, agreement.model
     selection = select(joined.used, level)
-    estimates = _estimates(joined.used, selection, confidence)
-    correlated, correlation = _correlation(selection)
+    estimates, doubt = _estimates(agreement, selection, confidence)
+    left = undescribed(agreement, coarse=coarse)
+    estimates = limited(agreement, estimates, left)
+    correlated, correlation = _correlation(selection, left)
     octaves = joined.octaves(selection.best.variances, selection.best.amplitudes, selection.ramp)
     fitted = joined.frequency_hz[joined.fitted]
     return NoiseFit(
         METHOD,
         *estimates,
-        slope=selection.slope.slope if selection.ramp else 0.0,
+        slope=selection.slope.slope if estimates[-1].present else 0.0,
         confidence=confidence,
         correlated=correlated,
         correlation=correlation,
         octaves=octaves,
-        lines=() if fast is None else fast.lines,
+        lines=_lines(slow, fast),
         band_hz=(float(fitted[0]), float(fitted[-1])),
-        remarks=(*remarks, *_remarks(selection)),
+        remarks=(*agreement.remarks, *_left(left)),
+        notes=(*_remarks(selection), *_doubts(doubt)),
+        followed=follows,
+        gauss_markov=None if model is None else gauss_markov(agreement.plain, model, selection.free),
+        flicker_corner_s=None if model is None else model.corner_s,
     )
 
 
-def _estimates(spectrum: Spectrum, selection: Selection, confidence: float) -> tuple[Estimate, ...]:
+def _estimates(agreement: Agreement, selection: Selection, confidence: float) -> tuple[tuple[Estimate, ...], Doubt]:
     """Of Q, N, B, K, R. Values are those of the processes present; intervals allow the others as well.
 
     A process not observed is not proven absent: an interval that took it for zero would be too narrow. An absent
     process's limit allows the ramp, too.
     """
+    spectrum = agreement.joined.used
+    slack = 1.0 if np.all(agreement.joined.fitted) else CHOSEN_BAND
+    losses = slack * float(chdtri(1, 1.0 - confidence)), slack * _one_sided()
     everything = tuple(range(spectrum.columns.shape[1]))
     own, full = (maximum(s, everything) for s in (selection.spectrum, spectrum))
     fit_sd = _standard_uncertainties(selection.spectrum, selection.best, selection.free)
@@ -74,11 +109,13 @@ def _estimates(spectrum: Spectrum, selection: Selection, confidence: float) -> t
         if k in selection.present:
             alone = Profile(selection.spectrum, selection.free, k, selection.best)
             allowed = Profile(selection.spectrum, everything, k, own)
-            found.append(_present(((alone, fit_sd[k]), (allowed, own_sd[k])), p_value, confidence))
+            found.append(_present(((alone, fit_sd[k]), (allowed, own_sd[k])), p_value, losses, slack))
         else:
-            limit = Profile(spectrum, everything, k, full).crossing(_one_sided(), upwards=True, scale=full_sd[k])
+            limit = Profile(spectrum, everything, k, full).crossing(losses[1], upwards=True, scale=full_sd[k])
             found.append(Estimate(None, None, None, None, sqrt(limit), p_value))
-    return (*found, _of_ramp(selection, confidence))
+    doubt = allowed_for(agreement.joined, agreement.plain, selection, own, dict(enumerate(found)), losses)
+    found = [doubt.estimates.get(k, estimate) for k, estimate in enumerate(found)]
+    return (*found, _of_ramp(selection, confidence)), doubt
 
 
 def _one_sided() -> float:
@@ -86,19 +123,21 @@ def _one_sided() -> float:
     return float(chdtri(1, 2.0 * (1.0 - LIMIT)))
 
 
-def _present(profiles: tuple[tuple[Profile, float], ...], p_value: float, confidence: float) -> Estimate:
+def _present(
+    profiles: tuple[tuple[Profile, float], ...], p_value: float, losses: tuple[float, float], slack: float
+) -> Estimate:
     """A process with variance v: ``coefficient = √v``, its uncertainty ``sd(v)/(2√v)``, its interval by profile.
 
     The profiles, each with sd(v): that of the processes present, then that of all. The interval is from the lowest to
     the highest end: alone the first is blind to what was not observed, alone the second is low where all that it
     allows is absent, since variances cannot be negative (N alone: upper limits held in 76 % instead of 95 %).
     """
-    loss = float(chdtri(1, 1.0 - confidence))
     first, sd = profiles[0]
+    sd *= sqrt(slack)
     variance = float(first.best.variances[first.k])
-    lower = min(p.crossing(loss, upwards=False, scale=s) for p, s in profiles)
-    upper = max(p.crossing(loss, upwards=True, scale=s) for p, s in profiles)
-    limit = max(p.crossing(_one_sided(), upwards=True, scale=s) for p, s in profiles)
+    lower = min(p.crossing(losses[0], upwards=False, scale=s) for p, s in profiles)
+    upper = max(p.crossing(losses[0], upwards=True, scale=s) for p, s in profiles)
+    limit = max(p.crossing(losses[1], upwards=True, scale=s) for p, s in profiles)
     return Estimate(sqrt(variance), 0.5 * sd / sqrt(variance), sqrt(lower), sqrt(upper), sqrt(limit), p_value)
 
 
@@ -123,15 +162,17 @@ def _covariance(spectrum: Spectrum, at: State, free: tuple[int, ...]) -> Array:
     return inverse_information(information(spectrum, at)[np.ix_(free, free)])
 
 
-def _correlation(selection: Selection) -> tuple[tuple[str, ...], Array]:
-    """Of the processes observed; slope and variances are independent in the information."""
+def _correlation(selection: Selection, left: tuple[int, ...]) -> tuple[tuple[str, ...], Array]:
+    """Of the processes observed, less those not described; slope and variances are independent in the information."""
     count = len(selection.present)
     covariance = _covariance(selection.spectrum, selection.best, selection.free)[:count, :count]
     sd = np.sqrt(np.diag(covariance))
     names = [PROCESSES[k] for k in selection.present]
     correlation = np.eye(count + selection.ramp)
     correlation[:count, :count] = covariance / np.outer(sd, sd)
-    return tuple(names + [PROCESSES[-1]] * selection.ramp), correlation
+    names += [PROCESSES[-1]] * selection.ramp
+    kept = [i for i, name in enumerate(names) if PROCESSES.index(name) not in left]
+    return tuple(names[i] for i in kept), correlation[np.ix_(kept, kept)]
 
 
 def _remarks(selection: Selection) -> tuple[str, ...]:
@@ -139,3 +180,37 @@ def _remarks(selection: Selection) -> tuple[str, ...]:
         return ()
     taken, other = ("rate ramp", "rate random walk")[:: 1 if selection.ramp else -1]
     return (f"The slow drift is taken for a {taken}, but one record does not tell it from a {other}.",)
+
+
+def _doubts(doubt: Doubt) -> tuple[str, ...]:
+    if doubt.model is None:
+        return ()
+    if doubt.model.time_s is None:
+        other = f"a flicker whose shortest relaxation time is about {doubt.model.corner_s:.2g} s"
+    else:
+        other = f"a Gauss–Markov process of about {doubt.model.time_s:.2g} s"
+    return (f"The slow noise may as well be {other}: the intervals of B and K allow for it.",)
+
+
+def _lines(slow: Powers, fast: Powers | None) -> tuple[SpectralLine, ...]:
+    """Those of the slow part up to where the fast modes tell lines apart, which know them unfolded."""
+    if fast is None:
+        return slow.lines
+    cells_hz = 1.0 / slow.period_s
+    seen = [line.frequency_hz for line in fast.lines]
+    folded = [abs(f - cells_hz * round(f / cells_hz)) for f in seen]
+    beside = _SAME_MODES * float(np.diff(fast.frequency_hz[:2])[0])
+    own = [
+        line
+        for line in slow.lines
+        if line.frequency_hz < _TOLD * cells_hz
+        and not any(abs(f - line.frequency_hz) < beside for f in (*seen, *folded))
+    ]
+    return (*own, *fast.lines)
+
+
+def _left(left: tuple[int, ...]) -> tuple[str, ...]:
+    if not left:
+        return ()
+    names = ", ".join("QNBKR"[i] for i in left)
+    return (f"Not described by the noise model, and given as limits only: {names}.",)

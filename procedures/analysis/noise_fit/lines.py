@@ -6,17 +6,20 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
-from scipy.special import gammainccinv, gammaincinv
+from scipy.special import fdtri, gammaincinv
 
 from procedures.core.arrays import Array
 
 LEVEL = 1e-6
 """Probability that noise alone shows one line in a record."""
 _HALF_WINDOW = 100
-_FIRST = 2 * _HALF_WINDOW
-"""Below this mode the spectrum bends too much within the window to tell a line."""
+_FEWEST_MODES = 32
+_FIRST = 8
+"""Below this mode of a segment the taper's main lobe meets the mean that was taken away."""
 _GUARD = 2
 """Modes beside a line that are cut out with it: the taper's main lobe."""
+_EFFICIENCY = 0.6
+"""Degrees of freedom of a median over those of a mean."""
 
 
 @dataclass(frozen=True)
@@ -29,27 +32,54 @@ class SpectralLine:
     """Of the sine of the same power [rate]."""
 
 
+def levels_around(power: Array, dof: float, first: int = 0) -> tuple[Array, Array]:
+    """Level of the noise about each mode, as of a χ²_dof of unit scale, and from how many modes, (m,) each.
+
+    The median of as many modes as lie within ±100, at low modes within a factor of two: on a slope its middle value.
+    Below the mode `first` it is not wanted.
+    """
+    count = len(power)
+    half = np.minimum(np.arange(count) // 2, _HALF_WINDOW)
+    level = median_filter(power, min(2 * _HALF_WINDOW + 1, 2 * count - 1), mode="reflect")
+    number = np.full(count, 2.0 * _HALF_WINDOW + 1.0)
+    for k in range(first, min(2 * _HALF_WINDOW, count)):  # evenly in the logarithm, so that a power law has no bias
+        ends = max(1, k - half[k]), min(count, 2 * k + 1, k + _HALF_WINDOW + 1)
+        if ends[1] > ends[0]:
+            level[k] = np.median(power[ends[0] : ends[1]])
+            number[k] = ends[1] - ends[0]
+    return level / gammaincinv(0.5 * dof, 0.5) / 2.0, number
+
+
+def standing_out(dof: float, count: Array, level: float) -> Array:
+    """What a mode's power over the level about it passes with this probability, (m,), in units of one χ²_dof's scale.
+
+    The level is itself of `count` modes: an F ratio of dof and dof·count degrees of freedom.
+    """
+    some, where = np.unique(count, return_inverse=True)  # the quantile is slow, and most modes have one count
+    return (dof * np.asarray(fdtri(dof, np.maximum(1.0, dof * some), 1.0 - level)))[where]
+
+
 def find_lines(
     power: Array, dof: float, segment: int, rate_hz: float
 ) -> tuple[NDArray[np.bool_], tuple[SpectralLine, ...]]:
     """Which modes belong to lines, (m,), and the lines, of mean powers (m,) of modes 0…m−1 of `segment` samples.
 
-    A mode stands out where its power over the local median passes what a χ² of `dof` degrees of freedom passes with
-    probability `LEVEL` in the whole record. A sine of amplitude a puts a²L/4 into its modes, L samples a segment.
+    A mode stands out where its power over the level about it passes what noise passes with probability `LEVEL` in the
+    whole record. A sine of amplitude a puts a²L/4 into its modes, L samples a segment.
     """
     out = np.zeros(len(power), dtype=bool)
-    if len(power) <= 2 * _FIRST:
+    if len(power) <= _FEWEST_MODES:
         return out, ()
-    level = median_filter(power, 2 * _HALF_WINDOW + 1, mode="nearest") / gammaincinv(0.5 * dof, 0.5)
-    stands = power > level * gammainccinv(0.5 * dof, LEVEL / len(power))
+    level, count = levels_around(power, dof)
+    stands = power > level * standing_out(dof, _EFFICIENCY * count, LEVEL / len(power))
     stands[:_FIRST] = False
     for shift in range(-_GUARD, _GUARD + 1):
         out |= np.roll(stands, shift)
-    out[:_FIRST] = False
+    out[: _FIRST - _GUARD] = False
     edges = np.flatnonzero(np.diff(np.concatenate([[0], out, [0]]).astype(np.int8))).reshape(-1, 2)
     lines: list[SpectralLine] = []
     for first, end in edges:
-        excess = float(np.sum(power[first:end] - level[first:end] * 0.5 * dof))
+        excess = float(np.sum(power[first:end] - level[first:end] * dof))
         strongest = first + int(np.argmax(power[first:end]))
         lines.append(SpectralLine(float(strongest * rate_hz / segment), sqrt(max(0.0, 4.0 * excess / segment))))
     return out, tuple(lines)

@@ -13,11 +13,14 @@ from math import ceil, log2, sqrt
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
+from scipy.special import chdtri
 
 from procedures.analysis.allan.statistic import FEWEST_SAMPLES
 from procedures.analysis.noise_fit import columns
 from procedures.analysis.noise_fit.columns import FlickerBand
 from procedures.analysis.noise_fit.lines import SpectralLine, find_lines
+from procedures.analysis.noise_fit.restricted import Spectrum, maximum
+from procedures.analysis.noise_fit.slow_lines import without_lines
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.noise import NoiseCoefficients
@@ -31,6 +34,9 @@ BINS = 300
 CROSSOVER_HZ = 0.03
 """From here on the full-rate segments are used, where there are any."""
 _MODES_AT_CROSSOVER = 4
+_CUT, _ROUNDS = 1e-5, 6
+"""Probability of a power that is cut down before the noise about a line is fitted, and how often."""
+VARIANCES = range(4)
 _EDGE = 8
 """The taper rises over one in so many samples of a segment."""
 
@@ -48,17 +54,23 @@ class Powers:
     columns: Array
     """Expected power for unit Q², N², B², K², (b, 4)."""
     products: Array
-    """Sums over the bin's modes of coefficient × regressor: unit ramp, first and last reading, (b, 3)."""
+    """Sums over the bin's modes of coefficient × regressor: unit ramp, first and last reading, others, (b, r)."""
     gram: Array
-    """Sums of products of those regressors, (b, 3, 3)."""
+    """Sums of products of those regressors, (b, r, r)."""
     period_s: float
     """Of the samples the modes were made of."""
     lines: tuple[SpectralLine, ...] = ()
     """Cut out of the bins."""
 
 
-def slow_powers(cells: Array, cell_s: float, *, flicker_band_s: FlickerBand = FLICKER_BAND_S) -> Powers:
-    """The whole record's spectrum from its cell means, (n,) [rate]. Raises `UnfitRecording` and `BadParameter`."""
+def slow_powers(
+    cells: Array, cell_s: float, *, regressors: Array | None = None, flicker_band_s: FlickerBand = FLICKER_BAND_S
+) -> Powers:
+    """The whole record's spectrum from its cell means, (n,) [rate], less its lines.
+
+    `regressors` (r, n) are what the rate may follow beside a ramp (a temperature, a shift of the level), any units.
+    Raises `UnfitRecording` and `BadParameter`.
+    """
     _check_rate("cell_s", cell_s)
     y = _checked(cells, 0)
     n = len(y)
@@ -66,25 +78,60 @@ def slow_powers(cells: Array, cell_s: float, *, flicker_band_s: FlickerBand = FL
         raise UnfitRecording(f"{n} cell means are too few for noise coefficients; it takes {FEWEST_SAMPLES}")
     if np.all(y == y[0]):
         raise UnfitRecording(f"the channel is constant ({y[0]!r}): a stuck channel has no noise to analyse")
-    coefficients = _cosines(y - np.mean(y))
     # one process at a time: transforms of all four would be the largest thing in memory
     expected = np.stack([columns.cosine_powers(gamma) for gamma in columns.covariances(n, cell_s, flicker_band_s)])
     expected[columns.QUANTIZATION] = columns.free_ended_quantization(n, cell_s)
     ends = np.zeros((2, n))
     ends[0, 0] = ends[1, -1] = 1.0
     time = (np.arange(n) - 0.5 * (n - 1)) * cell_s
-    regressors = np.stack([_cosines(time), _cosines(ends[0]), _cosines(ends[1])])
-    bins = _Bins.over(np.arange(1, n), SINGLE_MODES, BINS)
-    pairs = regressors[:, None, :] * regressors[None, :, :]
+    others = np.empty((0, n)) if regressors is None else regressors
+    follows = np.stack([_cosines(one) for one in (time, *ends, *others)])
+    rest = _less(y, np.asarray(others, dtype=np.float64))
+    clean = without_lines(
+        rest, cell_s, _expected_powers(_cosines(_less(rest, np.asarray(time[None], dtype=np.float64))), expected)
+    )
+    coefficients = _cosines(y - np.mean(y) - (rest - clean.cells))
+    kept = np.flatnonzero(~clean.beside)
+    bins = _Bins.over(kept + 1, SINGLE_MODES, BINS)
+    pairs = follows[:, None, kept] * follows[None, :, kept]
     return Powers(
-        frequency_hz=bins.mean(np.arange(1, n) / (2.0 * n * cell_s)),
-        power=bins.mean(coefficients**2),
+        frequency_hz=bins.mean((kept + 1) / (2.0 * n * cell_s)),
+        power=bins.mean(coefficients[kept] ** 2),
         dof=bins.count,
-        columns=bins.mean(expected).T,
-        products=bins.sum(coefficients * regressors).T,
+        columns=bins.mean(expected[:, kept]).T,
+        products=bins.sum(coefficients[kept] * follows[:, kept]).T,
         gram=np.ascontiguousarray(np.moveaxis(bins.sum(pairs), -1, 0)),
         period_s=cell_s,
+        lines=clean.lines,
     )
+
+
+def _less(y: Array, rows: Array) -> Array:
+    """A series (n,) less what rows (r, n) explain of it by least squares, and less its mean."""
+    centred = np.concatenate([rows - np.mean(rows, axis=1, keepdims=True), np.ones((1, len(y)))])
+    size = np.sqrt(np.sum(centred**2, axis=1, keepdims=True))
+    centred /= np.where(size > 0.0, size, 1.0)
+    return y - np.linalg.lstsq(centred @ centred.T, centred @ y, rcond=None)[0] @ centred
+
+
+def _expected_powers(coefficients: Array, expected: Array) -> Array:
+    """What Q, N, B and K that describe most of the modes (n−1,) put into each; a line is cut down to what noise shows.
+
+    `expected` (4, n−1) are their powers for unit coefficients.
+    """
+    bins = _Bins.over(np.arange(1, expected.shape[1] + 1), SINGLE_MODES, BINS)
+    none = np.zeros((len(bins.count), 1))
+    squares, unit = bins.sum(coefficients**2), bins.mean(expected).T
+    shown = np.asarray(chdtri(bins.count, _CUT))
+    gram = none[:, :, None] + 1.0
+    found = maximum(Spectrum(squares, bins.count, unit, none, gram), VARIANCES)
+    for _ in range(_ROUNDS):
+        most = shown * found.power
+        if not np.any(squares > most):
+            break
+        squares = np.minimum(squares, most)
+        found = maximum(Spectrum(squares, bins.count, unit, none, gram), VARIANCES)
+    return found.variances @ expected
 
 
 def _cosines(values: NDArray[np.floating]) -> Array:

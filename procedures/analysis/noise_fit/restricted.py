@@ -22,6 +22,8 @@ _TOLERANCE = 1e-6
 _SMOOTHED = 9
 """Bins over which the first guess of S is taken."""
 _WIDENINGS = 60
+_LEAST_SHARE, _MOVED = 1e-6, 0.1
+"""A start that explains less than this share of a bin's power is moved inwards, by so much of a fit of each alone."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,11 @@ class Spectrum:
     columns: Array
     products: Array
     gram: Array
+
+    @property
+    def without_ramp(self) -> "Spectrum":
+        """With all regressors but the first, which is the ramp."""
+        return self.only(range(1, self.products.shape[1]))
 
     def only(self, regressors: Sequence[int]) -> "Spectrum":
         """With some of the regressors."""
@@ -110,11 +117,9 @@ def maximum(
     else:
         guess = fixed.copy()
         guess[free] = start[free]
-    if not np.any(guess > 0.0):
-        guess[free] = float(np.sum(spectrum.squares)) / np.sum(
-            spectrum.dof[:, None] * spectrum.columns[:, free], axis=0
-        )
-    best = state(spectrum, guess)
+    best = state(spectrum, _inside(spectrum, free, guess))
+    if best.log_likelihood == -np.inf:  # none of the free processes has any power in some bin
+        return best
     for _ in range(_STEPS):
         target = _step(spectrum, free, fixed, best.residual, best.dof, best.power)
         if not np.any(target > 0.0):
@@ -129,6 +134,20 @@ def maximum(
     return best
 
 
+def _inside(spectrum: Spectrum, free: list[int], guess: Array) -> Array:
+    """The guess, moved off the edge where it leaves a bin without power: no step leads away from there.
+
+    A least squares guess takes for zero whatever does not add to the greatest bins (a low-pass, a lone quantization).
+    """
+    power = spectrum.columns @ guess
+    if np.all(power > _LEAST_SHARE * _smooth(spectrum)):
+        return guess
+    norm = np.sum(spectrum.dof[:, None] * spectrum.columns[:, free], axis=0)
+    moved = guess.copy()
+    moved[free] += _MOVED * float(np.sum(spectrum.squares)) / np.where(norm > 0.0, norm, np.inf)
+    return moved
+
+
 def _smooth(spectrum: Spectrum) -> Array:
     kernel = np.ones(min(_SMOOTHED, len(spectrum.dof)))
     return np.convolve(spectrum.squares, kernel, "same") / np.convolve(spectrum.dof, kernel, "same")
@@ -139,6 +158,7 @@ def _step(spectrum: Spectrum, free: list[int], fixed: Array, target: Array, dof:
     weight = np.sqrt(dof) / power
     scaled = spectrum.columns[:, free] * weight[:, None]
     norm = np.sqrt(np.sum(scaled**2, axis=0))
+    norm[norm == 0.0] = 1.0
     solution = nnls(scaled / norm, (target - spectrum.columns @ fixed) * weight)[0]
     result = fixed.copy()
     result[free] = solution / norm

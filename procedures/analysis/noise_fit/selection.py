@@ -69,9 +69,9 @@ class Selection:
 
 
 def select(spectrum: Spectrum, level: float) -> Selection:
-    """The processes of a spectrum whose regressors are ramp, first and last reading."""
+    """The processes of a spectrum whose regressors are ramp, first and last reading, and others that always stay."""
     untested = tuple(range(len(VARIANCES), spectrum.columns.shape[1]))
-    sloped, flat = _Fits(spectrum, untested), _Fits(spectrum.only(ENDS), untested)
+    sloped, flat = _Fits(spectrum, untested), _Fits(spectrum.without_ramp, untested)
     everything = slope_of(spectrum, sloped.best(VARIANCES))
     ramp, ambiguous = everything.p_value < level, False
     walk = (sloped if ramp else flat).p_value(VARIANCES, RATE_RANDOM_WALK) < level
@@ -111,15 +111,15 @@ class _Fits:
         return 0.5 * erfc(sqrt(0.5 * ratio)) if ratio > 0.0 else 1.0
 
 
-def slope_of(spectrum: Spectrum, at: State) -> Slope:
-    """The ramp at a state whose regressors contain it, with Satterthwaite's degrees of freedom."""
+def slope_of(spectrum: Spectrum, at: State, index: int = RAMP) -> Slope:
+    """One regressor, the ramp if not said otherwise, at a state that has it; with Satterthwaite's degrees."""
     s, inverse = spectrum, at.amplitude_covariance
-    variance = float(inverse[RAMP, RAMP])
+    variance = float(inverse[index, index])
     by_variance = np.einsum("bk,bij->kij", s.columns / at.power[:, None] ** 2, s.gram)
-    gradient = np.einsum("i,kij,j->k", inverse[RAMP], by_variance, inverse[RAMP])
+    gradient = np.einsum("i,kij,j->k", inverse[index], by_variance, inverse[index])
     known = inverse_information(information(s, at))
     spread = float(gradient @ known @ gradient)
-    return Slope(float(at.amplitudes[RAMP]), sqrt(variance), max(1.0, 2.0 * variance**2 / spread))
+    return Slope(float(at.amplitudes[index]), sqrt(variance), max(1.0, 2.0 * variance**2 / spread))
 
 
 def inverse_information(matrix: Array) -> Array:

@@ -13,6 +13,7 @@ from procedures.analysis.turns.fit import Term, TurnFit, Turning, fit_turns, tur
 from procedures.analysis.turns.plan import coefficient_names
 from procedures.core import units
 from procedures.core.arrays import Array
+from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import UnfitRecording
 from procedures.core.imu_model import TriadCalibration, triad_calibration
 from procedures.core.recording import AXES, Recording, Station
@@ -59,7 +60,7 @@ class WholeTurns:
 
     def coefficient(self, name: str) -> Coefficient:
         """By its name without the triad: "K11", "asymmetry_x"."""
-        return next(c for c in self.coefficients if c.name == f"gyro.{name}")
+        return next(c for c in self.coefficients if c.name.symbol == name)
 
 
 def analyse_turns(
@@ -126,7 +127,7 @@ def _coefficients(fit: TurnFit, terms: Sequence[Term]) -> tuple[Coefficient, ...
     values = fit.parameters.ravel()
     return tuple(
         Coefficient(
-            f"gyro.{name}",
+            CoefficientName("gyro", name),
             "rad/s" if name.startswith("b_") else "1",
             float(values[i]),
             float(total[i]),

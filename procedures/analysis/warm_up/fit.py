@@ -200,6 +200,8 @@ def refine(series: CosineSeries, noise: FittedNoise, shapes: tuple[Shape, ...], 
 
     def residuals(own: Array) -> Array:
         white = columns(own)
+        if not np.all(np.isfinite(white)):
+            raise np.linalg.LinAlgError("the curve has no finite values")
         return white @ _amplitudes(white, observed) - observed
 
     first = np.concatenate(_split(shapes, start)[1])

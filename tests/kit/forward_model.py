@@ -1,14 +1,27 @@
-"""A unit with the thesis's noise and a table with flaws: a forward model that shares no line with the analysis."""
+"""A unit with the thesis's noise and a table with flaws: a forward model that shares no line with the analysis.
+
+Only the covariance of drawn noise, `station_noise`, is the analysis's own.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.core import units
 from procedures.core.noise import NoiseCoefficients
-from procedures.core.recording import Channel, MemoryRecording, RecordingInfo, Station
+from procedures.core.recording import (
+    ACCELEROMETER,
+    GYRO,
+    Channel,
+    MemoryRecording,
+    Quantity,
+    RecordingInfo,
+    Station,
+)
 from procedures.core.site import Site
+from procedures.core.unit import Unit
 
 GYRO_NOISE = NoiseCoefficients(
     quantization=0.39 * units.ARCSEC,
@@ -26,6 +39,15 @@ K_ACCELEROMETER = np.array(
     [[0.8148, 0.0010164, -0.0014483], [-0.0010369, 0.85883, -0.005538], [0.0010814, 0.0053613, 0.85306]]
 )
 B_ACCELEROMETER = np.array([0.090117, 0.092241, 0.12179])
+
+BETA_GAMMA = [(0, -90), (0, 90), (90, 0), (-90, 0), (0, 0), (180, 0)]
+BETA_GAMMA += [(-90, -45), (90, 45), (180, -45), (0, 45), (135, 0), (-45, 0)]
+"""(β, γ) [deg] of the thesis's twelve orientations (figure 5.4), written out here again."""
+CHANNELS = (
+    *(Channel(name, Quantity.ANGULAR_RATE, "rad/s") for name in GYRO),
+    *(Channel(name, Quantity.SPECIFIC_FORCE, "m/s^2") for name in ACCELEROMETER),
+)
+"""Of recordings in rates: a count is one rad/s or one m/s²."""
 
 
 def turn(axis: str, degrees: float) -> np.ndarray:
@@ -104,3 +126,13 @@ def station_recordings(
         recordings.append(MemoryRecording(info, mean + ripple))
         start += count + 5.0
     return recordings
+
+
+def station_noise(stations: Sequence[Station], unit: Unit) -> tuple[np.ndarray, np.ndarray]:
+    """Covariances (3, n, n) of gyro and accelerometer means at the times that `station_recordings` gives them."""
+    starts = 10.0 + np.cumsum([0.0] + [2 * round(s.record_s / 2) + 5.0 for s in stations[:-1]])
+    windows = np.column_stack([starts, starts + [2 * round(s.record_s / 2) for s in stations]])
+    gyro, accelerometer = (triad_covariance(unit.triad(triad), windows) for triad in ("gyro", "accelerometer"))
+    assert gyro is not None
+    assert accelerometer is not None
+    return gyro, accelerometer

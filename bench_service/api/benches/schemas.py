@@ -1,28 +1,77 @@
-"""Benches: what they are, what they are doing, and the software stop."""
+"""What HTTP says of benches: their state, safety, queue and stops."""
 
 from datetime import datetime
+from typing import Annotated
 
-from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from bench_service.api.http.dependencies import Service
-from bench_service.api.http.errors import problems
+from bench_service.api.http.dependencies import NO_CONTROL_CHARACTERS, REQUESTED_BY, WHO_LENGTH
 from bench_service.api.http.fields import Request
 from bench_service.bench.devices import DeviceState
 from bench_service.bench.live.values import BenchLive
 from bench_service.bench.safety import Safety
 from bench_service.jobs.queue import Place, QueueEntry
-from bench_service.service import BenchService
-from bench_service.wall_clock import now
+from bench_service.mapping import copied
+from bench_service.model.records import BenchStop
 from procedures.bench import BenchDescription
 
-router = APIRouter(prefix="/api/v1/benches", tags=["benches"])
+By = Annotated[
+    str,
+    Field(
+        min_length=1,
+        max_length=WHO_LENGTH,
+        pattern=NO_CONTROL_CHARACTERS.pattern,
+        description=f"Who does it; without it, `{REQUESTED_BY}` counts",
+    ),
+]
 
 
 class StopRequest(Request):
-    """Why a bench is stopped."""
+    """Why a bench is stopped, and by whom."""
 
     reason: str = Field("stopped by an operator", min_length=1, max_length=500)
+    by: By | None = None
+
+
+class ReleaseRequest(Request):
+    """Why a stop is released, and by whom."""
+
+    remark: str = Field(min_length=1, max_length=500, description="What was looked at before the bench was released")
+    by: By | None = None
+
+
+class StopView(BaseModel):
+    """A stop of a bench. It stands until a person releases it; the bench works again once no stop stands."""
+
+    id: str
+    bench: str
+    at: datetime
+    by: str = Field(description="Who stopped it, as far as known; a process that could not make it safe names itself")
+    reason: str
+    safe_at: datetime | None = Field(description="When the bench's own host saw it safe since; null: not confirmed")
+    safe_by: str = Field(description="Who last commanded the devices then")
+    released_at: datetime | None = Field(description="null: it stands")
+    released_by: str
+    remark: str = Field(description="Remark of the person who released it")
+
+    @classmethod
+    def of(cls, stop: BenchStop) -> "StopView":
+        """As HTTP says it."""
+        return cls(**vars(stop))
+
+
+class StopPage(BaseModel):
+    """Stops of a bench, newest first, with those that were released."""
+
+    items: list[StopView]
+    next: str | None = Field(description="Cursor: pass it as `after` for the next page")
+
+
+class Releasing(BaseModel):
+    """The answer to a release."""
+
+    stop: StopView = Field(description="The stop that was released")
+    standing: list[StopView] = Field(description="Stops that still keep the bench from working, oldest first")
 
 
 class DevicesView(BaseModel):
@@ -84,6 +133,7 @@ class BenchView(BaseModel):
     description: BenchDescription
     state: str = Field(description='"idle", "busy", or "stopped" until it is released')
     stopped: str | None = Field(description="Why it is stopped")
+    stops: list[StopView] = Field(description="The stops that stand, oldest first; each is released by its id")
     job: str | None = Field(description="The job that drives it")
     units: list[str] = Field(description="Units that it can test")
     live: BenchLive | None = Field(description="The last that its driver said; null: it never had one")
@@ -110,17 +160,7 @@ class QueueEntryView(BaseModel):
     @classmethod
     def of(cls, entry: QueueEntry, place: Place) -> "QueueEntryView":
         """As HTTP says it."""
-        return cls(
-            job=entry.job,
-            position=place.position,
-            ahead=place.ahead,
-            waiting=place.waiting,
-            priority=entry.priority,
-            unit=entry.unit,
-            queued_at=entry.queued_at,
-            not_before=entry.not_before,
-            reservation=entry.reservation,
-        )
+        return copied(cls, entry, place, job=entry.id)
 
 
 class QueueView(BaseModel):
@@ -136,66 +176,8 @@ class Stopping(BaseModel):
     """The answer to a stop. Software is not the emergency stop: that is a hardware circuit beside the table."""
 
     bench: str
+    stop: str = Field(description="Id of this stop: a release names it")
     job: str | None = Field(description="The job that was running, which is being cancelled")
     safety: SafetyView = Field(description="What was known within a second of the stop; ask the bench for later")
+    books: str | None = Field(description="Why the database does not have this stop yet; null: it has")
     note: str = "This is a software stop. The emergency stop is a hardware circuit beside the table."
-
-
-def _view(service: BenchService, bench_id: str) -> BenchView:
-    description = service.benches.description(bench_id)
-    running = service.jobs.driving_job(bench_id)
-    live = service.live.of_bench(bench_id)
-    stop = service.stores.benches.bench_stop(bench_id)
-    return BenchView(
-        id=bench_id,
-        description=description,
-        state="stopped" if stop else "idle" if running is None else "busy",
-        stopped=None if stop is None else f"{stop.at.isoformat()}: {stop.reason}",
-        job=running,
-        units=[unit.serial for unit in service.benches.mounted(bench_id)],
-        live=live,
-        driver_seen_at=None if live is None else live.at,
-        driver_there=live is not None and live.there(now()),
-        safety=SafetyView.of(service.safety.known(bench_id)),
-        driven_by=service.benches.holder(bench_id),
-        queued=service.stores.queue.lengths().get(bench_id, 0),
-    )
-
-
-@router.get("", responses=problems())
-def list_benches(service: Service) -> list[BenchView]:
-    """Every bench that a worker of this database has registered."""
-    return [_view(service, bench_id) for bench_id in service.benches.ids()]
-
-
-@router.get("/{bench_id}", responses=problems(404))
-def read_bench(bench_id: str, service: Service) -> BenchView:
-    """Live state, limits, declared accuracy, and the job that drives it."""
-    return _view(service, bench_id)
-
-
-@router.get("/{bench_id}/queue", responses=problems(404))
-def read_queue(bench_id: str, service: Service) -> QueueView:
-    """The jobs that wait for a bench, in the order in which they start, and why each of them waits."""
-    queue = service.queues.queue(bench_id)
-    holder = service.benches.holder(bench_id)
-    places = queue.places(holder is not None)
-    entries = [QueueEntryView.of(entry, places[entry.job]) for entry in queue.entries]
-    return QueueView(bench=queue.bench, running=queue.running, driven_by=holder, entries=entries)
-
-
-@router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 413, 507))
-def stop(bench_id: str, service: Service, body: StopRequest | None = None) -> Stopping:
-    """Software stop: end the running job, stop the table, switch the unit off; until the bench is released.
-
-    It is noted first, so it holds whoever is alive: a worker sees it, and in its place the bench's supervisor.
-    """
-    job, safety = service.stops.stop(bench_id, (body or StopRequest.model_validate({})).reason)
-    return Stopping(bench=bench_id, job=job, safety=SafetyView.of(safety))
-
-
-@router.post("/{bench_id}/release", responses=problems(404, 409, 507))
-def release(bench_id: str, service: Service) -> BenchView:
-    """Let a stopped bench work again, once it is known to be safe: the jobs that wait in its queue go on."""
-    service.stops.release(bench_id)
-    return _view(service, bench_id)

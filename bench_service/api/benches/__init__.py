@@ -1,0 +1,1 @@
+"""Benches over HTTP: their state, their queues and their stops."""

@@ -1,0 +1,120 @@
+"""Benches: what they are, what they are doing, and their software stops."""
+
+from fastapi import APIRouter
+from fastapi.exceptions import RequestValidationError
+
+from bench_service.api.benches.schemas import (
+    BenchView,
+    QueueEntryView,
+    QueueView,
+    ReleaseRequest,
+    Releasing,
+    SafetyView,
+    StopPage,
+    Stopping,
+    StopRequest,
+    StopView,
+)
+from bench_service.api.benches.stop_threads import stop_in_own_thread
+from bench_service.api.http.dependencies import REQUESTED_BY, After, ClientName, Limit, RequestedBy, Service
+from bench_service.api.http.errors import problems
+from bench_service.model.records import reasons_of
+from bench_service.service import BenchService
+from bench_service.wall_clock import now
+
+router = APIRouter(prefix="/api/v1/benches", tags=["benches"])
+
+
+def _view(service: BenchService, bench_id: str) -> BenchView:
+    description = service.benches.description(bench_id)
+    running = service.jobs.driving_job(bench_id)
+    live = service.live.of_bench(bench_id)
+    stops = service.stores.benches.standing_stops(bench_id)
+    return BenchView(
+        id=bench_id,
+        description=description,
+        state="stopped" if stops else "idle" if running is None else "busy",
+        stopped=f"{stops[0].at.isoformat()}: {reasons_of(stops)}" if stops else None,
+        stops=[StopView.of(stop) for stop in stops],
+        job=running,
+        units=[unit.serial for unit in service.benches.mounted(bench_id)],
+        live=live,
+        driver_seen_at=None if live is None else live.at,
+        driver_there=live is not None and live.there(now()),
+        safety=SafetyView.of(service.safety.known(bench_id)),
+        driven_by=service.benches.holder(bench_id),
+        queued=service.stores.queue.lengths().get(bench_id, 0),
+    )
+
+
+@router.get("", responses=problems())
+def list_benches(service: Service) -> list[BenchView]:
+    """Every bench that a worker of this database has registered."""
+    return [_view(service, bench_id) for bench_id in service.benches.ids()]
+
+
+@router.get("/{bench_id}", responses=problems(404))
+def read_bench(bench_id: str, service: Service) -> BenchView:
+    """Live state, limits, declared accuracy, and the job that drives it."""
+    return _view(service, bench_id)
+
+
+@router.get("/{bench_id}/queue", responses=problems(404))
+def read_queue(bench_id: str, service: Service) -> QueueView:
+    """The jobs that wait for a bench, in the order in which they start, and why each of them waits."""
+    queue = service.queues.queue(bench_id)
+    holder = service.benches.holder(bench_id)
+    places = queue.places(holder is not None)
+    entries = [QueueEntryView.of(entry, places[entry.id]) for entry in queue.entries]
+    return QueueView(bench=queue.bench, running=queue.running, driven_by=holder, entries=entries)
+
+
+@router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 413, 507))
+async def stop(bench_id: str, service: Service, client: ClientName, body: StopRequest | None = None) -> Stopping:
+    """Software stop: end the running job, stop the table, switch the unit off; until this stop is released.
+
+    It goes to the bench itself first, on its host, and needs no database for that: a worker sees it, and in its place
+    the bench's supervisor. The database follows when it can; `books` says why where it has not yet. Several stops of a
+    bench stand beside each other.
+    """
+    asked = body or StopRequest.model_validate({})
+    done = await stop_in_own_thread(service.stops, bench_id, asked.reason, asked.by or client)
+    return Stopping(
+        bench=bench_id, stop=done.stop.id, job=done.job, safety=SafetyView.of(done.safety), books=done.books or None
+    )
+
+
+@router.get("/{bench_id}/stops", responses=problems(404))
+def list_stops(bench_id: str, service: Service, after: After = None, limit: Limit = 50) -> StopPage:
+    """Every stop of a bench, newest first: those that stand, and those that were released, by whom and why."""
+    service.benches.description(bench_id)
+    page = service.stores.benches.stops(bench_id, after=after, limit=limit)
+    return StopPage(items=[StopView.of(one) for one in page.items], next=page.next)
+
+
+@router.post("/{bench_id}/stops/{stop_id}/release", responses=problems(404, 409, 413, 507))
+def release_stop(
+    bench_id: str, stop_id: str, service: Service, body: ReleaseRequest, requested_by: RequestedBy = None
+) -> Releasing:
+    """Release one stop, one's own or another's, once the bench is known to be safe.
+
+    The person who releases it names himself, as `by` or in `X-Requested-By`. The jobs in the bench's queue go on once
+    no stop stands.
+    """
+    by = body.by or requested_by
+    if by is None:
+        text = f"the person who releases a stop names himself, here or in {REQUESTED_BY}"
+        raise RequestValidationError([{"type": "missing", "loc": ("body", "by"), "msg": text, "input": None}])
+    released = service.stops.release(bench_id, stop_id, by, body.remark)
+    standing = service.stores.benches.standing_stops(bench_id)
+    return Releasing(stop=StopView.of(released), standing=[StopView.of(one) for one in standing])
+
+
+@router.post("/{bench_id}/release", responses=problems(404, 409, 507))
+def release(bench_id: str, service: Service, client: ClientName) -> BenchView:
+    """Release the only stop of a bench that stands; where several stand, 409 with their ids.
+
+    The bench must be known to be safe. The jobs that wait in its queue go on.
+    """
+    service.stops.release_only(bench_id, client, "")
+    return _view(service, bench_id)

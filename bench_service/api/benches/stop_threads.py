@@ -1,0 +1,31 @@
+"""The thread of a stop: each has one of its own, so that no analysis, import or page that waits holds it up."""
+
+import asyncio
+from functools import partial
+
+from bench_service.background import in_background
+from bench_service.jobs.stops import Stopped, StopService
+from bench_service.model.errors import StorageFailure
+
+PATIENT = 32
+"""So many stops at once wait for what becomes of them; further ones are passed on just the same, and do not wait."""
+LONGEST_S = 6.0
+"""A stop is answered after this, whatever holds its thread [s]."""
+
+_waiting = 0
+
+
+async def stop_in_own_thread(stops: StopService, bench_id: str, reason: str, by: str) -> Stopped:
+    """`StopService.stop`, beside the pool of threads that all other routes share. Raises what it raises."""
+    global _waiting
+    _waiting += 1
+    try:
+        work = partial(stops.stop, bench_id, reason, by, patient=_waiting <= PATIENT)
+        return await asyncio.wait_for(asyncio.wrap_future(in_background("stop", work)), LONGEST_S)
+    except TimeoutError:
+        raise StorageFailure(
+            f"the stop of bench {bench_id!r} was passed on, and neither bench nor database has answered within "
+            f"{LONGEST_S:g} s: press the hardware emergency stop, or run `bench stop` on the bench's host"
+        ) from None
+    finally:
+        _waiting -= 1

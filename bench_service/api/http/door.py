@@ -1,0 +1,182 @@
+"""The rules by which a request is let in: to which host it speaks, from which page it comes, and from which address.
+
+Host: a page of another site can make its own name resolve to this address (DNS rebinding), and then reads and commands
+as one of ours; so the name in `Host` must be one that is ours. Origin and Sec-Fetch-Site: a browser says from which
+site a request comes; what comes from another site is refused. The one exception is a person who follows a link: a
+top-level navigation that only reads. A request with neither header comes from a program: it is let in from a loopback
+address, and from elsewhere with the service's token.
+"""
+
+import hmac
+import logging
+import re
+from dataclasses import dataclass
+from ipaddress import IPv6Address, ip_address
+from socket import getaddrinfo
+
+from starlette.datastructures import Headers
+from starlette.requests import Request
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from bench_service.api.http.errors import respond
+from bench_service.model.errors import Misconfigured
+from bench_service.settings import BadSettings, Settings
+from bench_service.wall_clock import monotonic_s
+
+LOOPBACK_NAMES = ("localhost", "127.0.0.1", "[::1]")
+ANY_ADDRESS = ("0.0.0.0", "::", "")
+READING = ("GET", "HEAD")
+QUIET_S = 60.0
+"""A reason to refuse is logged once in this time [s]: a page that tries again and again fills no disk."""
+_AUTHORITY = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(?::(?P<port>[0-9]{1,5}))?")
+_ORIGIN = re.compile(r"(?P<scheme>https?)://(?P<authority>[^/]+)")
+_DEFAULT_PORT = {"http": "80", "https": "443"}
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Door:
+    """The rules of one service."""
+
+    hosts: frozenset[str]
+    """Names in `Host` that are ours; with a port only that port, without one any."""
+    token: str | None = None
+    """Sent as `Authorization: Bearer …` by programs that ask from elsewhere than a loopback address."""
+    all_local: bool = False
+    """Whether the address is reached through a port of a loopback address only, so that every peer counts as local."""
+
+    @classmethod
+    def of(cls, settings: Settings, *more_hosts: str) -> "Door":
+        """The rules that settings give. Raises `Misconfigured` for a token that cannot be used."""
+        own = () if settings.host in ANY_ADDRESS else (_bracketed(settings.host),)
+        try:
+            token = settings.token()
+        except BadSettings as error:
+            raise Misconfigured(str(error)) from error
+        hosts = frozenset(name.lower() for name in (*LOOPBACK_NAMES, *own, *settings.hosts, *more_hosts))
+        return cls(hosts, token, settings.published == "loopback")
+
+    def refusal(self, headers: Headers, method: str, peer: str | None) -> "Refusal | None":
+        """Why a request is refused; None where it is let in. `peer`: address it comes from; None: a socket file."""
+        hosts = headers.getlist("host")
+        if len(hosts) != 1 or not self._ours(hosts[0]):
+            text = "the name that this request speaks to is not one of this service: BENCH_HOSTS lists further names"
+            return Refusal(421, "ForeignHost", text, ", ".join(hosts) or "none")
+        for origin in headers.getlist("origin"):
+            if not _same_origin(origin, hosts[0]):
+                return Refusal(403, "ForeignOrigin", "a page of another site may not ask this service", origin)
+        site = headers.get("sec-fetch-site", "none")
+        if site not in ("same-origin", "none") and not _follows_link(headers, method):
+            return Refusal(403, "ForeignSite", "a page of another site may not ask this service", site)
+        return self._unknown_peer(headers, peer)
+
+    def _ours(self, host: str) -> bool:
+        found = _AUTHORITY.fullmatch(host.lower())
+        return found is not None and (found["name"] in self.hosts or found[0] in self.hosts)
+
+    def _unknown_peer(self, headers: Headers, peer: str | None) -> "Refusal | None":
+        if self.all_local or peer is None or is_loopback_address(peer):
+            return None
+        scheme, _, given = headers.get("authorization", "").partition(" ")
+        if self.token is None:
+            text = "requests from elsewhere than a loopback address need a token: BENCH_TOKEN_FILE names its file"
+        elif scheme.lower() != "bearer" or not hmac.compare_digest(given.strip().encode(), self.token.encode()):
+            text = "requests from elsewhere than a loopback address need the service's token, as Authorization: Bearer"
+        else:
+            return None
+        return Refusal(401, "NoToken", text, peer)
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a request is not let in."""
+
+    status: int
+    kind: str
+    text: str
+    given: str
+    """What the request had instead: for the log."""
+
+
+class Doorkeeper:
+    """Pure ASGI: what is refused reaches no route, and its body is not read."""
+
+    def __init__(self, app: ASGIApp, door: Door) -> None:
+        self._app = app
+        self._door = door
+        self._logged_s: dict[str, float] = {}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        client = scope.get("client")
+        refusal = self._door.refusal(Headers(scope=scope), scope["method"], client[0] if client else None)
+        if refusal is None:
+            await self._app(scope, receive, send)
+            return
+        self._log(refusal, scope)
+        answer = respond(Request(scope), refusal.status, refusal.text, refusal.kind)
+        if refusal.status == 401:
+            answer.headers["WWW-Authenticate"] = "Bearer"
+        await answer(scope, receive, send)
+
+    def _log(self, refusal: Refusal, scope: Scope) -> None:
+        now_s = monotonic_s()
+        if now_s - self._logged_s.get(refusal.kind, -QUIET_S) < QUIET_S:
+            return
+        self._logged_s[refusal.kind] = now_s
+        given, path = refusal.given[:200], scope["path"][:200]
+        log.warning(
+            "refused %s %s, %s: %s; the next minute's are not logged", scope["method"], path, refusal.kind, given
+        )
+
+
+def may_listen(settings: Settings) -> bool:
+    """Whether a service may listen at its address: a loopback one, or one whose peers prove themselves."""
+    return is_loopback(settings.host) or settings.token_file is not None or settings.published is not None
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a name or an address is this host's own, whatever it resolves to."""
+    if host in ANY_ADDRESS:
+        return False
+    try:
+        found = getaddrinfo(host, None)
+    except OSError:
+        return False
+    return bool(found) and all(is_loopback_address(str(address[4][0])) for address in found)
+
+
+def is_loopback_address(text: str) -> bool:
+    """Whether an address is one of this host's loopback; false for what is no address."""
+    try:
+        address = ip_address(text)
+    except ValueError:
+        return False
+    if isinstance(address, IPv6Address) and address.ipv4_mapped is not None:
+        address = address.ipv4_mapped
+    return address.is_loopback
+
+
+def _same_origin(origin: str, host: str) -> bool:
+    """Whether a page is ours: its scheme may differ, where something before us ends TLS."""
+    found = _ORIGIN.fullmatch(origin.lower())
+    if found is None:
+        return False
+    default = _DEFAULT_PORT[found["scheme"]]
+    pairs = [_AUTHORITY.fullmatch(text.lower()) for text in (found["authority"], host)]
+    names = [(pair["name"], pair["port"] or default) for pair in pairs if pair is not None]
+    return len(names) == 2 and names[0] == names[1]
+
+
+def _follows_link(headers: Headers, method: str) -> bool:
+    """Whether a person follows a link to us from another site, in a window of its own."""
+    top_level = (headers.get("sec-fetch-mode"), headers.get("sec-fetch-dest")) == ("navigate", "document")
+    return top_level and method in READING
+
+
+def _bracketed(host: str) -> str:
+    """An address as `Host` has it."""
+    return f"[{host}]" if ":" in host else host

@@ -1,0 +1,63 @@
+"""The sign that the process which drives a bench lives, in the bench's device folder.
+
+One preallocated record, written in place: it needs neither a database nor a free byte. Whoever watches it counts on his
+own clock for how long it has not changed, so no clock of the other process matters.
+"""
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from bench_service.bench.processes import ProcessIdentity
+from bench_service.bench.records_in_place import Unreadable, encoded, preallocate, read_record, write_record
+
+BEAT_S = 0.5
+"""A process that drives a bench says so often that it is there [s, real time]."""
+SILENT_S = 10.0
+"""After so long without a word, while its bench is not safe, it is killed [s]."""
+
+
+class HeartbeatFile:
+    """The heartbeat of one bench on its host: written by who drives it, read by the supervisor."""
+
+    def __init__(self, folder: Path, bench_id: str) -> None:
+        self._path = folder / f"bench-{bench_id}.heartbeat"
+        self._own = ProcessIdentity.own()
+        self._file: int | None = None
+        self._count = 0
+
+    def prepare(self) -> None:
+        """Make the file with its full length. Raises `OSError` where there is no room."""
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        try:
+            preallocate(file, 1)
+        finally:
+            os.close(file)
+
+    def beat(self) -> None:
+        """Say that this process lives. Raises `OSError`."""
+        self._count += 1
+        record = encoded({"pid": self._own.pid, "started": self._own.started, "count": self._count})
+        assert record is not None, "three short fields"
+        if self._file is None:
+            self._file = os.open(self._path, os.O_RDWR | os.O_CLOEXEC)
+        write_record(self._file, 0, record)
+
+    def last(self, process: ProcessIdentity) -> int:
+        """The number of a process's last word; 0 where it has said none. Raises nothing."""
+        with suppress(OSError, Unreadable):
+            file = os.open(self._path, os.O_RDONLY | os.O_CLOEXEC)
+            try:
+                found = read_record(file)
+            finally:
+                os.close(file)
+            if found is not None and (found["pid"], found["started"]) == (process.pid, process.started):
+                return int(found["count"])
+        return 0
+
+    def close(self) -> None:
+        """Close the file; the next word opens it again."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None

@@ -1,0 +1,123 @@
+"""The road to a safe bench: the order of its steps, written once, for every way on which a bench has to be made safe.
+
+1. Where a job's session has the devices' link: whatever is under way is left, the procedure is closed, and the devices
+   are made safe over that link, in the order of `procedures.bench.SAFE_ORDER`.
+2. The session's link is given back, so that nothing that still comes from the job reaches a device.
+3. Where a device did not answer over that link, or there was none: the same order over a link of its own.
+
+A job's end, a stop, a start, the supervisor and a release all come here; the first three steps are a job's, the others
+have the third alone. None of it needs a database.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from bench_service.bench.devices import BenchDevices, DeviceState
+from procedures.bench.errors import BenchError, DeviceBusy, Disconnected
+
+
+class DrivingSession(Protocol):
+    """What is needed of a job's session (`bench_service.bench.session.BenchSession`)."""
+
+    def make_safe(self) -> None:
+        """Raises an `ExceptionGroup` of failures, and `Disconnected` where a device does not answer."""
+        ...
+
+    def close(self) -> None:
+        """Give the devices' link back; a second time does nothing."""
+        ...
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """Why a bench could not be made safe."""
+
+    reasons: tuple[str, ...]
+    busy: bool = False
+    """Another process has the devices' link."""
+
+    @property
+    def why(self) -> str:
+        """The reasons in one line."""
+        return "; ".join(self.reasons)
+
+    def __str__(self) -> str:
+        return self.why if self.busy else f"could not be made safe: {self.why}"
+
+
+@dataclass(frozen=True)
+class RoadEnd:
+    """How far the whole road had to be walked."""
+
+    obstacle: Obstacle | None = None
+    """None: the bench is safe."""
+    detour: str = ""
+    """Why the job's own link did not do, where a new one did."""
+
+
+def over_new_link(devices: BenchDevices, by: str) -> Obstacle | None:
+    """Make devices safe that no job of this process has; None where they are safe then. On a safe bench nothing is
+    asked of them.
+    """
+    try:
+        devices.make_safe(by)
+    except DeviceBusy as busy:
+        return Obstacle((str(busy),), busy=True)
+    except BenchError as error:
+        return Obstacle((str(error),))
+    except ExceptionGroup as group:
+        return Obstacle(tuple(map(str, group.exceptions)))
+    return None
+
+
+@dataclass(frozen=True)
+class Rescue:
+    """What a process that starts found of a bench that was left unsafe, and did before anything else."""
+
+    left: DeviceState
+    obstacle: Obstacle | None
+
+
+def before_anything_else(devices: BenchDevices, by: str) -> Rescue | None:
+    """Make safe what a dead process left; None where nothing had to be done. Needs neither database nor disk space.
+
+    Where another process has the devices' link it is left alone: that one drives them.
+    """
+    left = devices.device_state()
+    if left is None or left.safe:
+        return None
+    obstacle = over_new_link(devices, by)
+    return None if obstacle is not None and obstacle.busy else Rescue(left, obstacle)
+
+
+def over_the_jobs_link(session: DrivingSession) -> tuple[tuple[str, ...], bool]:
+    """Make devices safe over the link of a job; what failed, and whether a new link may help against all of it."""
+    try:
+        session.make_safe()
+    except ExceptionGroup as group:
+        return tuple(map(str, group.exceptions)), group.split(Disconnected)[1] is None
+    except Disconnected as silence:
+        return (str(silence),), True
+    return (), True
+
+
+def whole_road(session: DrivingSession, devices: BenchDevices, by: str, given_back: Callable[[], None]) -> RoadEnd:
+    """Make the bench of a job's session safe, and end the session. `given_back` is called once its link is."""
+    failed: tuple[str, ...] = ()
+    new_link_may_help = True
+    try:
+        failed, new_link_may_help = over_the_jobs_link(session)
+    finally:
+        given_back()
+        session.close()
+    if not failed:
+        return RoadEnd()
+    if not new_link_may_help:
+        return RoadEnd(Obstacle(failed))
+    why = "; ".join(failed)
+    obstacle = over_new_link(devices, by)
+    if obstacle is None:
+        return RoadEnd(detour=why)
+    again = tuple(reason for reason in obstacle.reasons if reason not in why)
+    return RoadEnd(Obstacle((*failed, *again), obstacle.busy), why)

@@ -1,0 +1,68 @@
+"""Small records at fixed places of a file, each written over the one before in a single write.
+
+Once the file has its full length no write needs a free byte or a free inode, so a record changes on a full disk too.
+(On a file system that copies on write, such as btrfs or zfs, it may still need room: `StopChannel` has sockets
+beside its file for that.) Processes of one host see a record at once; a checksum tells a whole one from a torn one.
+"""
+
+import json
+import os
+import zlib
+from collections.abc import Mapping
+from typing import Any
+
+from bench_service.wall_clock import pause
+
+RECORD_BYTES = 4096
+"""One page: a longer record could be torn by a machine that fails."""
+TRIES = 50
+"""How often a reader looks again that met a writer in the middle."""
+AGAIN_S = 0.002
+
+
+class Unreadable(Exception):
+    """A record that is there and does not match its checksum."""
+
+
+def encoded(document: Mapping[str, Any]) -> bytes | None:
+    """A record: CRC-32, then the document as JSON, padded; None where the document is too long for one."""
+    text = json.dumps(document, ensure_ascii=False)
+    body = text.encode(errors="backslashreplace")  # half a character becomes its escape, as JSON has it
+    if len(body) > RECORD_BYTES - 16:
+        return None
+    return f"{zlib.crc32(body):08x} ".encode() + body + b" " * (RECORD_BYTES - 10 - len(body)) + b"\n"
+
+
+def decoded(record: bytes) -> dict[str, Any] | None:
+    """The document in a record; None in an empty one. Raises `Unreadable`."""
+    if not record.strip(b"\0"):
+        return None
+    checksum, _, body = record.partition(b" ")
+    body = body.rstrip()
+    if checksum != f"{zlib.crc32(body):08x}".encode():
+        raise Unreadable
+    return json.loads(body)
+
+
+def read_record(file: int, number: int = 0) -> dict[str, Any] | None:
+    """The document at a place of an open file; None where nothing was written. Raises `Unreadable`, `OSError`."""
+    for _ in range(TRIES):
+        try:
+            return decoded(os.pread(file, RECORD_BYTES, number * RECORD_BYTES))
+        except Unreadable:
+            pause(AGAIN_S)
+    raise Unreadable
+
+
+def write_record(file: int, number: int, record: bytes) -> None:
+    """Write an encoded record over what was at its place. Raises `OSError`."""
+    os.pwrite(file, record, number * RECORD_BYTES)
+
+
+def preallocate(file: int, records: int) -> None:
+    """Give a file its full length, in blocks that are its own. Raises `OSError` where there is no room."""
+    size = os.fstat(file).st_size
+    missing = records * RECORD_BYTES - size
+    if missing > 0:  # zeros that are written, not a hole: a hole would need its blocks when it is filled
+        os.pwrite(file, b"\0" * missing, size)
+        os.fsync(file)

@@ -1,0 +1,266 @@
+"""The stop of a bench outside every database: a word in the bench's device folder that worker and supervisor watch.
+
+A file of fixed length (`bench-<id>.stop`) holds the words of those who stop and what worker and supervisor answer; its
+records are written in place. Each of the two also has a Unix datagram socket, which wakes it, and which carries the
+word where the file cannot be written. None of this needs a free byte, a free inode, a database or a network.
+
+A word passes through three states: asked (it is in the channel), seen (by the process that drives the bench, or by the
+supervisor where none does), safe (the devices say so). Light on purpose: `bench stop` imports this and little else.
+"""
+
+import fcntl
+import json
+import logging
+import os
+import socket
+from collections.abc import Callable, Generator, Iterable
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from bench_service.bench.records_in_place import (
+    RECORD_BYTES,
+    Unreadable,
+    decoded,
+    encoded,
+    preallocate,
+    read_record,
+    write_record,
+)
+from bench_service.bench.stop.folder_sockets import bound, send
+from bench_service.bench.stop.word import DAMAGED, StopAnswer, StopWord
+from bench_service.wall_clock import monotonic_s, pause
+
+WORDS = 16
+"""How many stops a bench can have at once; what comes after them changes nothing: the bench is stopped."""
+WORKER, SUPERVISOR = 0, 1
+"""Who answers, and the number of the answer's record."""
+_FIRST = 2
+"""Record of the first word."""
+LOCK_S = 0.2
+"""How long a writer waits for another one [s]; a stopped process may hold the lock for ever."""
+log = logging.getLogger(__name__)
+
+
+class StopChannel:
+    """The channel of one bench on its host. Every verb is bounded by the file system's own time."""
+
+    def __init__(self, folder: Path, bench_id: str) -> None:
+        self.bench_id = bench_id
+        self._folder = folder
+        self._path = folder / f"bench-{bench_id}.stop"
+        self._names = (f"bench-{bench_id}.stop-worker", f"bench-{bench_id}.stop-supervisor")
+        self._file: int | None = None
+        self._came: dict[str, StopWord] = {}
+        """Words that came by the socket and could not be written into the file."""
+        self._last: tuple[bytes, tuple[StopWord, ...]] = (b"", ())
+        self._answers = [StopAnswer(), StopAnswer()]
+        self._mutex = Lock()
+
+    @property
+    def exists(self) -> bool:
+        """Whether the bench has, or had, a process on this host."""
+        return self._path.exists() or (self._folder / f"bench-{self.bench_id}.devices").exists()
+
+    def prepare(self) -> None:
+        """Make the file with its full length. Raises `OSError` where there is no room."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        try:
+            preallocate(file, _FIRST + WORDS)
+        finally:
+            os.close(file)
+
+    def ask(self, word: StopWord) -> bool:
+        """Stop the bench; whether the word is where worker or supervisor will see it. Raises nothing."""
+        written = False
+        with suppress(OSError):
+            written = self._write(word)
+        sent = self._send({"stop": word.document()})
+        return written or sent
+
+    def wake(self) -> bool:
+        """Tell the bench's worker that there may be something to do; whether one listens."""
+        return self._send({"wake": True}, (WORKER,))
+
+    def standing(self) -> tuple[StopWord, ...]:
+        """The words that nobody has released, oldest first. Raises nothing: what cannot be read stops the bench."""
+        try:
+            found = self._read()
+        except FileNotFoundError:
+            found = ()
+        except OSError as error:
+            log.warning("the stop channel of bench %s cannot be read: %s", self.bench_id, error)
+            found = self._last[1]
+        there = {word.id for word in found}
+        came = [word for word in self._came.values() if word.id not in there]
+        return tuple(sorted((*found, *came), key=lambda word: word.at))
+
+    def mark_booked(self, ids: Iterable[str]) -> None:
+        """Note that the database has these words."""
+        self._change(ids, lambda word: replace(word, booked=True))
+
+    def clear(self, ids: Iterable[str]) -> None:
+        """Take words away that were released."""
+        self._change(ids, lambda _: None)
+
+    def answer(self, role: int, answer: StopAnswer) -> None:
+        """Say as worker or supervisor what became of the words; nothing is written where nothing has changed."""
+        if answer == self._answers[role]:
+            return
+        record = encoded({"by": answer.by, "seen": sorted(answer.seen), "safe": sorted(answer.safe)})
+        assert record is not None, "at most WORDS ids of 36 characters, twice"
+        try:
+            write_record(self._open(), role, record)
+        except OSError as error:
+            log.warning("the answer to a stop of bench %s cannot be written: %s", self.bench_id, error)
+            return
+        self._answers[role] = answer
+
+    def answered(self, role: int) -> StopAnswer:
+        """What worker or supervisor said last. Raises nothing."""
+        try:
+            found = read_record(self._open(), role)
+        except (OSError, Unreadable):
+            found = None
+        if found is None:
+            return StopAnswer()
+        return StopAnswer(found["by"], frozenset(found["seen"]), frozenset(found["safe"]))
+
+    def state(self, word_id: str) -> str:
+        """ "asked", "seen" or "safe"."""
+        answers = [self.answered(role) for role in (WORKER, SUPERVISOR)]
+        if any(word_id in answer.safe for answer in answers):
+            return "safe"
+        return "seen" if any(word_id in answer.seen for answer in answers) else "asked"
+
+    def listen(self, role: int) -> socket.socket | None:
+        """The own end of the channel, as worker or as supervisor; None where there can be none."""
+        try:
+            return bound(self._folder, self._names[role])
+        except OSError as error:
+            log.warning("bench %s has no socket for a stop, its file must do: %s", self.bench_id, error)
+            return None
+
+    def receive(self, listening: socket.socket) -> bool:
+        """Take all that came; whether somebody asked to be looked after. A word joins those of the file."""
+        woken = False
+        while True:
+            try:
+                message = json.loads(listening.recv(2 * RECORD_BYTES))
+                woken = woken or bool(message.get("wake"))
+                if "stop" in message:
+                    self._take(StopWord.of(message["stop"]))
+            except BlockingIOError:
+                return woken
+            except (ValueError, TypeError, KeyError, AttributeError) as error:
+                log.warning("bench %s was sent what is no stop: %s", self.bench_id, error)
+            except OSError as error:
+                log.warning("the stop socket of bench %s: %s", self.bench_id, error)
+                return woken
+
+    def close(self) -> None:
+        """Close the file; the next verb opens it again."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+    def _take(self, word: StopWord) -> None:
+        try:
+            if self._write(word):
+                return
+        except OSError as error:
+            log.warning("a stop of bench %s is kept in memory: %s", self.bench_id, error)
+        self._came[word.id] = word
+
+    def _open(self) -> int:
+        if self._file is None:
+            self._file = os.open(self._path, os.O_RDWR | os.O_CLOEXEC)
+        return self._file
+
+    @contextmanager
+    def _locked(self) -> Generator[int]:
+        """The file, for this process alone; after `LOCK_S` without that: at worst a reason is lost, never a stop."""
+        file, deadline = self._open(), monotonic_s() + LOCK_S
+        mine = self._mutex.acquire(timeout=LOCK_S)
+        try:
+            while not _flocked(file) and monotonic_s() < deadline:
+                pause(0.002)
+            yield file
+        finally:
+            fcntl.flock(file, fcntl.LOCK_UN)
+            if mine:
+                self._mutex.release()
+
+    def _read(self) -> tuple[StopWord, ...]:
+        """Parsed once for as long as nothing changes."""
+        size = WORDS * RECORD_BYTES
+        for _ in range(20):
+            page = os.pread(self._open(), size, _FIRST * RECORD_BYTES)
+            if page == self._last[0]:
+                return self._last[1]
+            with suppress(Unreadable):
+                records = (page[at : at + RECORD_BYTES] for at in range(0, len(page), RECORD_BYTES))
+                words = tuple(StopWord.of(document) for record in records if (document := decoded(record)) is not None)
+                self._last = (page, words)
+                return words
+            pause(0.001)
+        return (*(word for word in self._last[1] if word.id != DAMAGED.id), DAMAGED)
+
+    def _write(self, word: StopWord) -> bool:
+        """Into the first free record; where none is free, nothing is lost but a reason: the bench is stopped."""
+        with self._locked() as file:
+            free: int | None = None
+            for number in range(_FIRST, _FIRST + WORDS):
+                found = _document(file, number)
+                if found is not None and found["id"] == word.id:
+                    return True
+                if found is None and free is None:
+                    free = number
+            if free is None:
+                log.warning("bench %s has %d stops already; one more by %s is not kept", self.bench_id, WORDS, word.by)
+                return True
+            record = encoded(word.document())
+            assert record is not None, "its texts are cut"
+            write_record(file, free, record)
+            return True
+
+    def _change(self, ids: Iterable[str], change: Callable[[StopWord], StopWord | None]) -> None:
+        wanted = set(ids)
+        if not wanted:
+            return
+        for word_id in wanted & set(self._came):
+            changed = change(self._came.pop(word_id))
+            if changed is not None:
+                self._came[word_id] = changed
+        with suppress(FileNotFoundError), self._locked() as file:
+            for number in range(_FIRST, _FIRST + WORDS):
+                found = _document(file, number)
+                if found is not None and found["id"] in wanted:
+                    changed = None if found["id"] == DAMAGED.id else change(StopWord.of(found))
+                    record = b"\0" * RECORD_BYTES if changed is None else encoded(changed.document())
+                    assert record is not None, "it was a record before"
+                    write_record(file, number, record)
+
+    def _send(self, message: dict[str, Any], roles: Iterable[int] = (SUPERVISOR, WORKER)) -> bool:
+        body = json.dumps(message).encode()
+        sent = [send(self._folder, self._names[role], body) for role in roles]
+        return any(sent)
+
+
+def _document(file: int, number: int) -> dict[str, Any] | None:
+    """What a record holds."""
+    try:
+        return read_record(file, number)
+    except Unreadable:
+        return {"id": DAMAGED.id}
+
+
+def _flocked(file: int) -> bool:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True

@@ -1,0 +1,110 @@
+"""The road of a stop to a bench of another host: over the listener of its supervisor, by an address kept in memory."""
+
+import json
+import logging
+import socket
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from threading import Event, Thread
+
+from bench_service.bench.safety import Safety
+from bench_service.bench.stop.messages import (
+    BadMessage,
+    Listening,
+    check,
+    new_number,
+    proof,
+    read_secret,
+    receive_line,
+    send_line,
+    split_address,
+)
+from bench_service.bench.stop.word import StopWord
+from bench_service.model.errors import ServiceError
+from bench_service.wall_clock import monotonic_s
+
+CONNECT_S = 1.0
+ANSWER_S = 2.5
+"""How long the whole exchange may take [s]."""
+LEARN_S = 2.0
+"""How often the addresses are read while the database answers [s]."""
+
+log = logging.getLogger(__name__)
+
+
+class ListenerRoad:
+    """`bench_service.bench.stop.road.StopRoad` over TCP."""
+
+    here = False
+
+    def __init__(self, bench_id: str, at: Listening, secret: bytes) -> None:
+        self._bench_id = bench_id
+        self._at = at
+        self._secret = secret
+
+    def ask(self, word: StopWord) -> Safety | None:
+        """What the bench's supervisor answers; None where it cannot be reached."""
+        try:
+            found = self._exchange(word)
+        except (BadMessage, OSError, ValueError, KeyError) as error:
+            log.warning("the supervisor of bench %s at %s: %s", self._bench_id, self._at.address, error)
+            return None
+        if not found["taken"]:
+            return None
+        state = "the devices are safe" if found["safe"] else "the devices are NOT safe yet"
+        text = f"The bench's supervisor on host {found['host']} has the stop ({found['state']}); {state}."
+        return Safety(bool(found["safe"]), text, None, None, None)
+
+    def _exchange(self, word: StopWord) -> dict[str, object]:
+        by_s = monotonic_s() + ANSWER_S
+        with socket.create_connection(split_address(self._at.address), CONNECT_S) as connection:
+            hello = receive_line(connection, by_s)
+            numbers = (str(hello["number"]), new_number())
+            text = json.dumps({**word.document(), "bench": self._bench_id})
+            send_line(
+                connection,
+                {"number": numbers[1], "text": text, "proof": proof(self._secret, "stop", numbers, text)},
+            )
+            return json.loads(check(self._secret, "answer", numbers, receive_line(connection, by_s)))
+
+
+class StopAddresses:
+    """Where the supervisors of all benches listen, learned again and again while the database is well."""
+
+    def __init__(self, read: Callable[[], Mapping[str, Listening]], secret_file: Path) -> None:
+        """`read`: asks the database; raises `ServiceError`."""
+        self._read = read
+        self._secret_file = secret_file
+        self._known: dict[str, Listening] = {}
+        self._ending = Event()
+        self._thread = Thread(target=self._run, name="stop addresses", daemon=True)
+
+    def begin(self) -> None:
+        """Begin to learn."""
+        self._thread.start()
+
+    def end(self) -> None:
+        """Learn no more; a thread that hangs in the database ends with the process."""
+        self._ending.set()
+        self._thread.join(LEARN_S)
+
+    def road(self, bench_id: str) -> ListenerRoad | None:
+        """The road to a bench; None where its address or the secret is not known here."""
+        at, secret = self._known.get(bench_id), read_secret(self._secret_file)
+        return None if at is None or secret is None else ListenerRoad(bench_id, at, secret)
+
+    def host(self, bench_id: str) -> str:
+        """The host of a bench; empty where it is not known."""
+        at = self._known.get(bench_id)
+        return "" if at is None else at.host
+
+    def _run(self) -> None:
+        while True:
+            try:
+                self._known |= self._read()  # one that says nothing now keeps the address that it had
+            except ServiceError:
+                pass
+            except Exception:
+                log.exception("the addresses of supervisors")
+            if self._ending.wait(LEARN_S):
+                return

@@ -1,0 +1,121 @@
+"""The guard of a process that drives a bench: it watches the stop channel and gives the heartbeat.
+
+A thread of its own that needs no database and no free disk. Whatever else the process waits for, a stop that came by
+the channel is seen here, and the bench made safe in yet another thread. Where not even this thread gets to run, the
+supervisor, another process, misses the answer and ends this one.
+"""
+
+import logging
+import select
+import socket
+from collections.abc import Callable
+from threading import Event, Thread
+
+from bench_service.bench.heartbeat import BEAT_S, HeartbeatFile
+from bench_service.bench.processes import ProcessIdentity
+from bench_service.bench.stop.channel import WORKER, StopChannel
+from bench_service.bench.stop.word import StopAnswer
+from bench_service.wall_clock import monotonic_s
+
+LOOK_S = 0.1
+"""How often the channel's file is looked at [s]; its socket wakes the guard at once."""
+
+log = logging.getLogger(__name__)
+
+
+class StopGuard:
+    """Guards one bench from `begin` to `end`."""
+
+    def __init__(
+        self,
+        channel: StopChannel,
+        heartbeat: HeartbeatFile,
+        is_safe: Callable[[], bool],
+        make_safe: Callable[[], object],
+        wake: Callable[[], object],
+    ) -> None:
+        """`is_safe`: what the devices say. `make_safe`: leaves the job and makes the bench safe; it may take a while,
+        and is called again as long as a stop stands and the bench is not safe. `wake`: there may be something to do.
+        """
+        self._channel = channel
+        self._heartbeat = heartbeat
+        self._is_safe = is_safe
+        self._make_safe = make_safe
+        self._wake = wake
+        self._by = f"the worker, {ProcessIdentity.own()}"
+        self._ending = Event()
+        self._acting: Thread | None = None
+        self._next_beat_s = 0.0
+        self._beats = True
+        self._socket: socket.socket | None = None
+        self._thread = Thread(target=self._run, name="stop guard", daemon=True)
+
+    def begin(self) -> None:
+        """Begin to watch. The channel and the heartbeat must be prepared, the bench's lease held."""
+        self._socket = self._channel.listen(WORKER)
+        self._thread.start()
+
+    def stopped(self) -> bool:
+        """Whether somebody has stopped the bench over the channel, and nobody has released it."""
+        return bool(self._channel.standing())
+
+    def end(self) -> None:
+        """End; the bench must be safe by then."""
+        self._ending.set()
+        self._thread.join()
+        if self._socket is not None:
+            self._socket.close()
+        self._heartbeat.close()
+        self._channel.close()
+
+    def _run(self) -> None:
+        while not self._ending.is_set():
+            try:
+                woken = self._wait()
+                self._look()
+                if woken:
+                    self._wake()
+            except Exception:  # a guard that ended would guard nothing
+                log.exception("the stop guard of bench %s", self._channel.bench_id)
+                self._ending.wait(LOOK_S)
+
+    def _wait(self) -> bool:
+        """For a message, `LOOK_S` at the most; whether one was a call to look for work."""
+        if self._socket is None:
+            self._ending.wait(LOOK_S)
+            return False
+        poll = select.poll()  # not select: it cannot watch a descriptor above 1023
+        poll.register(self._socket, select.POLLIN)
+        return bool(poll.poll(LOOK_S * 1000)) and self._channel.receive(self._socket)
+
+    def _look(self) -> None:
+        self._beat()
+        words = self._channel.standing()
+        if not words:
+            return
+        ids = frozenset(word.id for word in words)
+        safe = self._is_safe()
+        said = self._channel.answered(WORKER)
+        self._channel.answer(WORKER, StopAnswer(self._by, ids, ids if safe else said.safe & ids))
+        if not safe and (self._acting is None or not self._acting.is_alive()):
+            self._acting = Thread(target=self._act, name="stop", daemon=True)
+            self._acting.start()
+
+    def _act(self) -> None:
+        try:
+            self._make_safe()
+        except Exception:  # tried again at the next look
+            log.exception("bench %s could not be made safe", self._channel.bench_id)
+
+    def _beat(self) -> None:
+        now_s = monotonic_s()
+        if now_s < self._next_beat_s:
+            return
+        self._next_beat_s = now_s + BEAT_S
+        try:
+            self._heartbeat.beat()
+            self._beats = True
+        except OSError as error:
+            if self._beats:
+                log.warning("the heartbeat of bench %s cannot be written: %s", self._channel.bench_id, error)
+            self._beats = False

@@ -1,0 +1,45 @@
+"""Keeps the stop channel and the books of a driven bench in step, in a thread that may hang in the database."""
+
+import logging
+from threading import Event, Thread
+
+from bench_service.bench.stop.channel import StopChannel
+from bench_service.bench.stop.exchange import StopBooks, StopExchange
+from bench_service.model.errors import ServiceError
+
+KEEP_S = 1.0
+"""How often channel and books are compared [s]."""
+
+log = logging.getLogger(__name__)
+
+
+class StopKeeper:
+    """Of one bench, in the process that drives it: a bench without a supervisor has its stops in the books too."""
+
+    def __init__(self, channel: StopChannel, books: StopBooks) -> None:
+        self._bench_id = channel.bench_id
+        self._exchange = StopExchange(channel, books)
+        self._ending = Event()
+        self._said = ""
+        self._thread = Thread(target=self._run, name="stop keeper", daemon=True)
+
+    def begin(self) -> None:
+        """Begin to compare."""
+        self._thread.start()
+
+    def end(self) -> None:
+        """Compare no more; a thread that hangs in the database ends with the process."""
+        self._ending.set()
+        self._thread.join(KEEP_S)
+
+    def _run(self) -> None:
+        while not self._ending.wait(KEEP_S):
+            try:
+                self._exchange.exchange()
+                self._said = ""
+            except ServiceError as error:
+                if str(error) != self._said:
+                    log.warning("the stops of bench %s are not compared with the books: %s", self._bench_id, error)
+                self._said = str(error)
+            except Exception:  # the books of a stop may be late, they may not be given up
+                log.exception("the stop keeper of bench %s", self._bench_id)

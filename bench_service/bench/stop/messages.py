@@ -1,0 +1,114 @@
+"""What a stop looks like on the wire between an API and the supervisor of a bench on another host.
+
+Lines of JSON over TCP. The supervisor begins with a number that it never uses again; the API's stop and the
+supervisor's answer each carry an HMAC-SHA-256, under a secret that both have, over that number, one of the API's own,
+and the text. So a stop that was listened in to cannot be sent again, an answer cannot be made up, and neither side
+needs a clock that is right. The text itself is no secret, and is not hidden.
+"""
+
+import hashlib
+import hmac
+import json
+import os
+import secrets
+import socket
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bench_service.wall_clock import monotonic_s
+
+LINE_BYTES = 16_384
+SECRET_BYTES = 16
+"""A secret of the deployment has at least this length."""
+
+
+class BadMessage(Exception):
+    """A line that is no message of ours, comes too late, or whose proof does not hold."""
+
+
+@dataclass(frozen=True)
+class Listening:
+    """Where a bench's supervisor listens, and on which host a person finds it."""
+
+    address: str
+    """`host:port`."""
+    host: str
+
+
+def read_secret(file: Path) -> bytes | None:
+    """The secret in a file; None where there is none that may be used."""
+    try:
+        found = file.read_bytes().strip()
+    except OSError:
+        return None
+    return found if len(found) >= SECRET_BYTES else None
+
+
+def made_secret(file: Path) -> bytes | None:
+    """The secret in a file, which is made with one of its own where it is absent. None where it cannot be."""
+    try:
+        made = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+    except OSError:  # it is there, or there is no room for it
+        return read_secret(file)
+    try:
+        os.write(made, secrets.token_hex(32).encode() + b"\n")
+    except OSError:  # no room: an empty file is no secret
+        file.unlink(missing_ok=True)
+    finally:
+        os.close(made)
+    return read_secret(file)
+
+
+def new_number() -> str:
+    """A number that is used once."""
+    return secrets.token_hex(16)
+
+
+def proof(secret: bytes, what: str, numbers: tuple[str, str], text: str) -> str:
+    """HMAC-SHA-256 over the kind of message, both numbers and the text, in hexadecimal."""
+    return hmac.new(secret, "\n".join((what, *numbers, text)).encode(), hashlib.sha256).hexdigest()
+
+
+def check(secret: bytes, what: str, numbers: tuple[str, str], message: dict[str, Any]) -> str:
+    """The text of a message whose proof holds. Raises `BadMessage`."""
+    text, given = message.get("text"), message.get("proof")
+    if not isinstance(text, str) or not isinstance(given, str):
+        raise BadMessage("a text and its proof are expected")
+    if not hmac.compare_digest(given.encode(), proof(secret, what, numbers, text).encode()):
+        raise BadMessage("its proof does not hold: the secret is another one")
+    return text
+
+
+def send_line(connection: socket.socket, message: dict[str, Any]) -> None:
+    """Raises `OSError`."""
+    connection.sendall(json.dumps(message).encode() + b"\n")
+
+
+def receive_line(connection: socket.socket, by_s: float) -> dict[str, Any]:
+    """One message, whole by a moment of the clock that is never set back. Raises `BadMessage`, `OSError`."""
+    found = b""
+    while not found.endswith(b"\n"):
+        left_s = by_s - monotonic_s()
+        if left_s <= 0.0:
+            raise BadMessage("no whole message came in time")
+        connection.settimeout(left_s)
+        piece = connection.recv(4096)
+        found += piece
+        if not piece or len(found) > LINE_BYTES:
+            raise BadMessage("the connection ended, or its line does not")
+    try:
+        message = json.loads(found)
+    except ValueError as error:
+        raise BadMessage("it is no JSON") from error
+    if not isinstance(message, dict):
+        raise BadMessage("it is no JSON object")
+    return message
+
+
+def split_address(address: str) -> tuple[str, int]:
+    """Host and port of `host:port`. Raises `ValueError`."""
+    host, separator, port = address.rpartition(":")
+    if not separator or not host or not port.isdecimal() or int(port) > 65_535:
+        raise ValueError(f"{address!r} is no host:port")
+    return host.strip("[]"), int(port)

@@ -1,0 +1,100 @@
+"""The road of a stop to its bench: the stop channel of this host, or the listener of the supervisor on another one.
+
+Neither needs the database. Where a bench's supervisor listens is learned while the database is well, and kept in
+memory (`StopAddresses`).
+"""
+
+import re
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from threading import Lock
+from typing import Protocol
+
+from bench_service.bench.safety import Safety
+from bench_service.bench.stop.channel import StopChannel
+from bench_service.bench.stop.word import StopWord
+
+BENCH_ID = re.compile(r"[a-z0-9][a-z0-9_-]{0,31}")
+"""What may become part of a file's name."""
+
+
+class StopRoad(Protocol):
+    """One way to a bench."""
+
+    @property
+    def here(self) -> bool:
+        """Whether the bench's devices are on this host."""
+        ...
+
+    def ask(self, word: StopWord) -> Safety | None:
+        """Bring a word to the bench; what is known of its safety then, where the road itself says so."""
+        ...
+
+
+class ChannelRoad:
+    """`StopRoad` over the channel in this host's device folder."""
+
+    here = True
+
+    def __init__(self, channel: StopChannel) -> None:
+        self._channel = channel
+
+    def ask(self, word: StopWord) -> None:
+        self._channel.ask(word)
+
+
+class StopRoads:
+    """The roads to every bench that can be stopped from this process."""
+
+    def __init__(
+        self,
+        folder: Path | None,
+        elsewhere: Callable[[str], StopRoad | None] = lambda _: None,
+        where: Callable[[str], str] = lambda _: "",
+    ) -> None:
+        """`folder`: where this host's benches have their channels. `elsewhere`: the road to a bench of another host.
+        `where`: which host that is, as far as known.
+        """
+        self._folder = folder
+        self._elsewhere = elsewhere
+        self._where = where
+        self._mutex = Lock()
+        self._channels: dict[str, StopChannel] = {}
+
+    def channel(self, bench_id: str) -> StopChannel | None:
+        """The stop channel of a bench on this host; None where it has none here. Kept open: a stop needs no
+        descriptor that may be lacking then.
+        """
+        with self._mutex:
+            found = self._channels.get(bench_id)
+            if found is None and self._folder is not None and BENCH_ID.fullmatch(bench_id):
+                found = StopChannel(self._folder, bench_id)
+                if not found.exists:
+                    return None
+                with suppress(OSError):  # of a bench that an older version drove; else it is whole already
+                    found.prepare()
+                self._channels[bench_id] = found
+            return found
+
+    def to(self, bench_id: str) -> StopRoad | None:
+        """The road to a bench; None where there is none but the database."""
+        channel = self.channel(bench_id)
+        return self._elsewhere(bench_id) if channel is None else ChannelRoad(channel)
+
+    def wake(self, bench_id: str) -> None:
+        """Tell the bench's worker, if it is on this host, that there may be something to do."""
+        channel = self.channel(bench_id)
+        if channel is not None:
+            channel.wake()
+
+    def unreached(self, bench_id: str) -> Safety:
+        """What is known of a bench that a stop has not reached."""
+        host = self._where(bench_id)
+        at = f"host {host}" if host else "the bench's own host"
+        text = (
+            f"The stop has NOT reached bench {bench_id!r}: its devices are not on this host, its supervisor cannot be "
+            f"reached from here, and the database does not answer. Press the hardware emergency stop, or run `bench "
+            f"stop --bench {bench_id}` at {at}."
+        )
+        return Safety(None, text, None, None, None)

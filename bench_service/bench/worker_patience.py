@@ -1,0 +1,65 @@
+"""How long a supervisor bears with a worker whose bench is not safe: one that leaves a stop unanswered, that gives no
+heartbeat, or that has seen a stop and does not get the bench safe.
+
+Times are counted look by look on the supervisor's own clock, so neither a clock that jumps nor a supervisor that was
+held up itself makes a worker late.
+"""
+
+from math import inf
+
+from bench_service.bench.heartbeat import HeartbeatFile
+from bench_service.bench.processes import ProcessIdentity
+from bench_service.bench.stop.channel import WORKER, StopChannel
+
+UNANSWERED_S = 3.0
+"""How long a worker may leave a stop unanswered, while its bench is not safe, before it is killed [s]."""
+HUNG_S = 10.0
+"""How long a worker that has seen a stop may take until the bench is safe, before it is killed [s]."""
+COUNTED_S = 0.5
+"""Of the time between two looks so much counts against a worker [s]: this process may have been held up itself."""
+
+
+class WorkerPatience:
+    """With the worker of one bench."""
+
+    def __init__(
+        self, channel: StopChannel, heartbeat: HeartbeatFile, unanswered_s: float, hung_s: float, silent_s: float
+    ) -> None:
+        self._channel = channel
+        self._heartbeat = heartbeat
+        self._limits_s = {"unanswered": unanswered_s, "hung": hung_s, "silent": silent_s}
+        self._held_s: dict[str, float | None] = dict.fromkeys(self._limits_s)
+        """For how long each has held so far, from the first look that found it so."""
+        self._looked_s = inf
+        self._beat = 0
+
+    def reset(self, now_s: float) -> None:
+        """There is nothing to bear with now."""
+        self._held_s = dict.fromkeys(self._limits_s)
+        self._looked_s = now_s
+
+    def over(self, now_s: float, worker: ProcessIdentity, words: frozenset[str], stopped: bool) -> str | None:
+        """Why the worker, which has its devices' link and leaves them unsafe, must be killed; None: not yet.
+
+        `words`: the stops in the channel; `stopped`: whether the bench is, by them or by the books.
+        """
+        passed_s = min(max(now_s - self._looked_s, 0.0), COUNTED_S)
+        self._looked_s = now_s
+        beat = self._heartbeat.last(worker)
+        silent, self._beat = beat == self._beat, beat
+        unanswered = bool(words - self._channel.answered(WORKER).seen)
+        for name, holds in (("silent", silent), ("unanswered", unanswered), ("hung", stopped)):
+            since = self._held_s[name] if holds else None  # None: it did not hold at the look before
+            self._held_s[name] = None if not holds else 0.0 if since is None else since + passed_s
+        return next((self._why(name) for name, held_s in self._held_s.items() if self._too_long(name, held_s)), None)
+
+    def _too_long(self, name: str, held_s: float | None) -> bool:
+        return held_s is not None and held_s > self._limits_s[name]
+
+    def _why(self, name: str) -> str:
+        limit_s = self._limits_s[name]
+        return {
+            "unanswered": f"left a stop unanswered for {limit_s:g} s",
+            "hung": f"has seen a stop and not made the bench safe within {limit_s:g} s",
+            "silent": f"gave no heartbeat for {limit_s:g} s",
+        }[name]

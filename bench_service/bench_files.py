@@ -1,0 +1,82 @@
+"""What a process that drives a bench has in the bench's device folder: stop channel, heartbeat, and who drives it.
+
+Composed here because devices, stop guard and books meet in it.
+"""
+
+from collections.abc import Callable
+
+from bench_service.bench.heartbeat import HeartbeatFile
+from bench_service.bench.make_safe import Rescue, before_anything_else
+from bench_service.bench.processes import ProcessIdentity
+from bench_service.bench.stop.channel import StopChannel
+from bench_service.bench.stop.guard import StopGuard
+from bench_service.bench.stop.keeper import StopKeeper
+from bench_service.bench.stop.word import StopWord
+from bench_service.campaigns.stores import Stores
+from bench_service.drivers.device_register import DeviceRegister
+from bench_service.drivers.registered import RegisteredDevices
+from bench_service.jobs.stop_entry import StopEntry
+from bench_service.model.errors import StorageFull
+from bench_service.model.records import BenchStop
+from bench_service.persistence.bench.host_files import HostFiles
+from bench_service.settings import Settings
+
+
+class BenchFiles:
+    """The files of the settings' bench on this host."""
+
+    def __init__(self, settings: Settings) -> None:
+        folder, self._bench_id = settings.devices_in(), settings.bench_id
+        self.host = HostFiles(folder, self._bench_id)
+        self._folder = folder
+        self._channel = StopChannel(folder, self._bench_id)
+        self._heartbeat = HeartbeatFile(folder, self._bench_id)
+        self._devices = RegisteredDevices(DeviceRegister(folder, self._bench_id))
+
+    def rescue(self) -> Rescue | None:
+        """Make safe what a dead process left, before a database is opened; see `before_anything_else`."""
+        return before_anything_else(self._devices, f"the service, {ProcessIdentity.own()}")
+
+    def begin_driving(self) -> None:
+        """Say that this process drives the bench; its lease must be held. Raises `StorageFull`."""
+        try:
+            self._channel.prepare()
+            self._heartbeat.prepare()
+            self.host.begin_driving()
+        except OSError as error:
+            raise StorageFull(
+                f"no bench is driven without its stop channel and heartbeat, and {self._folder} takes neither: {error}"
+            ) from error
+
+    def stopped(self) -> bool:
+        """Whether somebody has stopped the bench over its channel."""
+        return bool(self._channel.standing())
+
+    def guard(self, make_safe: Callable[[], object], wake: Callable[[], object]) -> StopGuard:
+        """The guard of this process; see `StopGuard`."""
+        return StopGuard(self._channel, self._heartbeat, self._is_safe, make_safe, wake)
+
+    def keep_books(self, stores: Stores) -> StopKeeper:
+        """Begin to enter stops of the channel into the books, and to take released ones away."""
+        keeper = StopKeeper(self._channel, _Books(stores, self._bench_id))
+        keeper.begin()
+        return keeper
+
+    def _is_safe(self) -> bool:
+        state = self._devices.device_state()
+        return state is not None and state.safe
+
+
+class _Books:
+    """`bench_service.bench.stop.exchange.StopBooks` over a service's stores."""
+
+    def __init__(self, stores: Stores, bench_id: str) -> None:
+        self._stores = stores
+        self._bench_id = bench_id
+        self._entry = StopEntry(stores.benches, stores.queue, stores.jobs, stores.audit)
+
+    def standing(self) -> tuple[BenchStop, ...]:
+        return self._stores.benches.standing_stops(self._bench_id)
+
+    def enter(self, word: StopWord) -> None:
+        self._entry.enter(self._bench_id, word)

@@ -1,0 +1,60 @@
+"""The commands of a bench's own host: drive it, watch over it, stop it."""
+
+from typing import Annotated
+
+import typer
+from pydantic import ValidationError
+
+from bench_service.cli.options import announce
+from bench_service.cli.refusal import Refused
+from bench_service.settings import Settings
+
+
+def worker(
+    context: typer.Context,
+    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
+) -> None:
+    """Run the jobs of a bench, without HTTP, until SIGTERM or SIGINT. Its running job is left for the next start."""
+    from bench_service.cli.working import work
+
+    settings = of_bench(context.obj, bench)
+    work(settings, announce)
+
+
+def supervise(
+    context: typer.Context,
+    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
+    companion: Annotated[bool, typer.Option(help="End with the process that drives the bench")] = False,
+) -> int:
+    """Watch a bench on its own host, and make it safe where the process that drives it is gone or hangs.
+
+    Exit code 3: a companion left the bench to another supervisor.
+    """
+    from bench_service.cli.supervising import supervise as watch_over
+
+    settings = of_bench(context.obj, bench)
+    return watch_over(settings, companion, announce)
+
+
+def stop(
+    context: typer.Context,
+    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
+    reason: Annotated[str, typer.Option(help="Why, for whoever releases it")] = "stopped by an operator",
+    wait: Annotated[float, typer.Option(help="How long to wait until it is safe [s]")] = 15.0,
+) -> int:
+    """Stop a bench on its own host, also without API, database and free disk. Not the hardware emergency stop.
+
+    Exit code: 0 safe, 1 asked for and not safe in time, 2 not asked for.
+    """
+    from bench_service.cli.stopping import stop_here
+
+    settings = of_bench(context.obj, bench)
+    return stop_here(settings.bench_id, settings.devices_in(), reason, wait, announce)
+
+
+def of_bench(settings: Settings, bench: str | None) -> Settings:
+    """The settings of another bench. Raises `Refused` for a name that no bench can have."""
+    try:
+        return Settings.model_validate({**settings.model_dump(), "bench_id": bench or settings.bench_id})
+    except ValidationError as error:
+        raise Refused(f"--bench {bench}: {error.errors()[0]['msg']}") from error

@@ -1,0 +1,93 @@
+"""Connections that nobody uses must not keep a stop out: so many descriptors are kept for bench, database and files.
+
+Where more connections come than there is room for, the oldest one that asks nothing is closed for each new one; one
+that has not said what it wants within `HEADERS_S` is closed anyway. A request that is at work is never cut.
+"""
+
+import asyncio
+import logging
+import resource
+import socket
+from contextlib import suppress
+
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+RESERVED = 256
+"""Descriptors that no connection gets."""
+LEAST = 64
+"""So many connections there are in any case."""
+WANTED = 65_536
+"""Descriptors that the process asks the system for, as far as it may have them."""
+HEADERS_S = 20.0
+"""How long a connection may take until its first request is whole up to its body [s]."""
+AT_ONCE = 64
+"""So many connections are accepted before the first of them is looked at."""
+QUEUE = 2048
+"""So many may wait at the door meanwhile."""
+
+log = logging.getLogger(__name__)
+
+
+class BoundedConnections(HttpToolsProtocol):
+    """uvicorn's protocol with an end to idle connections."""
+
+    most = WANTED
+    """How many connections there may be at once."""
+    _late: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._late = self.loop.call_later(HEADERS_S, self._end_if_idle)
+        _in_order[self] = None
+        if len(_in_order) > self.most:
+            _end_oldest_idle()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        super().connection_lost(exc)
+        _in_order.pop(self, None)
+        if self._late is not None:
+            self._late.cancel()
+
+    @property
+    def _begun(self) -> bool:
+        """Whether a first request has come, as far as its body."""
+        return getattr(self, "cycle", None) is not None
+
+    @property
+    def idle(self) -> bool:
+        """Whether it asks nothing now."""
+        return not self._begun or self.cycle.response_complete
+
+    def _end_if_idle(self) -> None:
+        if not self._begun and not self.transport.is_closing():
+            self.transport.abort()
+
+
+_in_order: dict[BoundedConnections, None] = {}
+"""The open connections, oldest first."""
+
+
+def _end_oldest_idle() -> None:
+    for connection in _in_order:
+        if connection.idle and not connection.transport.is_closing():
+            _in_order.pop(connection)
+            connection.transport.abort()
+            return
+
+
+def raise_descriptors() -> int:
+    """Ask the system for as many descriptors as it gives; how many connections that leaves room for."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = WANTED if hard == resource.RLIM_INFINITY else min(WANTED, hard)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        with suppress(OSError, ValueError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+            soft = wanted
+    return WANTED if soft == resource.RLIM_INFINITY else max(LEAST, soft - RESERVED)
+
+
+def lengthen_queue(sockets: list[socket.socket]) -> None:
+    """Let more connections wait than are accepted at once, so that none is turned away while the oldest are closed."""
+    for listening in sockets:
+        with suppress(OSError), socket.socket(fileno=socket.dup(listening.fileno())) as same:
+            same.listen(QUEUE)

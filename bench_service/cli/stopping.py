@@ -1,0 +1,127 @@
+"""``bench stop``: stop a bench from its own host, whatever else works there. Imports no database and no numerics.
+
+The word goes into the bench's stop channel. It needs neither API nor database nor a free byte of disk; who watches the
+channel acts, and where nobody does, the devices are made safe from here.
+"""
+
+import argparse
+import getpass
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from bench_service.bench.processes import HOST
+from bench_service.bench.stop.channel import StopChannel
+from bench_service.bench.stop.word import StopWord
+from bench_service.device_folder import BENCH_ID, DATABASE_URL, device_folder
+from bench_service.wall_clock import monotonic_s, pause
+
+LOOK_S = 0.02
+ALONE_S = 1.5
+"""After so long without an answer from worker or supervisor the devices are tried from here [s]."""
+NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,31}")
+HELP = (
+    "Stop a bench on its own host, also without API, database and free disk. Not the hardware emergency stop. "
+    "Exit code: 0 safe, 1 asked for and not safe in time, 2 not asked for."
+)
+REASON, WAIT_S = "stopped by an operator", 15.0
+SAFE, NOT_SAFE, REFUSED = 0, 1, 2
+
+
+def stop_here(bench: str, folder: Path, reason: str, wait_s: float, say: Callable[[str], object]) -> int:
+    """Stop a bench whose devices are in a folder; the exit code: 0 safe, 1 not within `wait_s`, 2 not asked for."""
+    channel = StopChannel(folder, bench)
+    word = StopWord(reason, _person(), "command")
+    asked_s = monotonic_s()
+    if _known(folder, bench):
+        with suppress(OSError):  # it is there since the bench was driven first; or on a full disk the devices must do
+            channel.prepare()
+    asked = channel.ask(word)
+    if not asked and not _known(folder, bench):
+        say(
+            f"bench {bench} has no devices in {folder.absolute()}: run this on the bench's host, "
+            "with its BENCH_DEVICE_FOLDER"
+        )
+        return REFUSED
+    said = ""
+    while True:
+        passed_s = monotonic_s() - asked_s
+        state = channel.state(word.id)
+        if state != said and asked:
+            say(f"stop of bench {bench}: {state} after {passed_s:.2f} s")
+            said = state
+        if state == "safe":
+            return SAFE
+        if state == "asked" and (not asked or passed_s > ALONE_S):
+            done, why = _make_safe(folder, bench)
+            if done:
+                say(f"bench {bench} was made safe from here: neither its worker nor its supervisor answered")
+                return SAFE
+            if not asked:
+                say(why)
+                return NOT_SAFE
+        if passed_s > wait_s:
+            say(
+                f"bench {bench} is NOT safe after {passed_s:.1f} s: use the hardware emergency stop. "
+                f"{_unsafe(folder, bench)}"
+            )
+            return NOT_SAFE
+        pause(LOOK_S)
+
+
+def stop_command(arguments: Sequence[str], environ: Mapping[str, str]) -> int:
+    """``bench stop`` by itself, without the rest of the command line; its exit code.
+
+    Of the environment it reads what it needs: a setting that another command would refuse does not keep a stop out.
+    """
+    parser = argparse.ArgumentParser(prog="bench stop", description=HELP)
+    parser.add_argument("--bench", default=environ.get("BENCH_ID", BENCH_ID), help="else that of the settings")
+    parser.add_argument("--reason", default=REASON, help="for whoever releases it")
+    parser.add_argument("--wait", type=float, default=WAIT_S, metavar="SECONDS", help="until it is safe")
+    try:
+        given = parser.parse_args(list(arguments))
+    except SystemExit as ended:
+        return REFUSED if ended.code else SAFE
+    if not NAME.fullmatch(given.bench):
+        print(f"bench: --bench {given.bench}: small letters, digits, - and _ are expected", file=sys.stderr)
+        return REFUSED
+    folder = environ.get("BENCH_DEVICE_FOLDER")
+    where = device_folder(environ.get("BENCH_DATABASE_URL", DATABASE_URL), None if folder is None else Path(folder))
+    return stop_here(given.bench, where, given.reason or REASON, given.wait, _say)
+
+
+def _say(line: str) -> None:
+    with suppress(OSError):  # nobody reads it, or its disk is full: the stop goes on
+        print(line, flush=True)
+
+
+def _person() -> str:
+    try:
+        return f"{getpass.getuser()} on {HOST}"
+    except (OSError, KeyError):
+        return f"a user of {HOST}"
+
+
+def _known(folder: Path, bench: str) -> bool:
+    """Whether the bench's devices were ever driven from this host."""
+    return (folder / f"bench-{bench}.devices").exists()
+
+
+def _make_safe(folder: Path, bench: str) -> tuple[bool, str]:
+    """Over the devices' own link, where no other process has it; numerics are loaded here, and only here."""
+    from bench_service.bench.make_safe import over_new_link
+    from bench_service.drivers.device_register import DeviceRegister
+    from bench_service.drivers.registered import RegisteredDevices
+
+    devices = RegisteredDevices(DeviceRegister(folder, bench))
+    obstacle = over_new_link(devices, f"bench stop by {_person()}")
+    return obstacle is None, "" if obstacle is None else f"bench {bench}: {obstacle}"
+
+
+def _unsafe(folder: Path, bench: str) -> str:
+    from bench_service.drivers.device_register import DeviceRegister
+
+    state = DeviceRegister(folder, bench).read()
+    return "" if state is None else f"Its devices say: {', '.join(state.unsafe) or 'nothing unsafe'}."

@@ -1,0 +1,20 @@
+"""Where a bench's devices keep their state, by the settings' words: known without loading the settings' model.
+
+`bench stop` reads no more than this of its environment, so that it begins at once and no wrong setting keeps it out.
+"""
+
+from pathlib import Path
+from urllib.parse import urlsplit
+
+DATABASE_URL = "sqlite:///.bench/bench.sqlite"
+BENCH_ID = "sim"
+
+
+def device_folder(database_url: str, given: Path | None) -> Path:
+    """The given folder, or the one beside an SQLite file, or one in .bench/ named by a Postgres database."""
+    if given is not None:
+        return given
+    address = urlsplit(database_url)
+    if address.scheme.startswith("sqlite"):
+        return Path(database_url.partition(":///")[2] or "bench.sqlite").parent
+    return Path(".bench") / (address.path.strip("/") or "postgres")

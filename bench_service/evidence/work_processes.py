@@ -1,0 +1,133 @@
+"""Analyses and drawings in processes of their own, beside the one that drives a bench and answers a stop.
+
+A few processes at a low priority. What the work refuses is the same error here; work that is cut off, because its
+process died, may be asked for again.
+"""
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import traceback
+from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from threading import BoundedSemaphore, Lock, Thread
+from typing import Any
+
+from bench_service.model.errors import Overloaded, ServiceError, StorageFailure
+from procedures.core.errors import DomainError
+
+AT_ONCE = 2
+"""Processes, and so pieces of work that are done at one time."""
+NICENESS = 10
+"""By so much they give way to whoever drives a bench or answers."""
+
+WAITING = 16
+"""So many pieces of work may be done or wait at one time; each holds a thread of the service."""
+
+Run = Callable[[str, tuple[Any, ...]], str]
+"""Does a piece of work by its name and arguments, and gives a text: the id of a stored result, or a drawing."""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """An error on its way to another process: errors with arguments of their own cannot be pickled as they are."""
+
+    kind: type[Exception]
+    arguments: tuple[Any, ...]
+    fields: dict[str, Any]
+
+    @classmethod
+    def of(cls, error: Exception) -> "Refusal":
+        """Everything that an error is made of."""
+        return cls(type(error), error.args, dict(vars(error)))
+
+    def error(self) -> Exception:
+        """The error that it was."""
+        made = self.kind.__new__(self.kind)
+        made.args = self.arguments
+        vars(made).update(self.fields)
+        return made
+
+
+class WorkProcesses:
+    """Some processes of one service, begun with the first piece of work. For any thread."""
+
+    def __init__(
+        self, open_run: Callable[..., Run], *arguments: Any, at_once: int = AT_ONCE, waiting: int = WAITING
+    ) -> None:
+        """`open_run`: called with `arguments` in each new process, a function of a module that both can import."""
+        self._at_once = at_once
+        self._waiting = waiting
+        self._open_run = open_run
+        self._arguments = arguments
+        self._mutex = Lock()
+        self._places = BoundedSemaphore(waiting)
+        self._pool: ProcessPoolExecutor | None = None
+
+    def result(self, name: str, *arguments: Any) -> str:
+        """Do a piece of work. Raises what the work raises, `StorageFailure` where it is cut off, and `Overloaded` where
+        too much is waited for already.
+        """
+        if not self._places.acquire(blocking=False):
+            raise Overloaded(f"{self._waiting} such requests are worked on or wait already: ask again later")
+        try:
+            found = self._submit(name, arguments).result()
+        except BrokenProcessPool as broken:
+            with self._mutex:
+                self._pool = None
+            raise StorageFailure("the process that worked on this ended before it was done: ask again") from broken
+        finally:
+            self._places.release()
+        if isinstance(found, Refusal):
+            raise found.error()
+        return found
+
+    def close(self) -> None:
+        """End the processes; work that is under way is cut off."""
+        with self._mutex:
+            pool, self._pool = self._pool, None
+        if pool is not None:
+            processes = list(getattr(pool, "_processes", {}).values())
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in processes:
+                process.terminate()
+
+    def _submit(self, name: str, arguments: tuple[Any, ...]) -> "Future[str | Refusal]":
+        with self._mutex:
+            if self._pool is None:
+                context = multiprocessing.get_context("spawn")
+                given = (self._open_run, self._arguments)
+                self._pool = ProcessPoolExecutor(self._at_once, context, _begin, given)
+            return self._pool.submit(_work, name, arguments)
+
+
+_run: list[Run] = []
+
+
+def _begin(open_run: Callable[..., Run], arguments: tuple[Any, ...]) -> None:
+    """In a new process: leave interrupts to the service, open what the work needs, then give way to others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_the_service, name="end with the service", daemon=True).start()
+    _run.append(open_run(*arguments))
+    with contextlib.suppress(OSError):  # only now: somebody waits for the first piece of work
+        os.nice(NICENESS)
+
+
+def _work(name: str, arguments: tuple[Any, ...]) -> str | Refusal:
+    try:
+        return _run[0](name, arguments)
+    except (DomainError, ServiceError) as refused:
+        return Refusal.of(refused)
+    except Exception as defect:
+        return Refusal.of(RuntimeError("".join(traceback.format_exception(defect))))
+
+
+def _end_with_the_service() -> None:
+    """A service that was killed ends nothing: its processes must notice."""
+    service = multiprocessing.parent_process()
+    if service is not None:
+        service.join()
+        os._exit(1)

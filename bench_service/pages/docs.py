@@ -1,0 +1,26 @@
+"""The API's document as a page, from files of an installed package: it needs no other host."""
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse, RedirectResponse
+
+from bench_service.pages.rendering import templates
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+"""The package styles its elements in place and has its icons in its style sheet; scripts are from own files only."""
+
+
+@router.get("/docs")
+def docs(request: Request) -> HTMLResponse:
+    """Every operation of the API, to be read and tried."""
+    return templates.TemplateResponse(request, "docs.html", headers={"Content-Security-Policy": POLICY})
+
+
+@router.get("/redoc")
+def redoc() -> RedirectResponse:
+    """The older address of the same document."""
+    return RedirectResponse("/docs", status_code=308)

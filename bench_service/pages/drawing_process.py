@@ -1,0 +1,16 @@
+"""What a process of drawings is made of: matplotlib, and nothing of the service."""
+
+from typing import Any
+
+from bench_service.evidence.work_processes import Run
+from bench_service.pages import figures
+
+
+def open_drawing() -> Run:
+    """See `WorkProcesses`: each piece of work is a figure, and gives its SVG document."""
+    figures.drawn_here(figures.SMALLEST)  # load matplotlib before the first one is waited for
+
+    def run(_: str, arguments: tuple[Any, ...]) -> str:
+        return figures.drawn_here(*arguments)
+
+    return run

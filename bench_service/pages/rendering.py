@@ -1,0 +1,30 @@
+"""What every page is made with: templates, the filters in them, and the service behind the request."""
+
+from pathlib import Path
+from typing import Any
+
+from fastapi import Request
+from fastapi.templating import Jinja2Templates
+
+from bench_service.pages.static_files import asset
+from bench_service.service import BenchService
+
+templates = Jinja2Templates(Path(__file__).parent / "templates")
+
+
+def number(value: Any) -> str:
+    """A cell as a reader wants it: six significant digits, a dash for what is absent."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+templates.env.filters["number"] = number
+templates.env.filters["asset"] = asset
+
+
+def service_of(request: Request) -> BenchService:
+    """What the application was made for."""
+    return request.app.state.service

@@ -1,0 +1,23 @@
+"""What a process of analyses opens for itself: a connection to the database, the catalogue, and the numerics."""
+
+from typing import Any
+
+from bench_service.evidence.analyses import AnalysisService
+from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.work_processes import Run
+from bench_service.persistence import open_stores
+
+
+def open_run(database_url: str, code_version: str) -> Run:
+    """See `WorkProcesses`: "method" and "again", with the arguments of `AnalysisService`'s verbs."""
+    from threadpoolctl import threadpool_limits
+
+    stores, _ = open_stores(database_url)  # it is closed with the process
+    service = AnalysisService(stores, Catalogue(), stores.jobs.get, code_version)
+    threadpool_limits(1)
+    verbs = {"method": service.run_method, "again": service.analyse_again}
+
+    def run(name: str, arguments: tuple[Any, ...]) -> str:
+        return verbs[name](*arguments).id
+
+    return run

@@ -1,0 +1,78 @@
+"""Level and noise of every channel over short cells: what steps and changes of the noise are sought in."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from procedures.analysis.fitness.pieces import PIECE, Piece
+from procedures.core.arrays import Array
+
+LEAST_CELLS = 1024
+"""Cells of a recording of known length, at least where it has so many samples, and less than twice as many."""
+NOISE_SAMPLES = 32
+"""Differences that one value of the noise rests on, at least."""
+STRIDE = 8
+"""Every so many differences tell the noise of a long cell."""
+THIN_FROM, THINNEST = 64, 4
+"""Cells of more than so many samples are averaged over every second, those of twice as many over every fourth at the
+most: half the certainty for a quarter of the time."""
+UNKNOWN = 256
+"""Samples a cell where the length is not announced."""
+
+
+@dataclass(frozen=True)
+class CellLevels:
+    """Raw units; K cells of `size` samples, and K // `group` values of the noise."""
+
+    size: int
+    means: Array
+    """(channels, K)"""
+    group: int
+    """Cells that a value of the noise is of."""
+    noise: Array
+    """Mean magnitude of the difference of two neighbours, (channels, K // group)."""
+
+    def leave_out(self, channel: int, samples: Sequence[int]) -> None:
+        """Put the mean of its neighbours for each cell of a channel that one of these samples is in, in place."""
+        for row, size in ((self.means[channel], self.size), (self.noise[channel], self.size * self.group)):
+            # The difference to the next sample is in the next cell where the sample is the last of its own.
+            for k in sorted({(i + late) // size for i in samples for late in (0, 1)}):
+                if 0 < k < len(row) - 1:
+                    row[k] = 0.5 * (row[k - 1] + row[k + 1])
+
+
+class Levels:
+    """Gathers the cells piece by piece; a cell never lies in two pieces, what is left over at the end is left out."""
+
+    def __init__(self, channels: int, count: int | None) -> None:
+        """`count`: samples that are announced."""
+        shortest = UNKNOWN if count is None else max(1, count // LEAST_CELLS)
+        self._size = min(PIECE, 1 << (shortest.bit_length() - 1))
+        self._stride = max(1, min(STRIDE, self._size // NOISE_SAMPLES // 2))
+        self._means: list[Array] = [np.empty((channels, 0))]
+        self._noise: list[Array] = [np.empty((channels, 0))]
+
+    def add(self, piece: Piece) -> None:
+        """The next piece."""
+        x, size = piece.x, self._size
+        cells = x.shape[1] // size
+        if not cells or not piece.columns.shape[1] > 1:
+            return
+        thinned = min(THINNEST, max(1, size // THIN_FROM))
+        whole = x[:, : cells * size : thinned].astype(np.float64)
+        self._means.append(whole.reshape(len(x), cells, -1).mean(axis=2) if size > 1 else whole)
+        # The first sample of a recording has no difference: that of the second stands for it.
+        d = piece.d if piece.d.shape[1] == x.shape[1] else np.hstack([piece.d[:, :1], piece.d])
+        some = np.abs(d[:, : cells * size : self._stride].astype(np.float64))
+        if some.shape[1] and d.shape[1] == x.shape[1]:
+            self._noise.append(some.reshape(len(x), cells, -1).mean(axis=2))
+
+    def finish(self) -> CellLevels:
+        """All cells."""
+        means, noise = np.hstack(self._means), np.hstack(self._noise)
+        group = -(-NOISE_SAMPLES * self._stride // self._size)
+        used = noise.shape[1] // group * group
+        return CellLevels(
+            self._size, means, group, noise[:, :used].reshape(len(noise), used // group, group).mean(axis=2)
+        )

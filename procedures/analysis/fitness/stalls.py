@@ -1,0 +1,169 @@
+"""Runs of exact repeats longer than chance: rows that hang, triads or channels that stand still while others move."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from procedures.analysis.fitness.pieces import Mask
+from procedures.core.arrays import Array
+
+SHORTEST = 5
+"""Repeats in a row, at least."""
+BUSY = 0.6
+"""A channel bears witness where less than so large a part of its samples repeat the one before."""
+CHANCE = 1e-9
+"""Allowed of a false alarm of a recording and a group."""
+WINDOW = 64
+"""Samples whose part of repeats is taken at a time."""
+USUAL = 0.8
+"""A run is judged against this quantile of the windows of its piece: a channel whose level drifts between two counts
+repeats more often at some times than at others."""
+LEAST_PART = 1e-3
+"""Part of repeats that a channel is taken to have at least."""
+KEPT = 1000
+"""Runs that are kept of a group."""
+SAME = 0.8
+"""Part of a run that lies within one of a larger group for it to be the same."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Samples `first_index` … `first_index` + `length` − 1, each of which repeats the one before it."""
+
+    first_index: int
+    length: int
+
+
+@dataclass
+class Group:
+    """Channels that are looked at together: all of them, a triad, or one."""
+
+    rows: tuple[int, ...]
+    runs: list[Run] = field(default_factory=list[Run])
+    lost: int = 0
+    """Runs beyond those that are kept."""
+    open: int = 0
+    """Repeats at the end of the piece before, that a run may go on from."""
+
+
+class Stalls:
+    """Gathers the runs of all groups piece by piece."""
+
+    def __init__(self, groups: Sequence[tuple[int, ...]], channels: int) -> None:
+        """`groups` of channels' columns, the larger ones first."""
+        self._groups = [Group(rows) for rows in groups]
+        self._part = np.full(channels, np.nan)
+        self.repeats = np.zeros(channels, np.int64)
+        self.inside = np.zeros(channels, np.int64)
+        """Repeats that lie in runs, once these are known."""
+        self._seen = 0
+
+    def add(self, same: Mask, zeros: NDArray[np.int64], start: int) -> None:
+        """Which samples repeat the one before, (channels, n), how many in each, and the index of the first of them."""
+        if not same.shape[1]:
+            return
+        self.repeats += zeros
+        self._seen += same.shape[1]
+        part: Array | None = None
+        has_run, trailing = _has_run(same, zeros), _trailing(same)
+        for group in self._groups:
+            rows = list(group.rows)
+            if not group.open and not has_run[rows].all():
+                group.open = int(trailing[rows].min())
+                continue
+            together = same[rows[0]] if len(rows) == 1 else np.logical_and.reduce(same[rows])
+            part = self._usual(same) if part is None else part
+            self._runs(group, together, start, part)
+        if part is None and np.isnan(self._part).any():
+            self._usual(same)
+
+    def finish(self, able: NDArray[np.bool_]) -> list[Group]:
+        """Every group with the runs that are its own, beyond chance against the whole recording.
+
+        `able` (channels,): those that bear witness alone or as a triad. A counter that gives single pulses does not:
+        how regularly they come depends on where its input stands between two pulses.
+        """
+        for group in self._groups:
+            if group.open:
+                part = np.where(np.isnan(self._part), LEAST_PART, self._part)
+                self._keep(group, self._seen - group.open, group.open, part, shift=1)
+        larger: list[Run] = []
+        several = len(self.repeats) > 1
+        for group in self._groups:
+            inside = sum(run.length for run in group.runs)
+            whole = (self.repeats - inside) / max(self._seen - inside, 1)
+            if several and len(group.rows) < len(self.repeats) and not able[list(group.rows)].all():
+                group.runs = []
+                continue
+            own = [run for run in group.runs if self._beyond_chance(group, run.length, whole)]
+            group.runs = [run for run in own if not _within(run, larger)]
+            larger += group.runs
+            self.inside[list(group.rows)] += sum(run.length for run in group.runs)
+        return self._groups
+
+    def _usual(self, same: Mask) -> Array:
+        """Usual part of repeats of each channel in a window of this piece, (channels,); windows that repeat throughout
+        are those that are to be judged. Where there is no other the piece before tells it.
+        """
+        width = WINDOW if same.shape[1] >= 2 * WINDOW else same.shape[1]
+        windows = same.shape[1] // width
+        parts = same[:, : windows * width].reshape(len(same), windows, width).mean(axis=2)
+        for c, row in enumerate(parts):
+            moving = row[row < 1.0]
+            if len(moving) and (windows > 1 or np.isnan(self._part[c])):
+                self._part[c] = np.quantile(moving, USUAL)
+        return np.where(np.isnan(self._part), LEAST_PART, self._part)
+
+    def _runs(self, group: Group, rows: Mask, start: int, part: Array) -> None:
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
+        begins, ends = edges[::2], edges[1::2]
+        lengths = ends - begins
+        carried, group.open = group.open, 0
+        if carried and not (len(begins) and begins[0] == 0):
+            self._keep(group, start - carried, carried, part)
+        elif carried:
+            lengths[0] += carried
+        if len(ends) and ends[-1] == len(rows):
+            group.open = int(lengths[-1])
+            begins, ends, lengths = begins[:-1], ends[:-1], lengths[:-1]
+        for i in np.flatnonzero(lengths >= SHORTEST).tolist():
+            self._keep(group, start + int(ends[i]) - int(lengths[i]), int(lengths[i]), part)
+
+    def _keep(self, group: Group, first: int, length: int, part: Array, shift: int = 0) -> None:
+        if length < SHORTEST or not self._beyond_chance(group, length, part):
+            return
+        if len(group.runs) < KEPT:
+            group.runs.append(Run(first + shift, length))
+        else:
+            group.lost += 1
+
+    def _beyond_chance(self, group: Group, length: int, part: Array) -> bool:
+        """Whether ``N·Π p_c^L`` over the channels that bear witness is below `CHANCE`."""
+        p = part[list(group.rows)]
+        witnesses = p[p < BUSY]
+        if not len(witnesses) or (len(group.rows) > 1 and len(witnesses) < 2):
+            return False
+        chance = np.log(max(self._seen, 1)) + length * float(np.sum(np.log(np.maximum(witnesses, LEAST_PART))))
+        return bool(chance < np.log(CHANCE))
+
+
+def _has_run(same: Mask, zeros: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether `SHORTEST` repeats stand in a row, (channels,)."""
+    if same.shape[1] < SHORTEST or not np.any(zeros >= SHORTEST):
+        return zeros >= min(SHORTEST, same.shape[1])
+    two = same[:, 1:] & same[:, :-1]
+    return (two[:, 3:] & two[:, :-3] & same[:, 2:-2]).any(axis=1)
+
+
+def _trailing(same: Mask) -> NDArray[np.int64]:
+    """Repeats at the very end, at most `SHORTEST`, (channels,); those of a group are the fewest of its channels."""
+    tail = same[:, -SHORTEST:]
+    return np.where(tail.all(axis=1), tail.shape[1], np.argmin(tail[:, ::-1], axis=1)).astype(np.int64)
+
+
+def _within(run: Run, larger: Sequence[Run]) -> bool:
+    stop = run.first_index + run.length
+    shared = sum(max(0, min(stop, o.first_index + o.length) - max(run.first_index, o.first_index)) for o in larger)
+    return shared > SAME * run.length

@@ -1,0 +1,176 @@
+"""Recordings that are inspected while an analysis reads them: one pass serves both.
+
+The first pass over a recording's blocks is the inspection's too; where it ends with a refusal the analysis ends there,
+before it has judged anything. Outliers that are few can be mended for a second analysis.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from procedures.analysis.fitness.findings import ChannelFitness, FitnessSettings, Kind, Severity
+from procedures.analysis.fitness.grouped import grouped
+from procedures.analysis.fitness.jumps import Jump
+from procedures.analysis.fitness.stream import FitnessStream
+from procedures.core.errors import UnfitRecording
+from procedures.core.recording import Channel, Quantity, RawArray, Recording, RecordingInfo, Station
+
+WRONG_TEMPERATURES = (Kind.WRAPPED, Kind.WRONG_UNIT, Kind.NOT_FINITE)
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """How the recordings of an analysis are inspected."""
+
+    settings: FitnessSettings = field(default_factory=FitnessSettings)
+    channels: tuple[str, ...] | None = None
+    """Those whose findings matter to the analysis; None: all."""
+    temperatures: bool = False
+    """Whether the analysis rests on temperatures; where it does not, those that cannot be right are warned of."""
+
+    def matters(self, found: ChannelFitness, channel: Channel) -> ChannelFitness | None:
+        """The findings of a channel as far as they matter to the analysis."""
+        if channel.quantity is not Quantity.TEMPERATURE:
+            return found if self.channels is None or channel.name in self.channels else None
+        if self.temperatures:
+            return found
+        wrong = (replace(f, severity=Severity.WARN) for f in found.findings if f.kind in WRONG_TEMPERATURES)
+        return replace(found, findings=tuple(wrong))
+
+    def of_station(self, station: Station | None) -> FitnessSettings:
+        """What is expected of one recording: a station may turn on purpose, or feed a current in place of gravity."""
+        if station is None:
+            return self.settings
+        turns, fed = station.turn is not None, station.current_ma is not None
+        still, weighs = self.settings.at_rest and not turns, self.settings.reads_gravity and not fed
+        return replace(self.settings, at_rest=still, reads_gravity=weighs)
+
+
+class Watched:
+    """A recording whose first whole pass is its inspection; see `procedures.core.recording.Recording`."""
+
+    def __init__(self, recording: Recording, inspection: Inspection, watch: "Watch | None" = None) -> None:
+        self._recording, self._inspection, self._watch = recording, inspection, watch
+        self._fitness: tuple[ChannelFitness, ...] | None = None
+        self._outliers: dict[int, list[Jump]] = {}
+        self._mended = False
+
+    @property
+    def info(self) -> RecordingInfo:
+        """Of the recording itself."""
+        return self._recording.info
+
+    @property
+    def is_read(self) -> bool:
+        """Whether a whole pass has been made."""
+        return self._fitness is not None
+
+    def blocks(self) -> Iterator[RawArray]:
+        """The blocks; the end of the first pass raises `UnfitRecording` where the recording is refused."""
+        if self._fitness is not None:
+            yield from self._again()
+            return
+        stream = self._stream()
+        for block in self._recording.blocks():
+            stream.add(block)
+            yield block
+        self._end(stream)
+        if self.refused:
+            (self._watch or Watch.of(self)).refuse()
+
+    def fitness(self) -> tuple[ChannelFitness, ...]:
+        """The findings; where no analysis has read to the end, the recording is read for them."""
+        if self._fitness is None:
+            stream = self._stream()
+            for block in self._recording.blocks():
+                stream.add(block)
+            self._end(stream)
+        assert self._fitness is not None
+        return self._fitness
+
+    @property
+    def refused(self) -> bool:
+        """Whether a finding forbids the analysis."""
+        return any(f.refused for f in self.fitness())
+
+    @property
+    def has_outliers(self) -> bool:
+        """Whether there are some to mend."""
+        return bool(self._outliers)
+
+    def mend(self) -> None:
+        """From now on give the mean of its two neighbours for each outlier."""
+        self._mended = True
+
+    def _stream(self) -> FitnessStream:
+        info = self.info
+        settings = self._inspection.of_station(info.station)
+        return FitnessStream(info.channels, info.rate_hz, info.count, settings)
+
+    def _end(self, stream: FitnessStream) -> None:
+        pairs = zip(stream.finish(), self.info.channels, strict=True)
+        found = (self._inspection.matters(fitness, channel) for fitness, channel in pairs)
+        self._fitness = tuple(f for f in found if f is not None)
+        if self._inspection.settings.mends_outliers:
+            self._outliers = stream.outliers()
+
+    def _again(self) -> Iterator[RawArray]:
+        start = 0
+        for block in self._recording.blocks():
+            yield self._without_outliers(block, start) if self._mended else block
+            start += len(block)
+
+    def _without_outliers(self, block: RawArray, start: int) -> RawArray:
+        inside = [
+            (jump.index - start, c, jump.size)
+            for c, jumps in self._outliers.items()
+            for jump in jumps
+            if start <= jump.index < start + len(block)
+        ]
+        if not inside:
+            return block
+        mended = block.copy()
+        for row, column, away in inside:
+            mended[row, column] -= round(away) if np.issubdtype(mended.dtype, np.integer) else away
+        return mended
+
+
+class Watch:
+    """The recordings of one analysis, and what is said of them together."""
+
+    def __init__(self, recordings: Sequence[Recording], inspection: Inspection) -> None:
+        self.recordings = tuple(Watched(r, inspection, self) for r in recordings)
+
+    @classmethod
+    def of(cls, watched: Watched) -> "Watch":
+        """Of one recording that is watched already."""
+        watch = cls((), Inspection())
+        watch.recordings = (watched,)
+        return watch
+
+    def refuse(self, but: Kind | None = None) -> None:
+        """Raise `UnfitRecording` with all refusals of all recordings, where there are any; `but` for one kind."""
+        sentences = self._told(Severity.REFUSE, self.recordings, but)
+        if not sentences:
+            return
+        alone = f"recording {self.recordings[0].info.id}: " if len(self.recordings) == 1 else ""
+        raise UnfitRecording(alone + "; ".join(sentences))
+
+    def warnings(self) -> tuple[str, ...]:
+        """What a person should know of the recordings that were read; those that no analysis read are not its own."""
+        return self._told(Severity.WARN, [r for r in self.recordings if r.is_read])
+
+    def mend(self) -> bool:
+        """Mend the outliers of those that were read; whether there are any."""
+        found = [r for r in self.recordings if r.is_read and r.has_outliers]
+        for recording in found:
+            recording.mend()
+        return bool(found)
+
+    def _told(self, severity: Severity, recordings: Sequence[Watched], but: Kind | None = None) -> tuple[str, ...]:
+        return grouped([(_label(r.info), r.fitness()) for r in recordings], severity, but)
+
+
+def _label(info: RecordingInfo) -> str:
+    return f"station {info.station.label}" if info.station else f"recording {info.id}"

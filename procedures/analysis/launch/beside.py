@@ -1,0 +1,104 @@
+"""What is known beside a channel's samples: findings, temperatures, and whether its noise is less than a count."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from procedures.analysis.cells import Cells
+from procedures.core.arrays import Array
+from procedures.core.recording import INCREMENTS, Channel, Quantity, RawArray, RecordingInfo
+
+LOOKED_AT = 200_000
+"""Samples of a channel from which its resolution is judged."""
+COUNTER, CONVERTER = 0.35, 0.2
+"""Variance in counts² of samples below which the error of reading is no white noise.
+
+A plain counter of an even turn has at most ¼, and ⅙ of evenly spread readings; one of independent readings with a
+triangular dither ½. Rates converted with rounding have 1/12 beside their own noise: below 0.12 (0.35 of a count) the
+rounded noise depends on where between two counts the mean lies.
+"""
+_SMOOTHED_CELLS, _SMOOTHED_PART = 61, 20
+_GROUPS = 256
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Of one channel."""
+
+    findings: tuple[str, ...] = ()
+    coarse: str = ""
+    """A sentence where the noise is less than a count."""
+    temperatures: dict[str, Array] = field(default_factory=dict[str, Array])
+    """Cell means (n,) of each temperature channel [its unit]."""
+
+
+def temperature_names(info: RecordingInfo) -> tuple[str, ...]:
+    """The temperature channels."""
+    return tuple(c.name for c in info.channels if c.quantity is Quantity.TEMPERATURE)
+
+
+def smooth_temperatures(cells: Cells, names: Sequence[str]) -> dict[str, Array]:
+    """Cell means of temperatures, averaged so that their reading noise matters little; constant ones are left out."""
+    found: dict[str, Array] = {}
+    for name, row in zip(cells.channels, cells.rates, strict=True):
+        if name in names and np.all(np.isfinite(row)) and np.ptp(row) > 0.0:
+            width = max(1, min(_SMOOTHED_CELLS, len(row) // _SMOOTHED_PART))
+            found[name] = uniform_filter1d(row, width, mode="nearest")
+    return found
+
+
+def most_followed(series: Array, temperatures: dict[str, Array]) -> str | None:
+    """The temperature whose changes the series (n,) follows most, by correlation of successive group means."""
+    size = max(1, len(series) // _GROUPS)
+    count = len(series) // size
+    if not temperatures or count < 3:
+        return None
+
+    def changes(row: Array) -> Array:
+        return np.diff(row[: count * size].reshape(count, size).mean(axis=1))
+
+    own = changes(series)
+    by_size: dict[str, float] = {}
+    for name, row in temperatures.items():
+        other = changes(row)
+        scale = float(np.sqrt(np.dot(own, own) * np.dot(other, other)))
+        by_size[name] = abs(float(np.dot(own, other))) / scale if scale > 0.0 else 0.0
+    return max(by_size, key=lambda name: by_size[name])
+
+
+class Resolution:
+    """Gathers the variance of the first samples of channels that send whole counts."""
+
+    def __init__(self, channels: Sequence[Channel]) -> None:
+        self._channels = tuple(channels)
+        self._parts: list[RawArray] = []
+        self._seen = 0
+
+    def add(self, block: RawArray) -> None:
+        """The next samples, (n, channels)."""
+        if self._seen < LOOKED_AT:
+            part = block[: LOOKED_AT - self._seen].copy()
+            self._parts.append(part)
+            self._seen += len(part)
+
+    def finish(self) -> dict[str, str]:
+        """A sentence for each channel whose noise is less than a count."""
+        if not self._parts or not np.issubdtype(self._parts[0].dtype, np.integer):
+            return {}
+        samples = np.concatenate(self._parts)
+        found: dict[str, str] = {}
+        for channel, row in zip(self._channels, samples.T, strict=True):
+            variance = float(np.var(row))
+            if channel.quantity in INCREMENTS and 0.0 < variance < COUNTER:
+                found[channel.name] = (
+                    f"its samples vary by {np.sqrt(variance):.2g} counts: readings of a counter without dither "
+                    "err by a sawtooth, not by white noise; of the random walk only a limit is given"
+                )
+            elif channel.quantity not in INCREMENTS and 0.0 < variance < CONVERTER:
+                found[channel.name] = (
+                    f"its samples vary by {np.sqrt(variance):.2g} counts: rounding hides most of the noise; of the "
+                    "random walk only a limit is given"
+                )
+        return found

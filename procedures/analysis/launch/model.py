@@ -1,0 +1,116 @@
+"""The likelihood fit of one channel, with what its rate follows beside noise, and sentences on what the model lacks."""
+
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+
+from procedures.analysis.cells import Cells
+from procedures.analysis.launch.beside import Beside, most_followed
+from procedures.analysis.launch.results import CorrelatedProcess, LevelShift, TemperatureSlope
+from procedures.analysis.launch.settings import LaunchSettings
+from procedures.analysis.launch.signal import CleanSignal
+from procedures.analysis.noise_fit.estimate import NoiseFit
+from procedures.analysis.noise_fit.followed import Candidate, likeliest_shift
+from procedures.analysis.noise_fit.likelihood import fit_noise
+from procedures.analysis.noise_fit.powers import Powers, slow_powers
+from procedures.core.arrays import Array
+from procedures.core.units import DEVIATION_DISPLAY
+
+TEMPERATURE_LEVEL, TEMPERATURE_GAIN = 1e-3, 4.0
+"""Probability that a temperature which matters nothing is said to matter, and what it must gain over drifting noise."""
+SHIFT_LEVEL, SHIFT_GAIN = 1e-3, 2.0
+"""The same of a shift of the level: a probability over all cells where it may be, a gain beside ln(cells)."""
+SHOWN_LINES = 5
+
+
+@dataclass(frozen=True)
+class FoundNoise:
+    """What the likelihood says of a channel."""
+
+    fit: NoiseFit
+    coarse: str
+    temperature: TemperatureSlope | None
+    shift: LevelShift | None
+
+    @property
+    def correlated(self) -> CorrelatedProcess | None:
+        """The Gauss–Markov process, where there is one."""
+        g = self.fit.gauss_markov
+        return None if g is None else CorrelatedProcess(g.time_s, g.time_sd_s, g.driving, g.driving_sd, g.sd)
+
+    def warnings(self, rate_unit: str) -> tuple[str, ...]:
+        """What a reader must know before believing a coefficient."""
+        unit, size = DEVIATION_DISPLAY[rate_unit]
+        found = [self.coarse] if self.coarse else list[str]()
+        lines = [] if self.coarse else sorted(self.fit.lines, key=lambda line: -line.amplitude)
+        found += [
+            f"a spectral line at {line.frequency_hz:.4g} Hz of {line.amplitude / size:.3g} {unit} was taken out"
+            for line in sorted(lines[:SHOWN_LINES], key=lambda line: line.frequency_hz)
+        ]
+        if len(lines) > SHOWN_LINES:
+            found.append(f"{len(lines) - SHOWN_LINES} weaker spectral lines were taken out")
+        if self.temperature is not None:
+            t = self.temperature
+            found.append(
+                f"the rate follows {t.channel} by {t.slope / size:.3g} ± {t.standard_uncertainty / size:.1g} {unit} a "
+                "kelvin (or count): that drift is neither K nor R"
+            )
+        if self.shift is not None:
+            s = self.shift
+            found.append(
+                f"the level shifts by {s.height / size:.3g} ± {s.standard_uncertainty / size:.1g} {unit} at "
+                f"{s.at_s:.6g} s after the launch: no part of K"
+            )
+        return (*found, *self._model(unit, size), *self.fit.remarks)
+
+    def _model(self, unit: str, size: float) -> tuple[str, ...]:
+        """On what the model has beside the five coefficients."""
+        g, corner = self.fit.gauss_markov, self.fit.flicker_corner_s
+        found: list[str] = []
+        if g is not None:
+            spread = "" if g.time_sd_s is None else f" ± {g.time_sd_s:.2g}"
+            found.append(
+                f"a Gauss–Markov process is in the noise: correlation time {g.time_s:.3g}{spread} s, driving noise "
+                f"{g.driving / size:.3g} {unit}/√s"
+            )
+        if corner is not None:
+            found.append(f"the flicker's shortest relaxation time is about {corner:.2g} s")
+        return tuple(found)
+
+
+def found_noise(
+    signal: CleanSignal, cells: Cells, powers: Powers | None, beside: Beside, settings: LaunchSettings
+) -> FoundNoise:
+    """Fits what is left of a channel's cells, with the likeliest temperature and shift of the level as regressors."""
+    series, cell_s = signal.cells, cells.cell_s
+    temperatures = {name: row[signal.first_cell :] for name, row in beside.temperatures.items()}
+    followed = most_followed(series, {n: row for n, row in temperatures.items() if np.ptp(row) > 0.0})
+    rest = series
+    rows: list[Array] = []
+    candidates: list[Candidate] = []
+    if followed is not None:
+        own = temperatures[followed] - np.mean(temperatures[followed])
+        rows.append(own)
+        candidates.append(Candidate(TEMPERATURE_LEVEL, TEMPERATURE_GAIN))
+        rest = series - own * (float(np.dot(own, series)) / float(np.dot(own, own)))
+    at = likeliest_shift(rest)
+    if at is not None:
+        rows.append(np.where(np.arange(len(series)) >= at, 1.0, 0.0) - (len(series) - at) / len(series))
+        candidates.append(Candidate(SHIFT_LEVEL / len(series), SHIFT_GAIN + log(len(series))))
+    fit = fit_noise(
+        slow_powers(series, cell_s, regressors=np.array(rows) if rows else None),
+        powers,
+        level=settings.level,
+        confidence=settings.confidence,
+        candidates=candidates,
+        coarse=bool(beside.coarse),
+    )
+    temperature, shift = None, None
+    for f in fit.followed:
+        if followed is not None and f.index == 0:
+            temperature = TemperatureSlope(followed, f.slope, f.standard_uncertainty, f.p_value)
+        elif at is not None:
+            begin = cells.since_launch_s + (signal.first_cell + at) * cell_s
+            shift = LevelShift(begin, f.slope, f.standard_uncertainty)
+    return FoundNoise(fit, beside.coarse, temperature, shift)

@@ -1,0 +1,125 @@
+"""Slow noise that could be another process as well: intervals of B and K that hold whichever it is.
+
+One record does not tell a flicker, a rate random walk and a Gauss–Markov process apart where it shows only a little of
+them. The test that finds one of them compares it with nothing, not with the others.
+"""
+
+from dataclasses import dataclass, replace
+from math import sqrt
+
+import numpy as np
+
+from procedures.analysis.noise_fit.columns import BIAS_INSTABILITY, RATE_RANDOM_WALK
+from procedures.analysis.noise_fit.estimate import Estimate
+from procedures.analysis.noise_fit.extensions import Extension, candidates
+from procedures.analysis.noise_fit.joined import Joined
+from procedures.analysis.noise_fit.restricted import Spectrum, State, information, maximum
+from procedures.analysis.noise_fit.selection import Selection, inverse_information
+
+DOUBT = 4.0
+"""Twice the log likelihood that another process gains, from which on intervals allow for it."""
+SLOW = (BIAS_INSTABILITY, RATE_RANDOM_WALK)
+_EVERY = 3
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """One other model: all processes allowed, and its own."""
+
+    model: Extension
+    spectrum: Spectrum
+    best: State
+
+    @property
+    def everything(self) -> tuple[int, ...]:
+        """All columns."""
+        return tuple(range(self.spectrum.columns.shape[1]))
+
+    def without(self, k: int) -> float:
+        """The log likelihood with the process k left out."""
+        free = [i for i in self.everything if i != k]
+        return maximum(self.spectrum, free, start=self.best.variances).log_likelihood
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """What else the slow noise may be."""
+
+    estimates: dict[int, Estimate]
+    """By process, with intervals that allow for it."""
+    model: Extension | None
+    """The likeliest other model; None: there is no doubt."""
+
+
+def allowed_for(
+    joined: Joined,
+    plain: Joined,
+    selection: Selection,
+    own: State,
+    estimates: dict[int, Estimate],
+    losses: tuple[float, float],
+) -> Doubt:
+    """Widens the intervals of B and K that are present; `own` is the fit of all processes with the selection's ramp.
+
+    `plain` are the bins without what extends the model. `losses` are those of an interval's and of an upper limit's
+    end. A process whose absence costs no more than an interval's end once another is allowed has an interval from
+    zero; the limit of one that was not observed is raised where the other model is as likely.
+    """
+    extended = joined is not plain
+    if not extended and not any(k in selection.present for k in SLOW):
+        return Doubt({}, None)
+    fits = _fits(plain, selection, own)
+    if not fits:
+        return Doubt({}, None)
+    top = max(own.log_likelihood, *(f.best.log_likelihood for f in fits))
+    missing = {k for k in SLOW if k in selection.present and _can_miss(k, fits, top, losses[0])}
+    doubtful = extended or bool(missing) or 2.0 * (top - own.log_likelihood) >= DOUBT
+    changed: dict[int, Estimate] = {}
+    for k in SLOW:
+        # how fast a flicker ends is part of its level; another process only where there is a doubt
+        others = fits if doubtful else [f for f in fits if f.model.corner_s is not None and k == BIAS_INSTABILITY]
+        changed[k] = _wider(estimates[k], k, others, top, losses, zero=k in missing)
+    return Doubt(changed, fits[0].model if doubtful else None)
+
+
+def _can_miss(k: int, fits: list[_Fit], top: float, loss: float) -> bool:
+    """Whether some other model does without the process k at no more than an interval's loss."""
+    return any(2.0 * (top - f.best.log_likelihood) <= loss and 2.0 * (top - f.without(k)) <= loss for f in fits)
+
+
+def _fits(plain: Joined, selection: Selection, own: State) -> list[_Fit]:
+    """The likeliest two models of each kind, the likeliest first."""
+    found: list[_Fit] = []
+    for model in candidates(plain, _EVERY):
+        spectrum = model.applied(plain).used
+        spectrum = spectrum if selection.ramp else spectrum.without_ramp
+        columns = spectrum.columns.shape[1]
+        begin = np.zeros(columns)
+        known = min(plain.spectrum.columns.shape[1], columns)
+        begin[:known] = own.variances[:known]
+        if model.time_s is not None:  # nothing grows from zero by itself
+            begin[-1] = 0.5 * float(np.min(own.power / spectrum.columns[:, -1]))
+        found.append(_Fit(model, spectrum, maximum(spectrum, range(columns), start=begin)))
+    found.sort(key=lambda f: -f.best.log_likelihood)
+    times = [f for f in found if f.model.time_s is not None]
+    corners = [f for f in found if f.model.time_s is None]
+    return sorted((*times[:2], *corners[:2]), key=lambda f: -f.best.log_likelihood)
+
+
+def _wider(
+    estimate: Estimate, k: int, fits: list[_Fit], top: float, losses: tuple[float, float], *, zero: bool
+) -> Estimate:
+    """The interval and the limit over all models, by their information: ``v ± √(loss left)·sd``."""
+    present = estimate.value is not None
+    ends = [estimate.lower or 0.0], [estimate.upper or 0.0], [estimate.upper_limit]
+    for fit in fits:
+        lost = 2.0 * (top - fit.best.log_likelihood)
+        free = [i for i in fit.everything if fit.best.variances[i] > 0.0 or i == k]
+        known = inverse_information(information(fit.spectrum, fit.best)[np.ix_(free, free)])
+        v, sd = float(fit.best.variances[k]), sqrt(float(known[free.index(k), free.index(k)]))
+        for into, loss, sign in zip(ends, (losses[0], *losses), (-1.0, 1.0, 1.0), strict=True):
+            if loss > lost:
+                into.append(sqrt(max(0.0, v + sign * sqrt(loss - lost) * sd)))
+    if not present:
+        return replace(estimate, upper_limit=max(ends[2]))
+    return replace(estimate, lower=0.0 if zero else min(ends[0]), upper=max(ends[1]), upper_limit=max(ends[2]))

@@ -1,0 +1,162 @@
+"""Slow noise that the five coefficients do not describe: a Gauss–Markov process, and a flicker that ends elsewhere.
+
+A Gauss–Markov process of correlation time τ and driving noise q has the two-sided density ``q²τ²/(1 + (2πfτ)²)``,
+variance σ² = q²τ/2 (IEEE Std 952 Annex C). Means over cells of Δ, a = e^(−Δ/τ), have the covariance
+``γ(0) = 2σ²(τ/Δ)²(Δ/τ − 1 + a)``, ``γ(l) = σ²(τ/Δ)²(1 − a)²a^(l−1)``, hence in a mode of phase step ω the power
+``γ(0) + 2σ²(τ/Δ)²(1 − a)²(cos ω − a)/(1 − 2a cos ω + a²)``.
+
+The flicker of `core.noise` is a bank of such processes, evenly in ln τ, B²/π of variance each e-fold: a longer shortest
+time takes the fastest of them away. Which extension a record needs is asked by score tests first (C. R. Rao, Proc.
+Camb. Phil. Soc. 44 (1948) 50), which cost one fit; then by likelihood.
+"""
+
+from dataclasses import dataclass, replace
+from math import log, pi
+
+import numpy as np
+
+from procedures.analysis.noise_fit.columns import BIAS_INSTABILITY, RATE_RANDOM_WALK
+from procedures.analysis.noise_fit.joined import Joined
+from procedures.analysis.noise_fit.powers import FLICKER_BAND_S
+from procedures.analysis.noise_fit.restricted import State, information, maximum
+from procedures.core.arrays import Array
+
+SHORTEST_S, CELLS = 2.0, 2.0
+"""Least correlation time, in seconds and in cells: what is shorter is a filter's edge."""
+SHORT_CORNERS_S = (0.05, 0.1, 0.2, 1.0)
+"""Shortest relaxation times of a flicker that are tried beside those of a Gauss–Markov process."""
+_CORNER_OF_LONGEST = 0.3
+LONGEST = 0.1
+"""Greatest correlation time, of the record: what is longer is no other than a random walk."""
+SCORE = 2.7
+"""Standard deviations of a score from which on the extension is fitted."""
+GAIN_OF_TIME, GAIN_OF_CORNER = 16.0, 11.0
+"""Twice the log likelihood that an extension must gain: χ² of two and of one degree at 5e-4, of several times tried."""
+_RATIO = 2.0**0.5
+"""Between two times that are tried."""
+_PER_E_FOLD = 3
+_EVERY = 2
+"""Of the times, so many are looked at first."""
+_FIRST_CORNER_S = FLICKER_BAND_S[0]
+
+
+@dataclass(frozen=True)
+class Extension:
+    """One change of the model: a Gauss–Markov process beside the others, or a flicker of another shortest time."""
+
+    time_s: float | None = None
+    """Correlation time of the process."""
+    corner_s: float | None = None
+    """Shortest relaxation time of the flicker."""
+
+    def applied(self, joined: Joined) -> Joined:
+        """The bins with this model's columns; the process is the last of them."""
+        s = joined.spectrum
+        columns = s.columns.copy()
+        if self.corner_s is not None:
+            columns[:, BIAS_INSTABILITY] = flicker_from(joined, self.corner_s)
+        if self.time_s is None:
+            return replace(joined, spectrum=replace(s, columns=columns))
+        columns = np.column_stack([columns, gauss_markov(joined, self.time_s)])
+        return replace(joined, spectrum=replace(s, columns=columns), added=1)
+
+    def scaled(self, factor: float) -> "Extension":
+        """With its time longer by a factor."""
+        if self.time_s is not None:
+            return Extension(time_s=factor * self.time_s)
+        return Extension(corner_s=factor * (self.corner_s or 0.0))
+
+    def taken_from(self, joined: Joined) -> Joined:
+        """The bins with the columns they had before."""
+        s = joined.spectrum
+        columns = s.columns[:, : s.columns.shape[1] - joined.added].copy()
+        columns[:, BIAS_INSTABILITY] = joined.flicker
+        return replace(joined, spectrum=replace(s, columns=columns), added=0)
+
+
+def gauss_markov(joined: Joined, time_s: float) -> Array:
+    """Expected power (b,) of unit variance.
+
+    A process that lasts as long as a segment leaks as a random walk does, whose exact column tells how much.
+    """
+    period, omega = joined.period_s, 2.0 * pi * joined.frequency_hz * joined.period_s
+    ratio, cosine = time_s / period, np.cos(omega)
+    a = np.exp(-1.0 / ratio)
+    size = ratio**2
+    power = 2.0 * size * (1.0 / ratio - 1.0 + a) + 2.0 * size * (1.0 - a) ** 2 * (cosine - a) / (
+        1.0 - 2.0 * a * cosine + a**2
+    )
+    walk = period / (2.0 - 2.0 * cosine) - period / 6.0
+    fast = joined.frequency_hz[joined.is_fast]
+    lasting = (2.0 * pi * float(np.min(np.diff(fast))) * time_s) ** 2 if len(fast) > 1 else 0.0
+    steep = np.where(joined.is_fast, lasting, 0.0)
+    return power * (joined.spectrum.columns[:, RATE_RANDOM_WALK] / walk) ** (steep / (1.0 + steep))
+
+
+def flicker_from(joined: Joined, corner_s: float) -> Array:
+    """Expected power (b,) of unit B² with another shortest relaxation time than the columns were made with."""
+    count = max(2, round(_PER_E_FOLD * abs(log(corner_s / _FIRST_CORNER_S))) + 1)
+    times = np.geomspace(_FIRST_CORNER_S, corner_s, count)
+    weights = np.full(count, log(corner_s / _FIRST_CORNER_S) / (count - 1))
+    weights[[0, -1]] *= 0.5
+    taken = sum(w * gauss_markov(joined, float(t)) for w, t in zip(weights, times, strict=True))
+    column = joined.spectrum.columns[:, BIAS_INSTABILITY]
+    return np.maximum(column - taken / pi, 1e-6 * column)
+
+
+def extension(joined: Joined, at: State) -> Extension | None:
+    """What the record needs beside the five coefficients; `at` is their fit, all allowed, with a ramp."""
+    best, most = None, 0.0
+    for one in candidates(joined, _EVERY):
+        if _score(joined, at, one) > SCORE:
+            gain = _gain(joined, at, one)
+            if gain > most:
+                best, most = one, gain
+    if best is None:
+        return None
+    for factor in (1.0 / _RATIO, _RATIO):
+        other = best.scaled(factor)
+        gain = _gain(joined, at, other)
+        if gain > most:
+            best, most = other, gain
+    return best if most > (GAIN_OF_CORNER if best.time_s is None else GAIN_OF_TIME) else None
+
+
+def candidates(joined: Joined, every: int = 1) -> list[Extension]:
+    """Every extension that is tried, or every so many of the longer times."""
+    shortest = max(SHORTEST_S, CELLS * float(np.max(joined.period_s)))
+    longest = LONGEST * 0.5 / float(joined.frequency_hz[0])
+    if longest <= shortest:
+        return []
+    times = shortest * _RATIO ** np.arange(int(log(longest / shortest) / log(_RATIO)) + 1)
+    some = times.tolist()[::every]
+    corners = [*SHORT_CORNERS_S, *(t for t in some if t <= _CORNER_OF_LONGEST * longest)]
+    return [*(Extension(time_s=t) for t in some), *(Extension(corner_s=t) for t in corners)]
+
+
+def _score(joined: Joined, at: State, one: Extension) -> float:
+    """The score of the extension's power over its standard deviation, the fitted variances allowed for."""
+    used = joined.fitted
+    if one.time_s is not None:
+        column = gauss_markov(joined, one.time_s)[used]
+    elif at.variances[BIAS_INSTABILITY] == 0.0:
+        return 0.0
+    else:
+        own = joined.spectrum.columns[:, BIAS_INSTABILITY]
+        column = (flicker_from(joined, one.corner_s or 0.0) - own)[used]
+    free = np.flatnonzero(at.variances > 0.0)
+    scaled = column / at.power
+    others = joined.used.columns[:, free] / at.power[:, None]
+    known = information(joined.used, at)[np.ix_(free, free)]
+    shared = 0.5 * (others.T * at.dof) @ scaled
+    size = np.sqrt(np.diag(known))
+    explained = float(shared / size @ np.linalg.pinv(known / np.outer(size, size)) @ (shared / size))
+    spread = 0.5 * float(np.dot(at.dof, scaled**2)) - explained
+    score = 0.5 * float(np.dot(at.dof * scaled, at.residual / at.power - 1.0))
+    return score / np.sqrt(spread) if spread > 1e-9 * float(np.dot(at.dof, scaled**2)) else 0.0
+
+
+def _gain(joined: Joined, at: State, one: Extension) -> float:
+    """Twice the log likelihood that the extension gains."""
+    extended = one.applied(joined).used
+    return 2.0 * (maximum(extended, range(extended.columns.shape[1])).log_likelihood - at.log_likelihood)

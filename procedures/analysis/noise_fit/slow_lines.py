@@ -1,0 +1,114 @@
+"""Lines in the slow part of a record: found in the spectrum of all cell means, and taken out by least squares.
+
+A line of few cycles leaks into every mode of the whole record, so leaving modes out is not enough: the strongest one
+that stands out of its neighbourhood is fitted, then the next in what is left, all of them anew with each. What the fit
+takes of the noise lies in the modes beside the line, which are left out.
+"""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import zoom_fft
+
+from procedures.analysis.noise_fit.lines import SpectralLine, levels_around, standing_out
+from procedures.core.arrays import Array
+
+LEVEL = 1e-4
+"""Probability that noise alone shows one line in a record."""
+MOST_LINES = 20
+_FEWEST_CELLS = 64
+_FIRST = 3
+"""Cycles in the record; what has less is a drift."""
+_BESIDE = 3
+"""Modes of half a cycle in the record, on each side of a line, that are left out with it."""
+_MANY = 100
+"""Cycles from which on a mode has enough neighbours to tell its level."""
+_FINE = 65
+_EFFICIENCY = 0.35
+"""Of a median of neighbouring, overlapping modes, against a mean of independent ones."""
+
+
+@dataclass(frozen=True)
+class WithoutLines:
+    """A record less its lines."""
+
+    cells: Array
+    """(n,) [rate]"""
+    lines: tuple[SpectralLine, ...]
+    """By frequency."""
+    beside: NDArray[np.bool_]
+    """Modes 1…n−1 of the cosine transform that lie beside a line, (n−1,)."""
+
+
+def without_lines(cells: Array, cell_s: float, expected: Array) -> WithoutLines:
+    """Takes lines of at least three cycles out of cell means (n,).
+
+    `expected` (n−1,) is what the noise puts into modes 1…n−1 of the cosine transform. Of many cycles, the level about
+    a mode counts where it is higher: noise of a filter's edge is no line.
+    """
+    n = len(cells)
+    found: list[float] = []
+    rest, amplitudes = cells, np.empty(0)
+    if n >= _FEWEST_CELLS:
+        taper = np.hanning(n + 1)[:-1]
+        while len(found) < MOST_LINES:
+            cycles = _strongest(_detrended(rest), taper, expected)
+            if cycles is None or any(abs(cycles - other) < 1.0 for other in found):
+                break
+            found.append(cycles)
+            rest, amplitudes = _fitted(cells, found)
+    frequency = np.array(found) / (n * cell_s)
+    seen = amplitudes / np.sinc(frequency * cell_s)
+    lines = sorted((SpectralLine(float(f), float(a)) for f, a in zip(frequency, seen, strict=True)), key=_frequency)
+    beside = np.zeros(n - 1, dtype=bool)
+    for cycles in found:
+        first = max(0, round(2.0 * cycles) - _BESIDE - 1)
+        beside[first : round(2.0 * cycles) + _BESIDE] = True
+    return WithoutLines(rest, tuple(lines), beside)
+
+
+def _frequency(line: SpectralLine) -> float:
+    return line.frequency_hz
+
+
+def _detrended(y: Array) -> Array:
+    """Less its mean and slope."""
+    t = np.arange(len(y)) - 0.5 * (len(y) - 1)
+    return y - np.mean(y) - t * (float(np.dot(t, y)) / float(np.dot(t, t)))
+
+
+def _strongest(y: Array, taper: Array, expected: Array) -> float | None:
+    """Cycles in the record of the mode that stands out most; None where none does."""
+    power = np.abs(np.fft.rfft(y * taper)) ** 2
+    power = power[:-1]
+    around, _ = levels_around(power, 2.0, _MANY)
+    level = np.zeros(len(power))
+    level[1:] = 0.5 * float(np.sum(taper**2)) * expected[1 : 2 * len(power) - 2 : 2]
+    level[_MANY:] = np.maximum(level[_MANY:], around[_MANY:])
+    limit = float(standing_out(2.0, np.array([_EFFICIENCY * _MANY]), LEVEL / len(power))[0])
+    ratio = np.zeros(len(power))
+    ratio[_FIRST:] = power[_FIRST:] / np.maximum(level[_FIRST:], np.finfo(float).tiny) / limit
+    ratio[level <= 1e-24 * float(np.max(power))] = 0.0  # a noiseless record: rounding has no lines
+    first = int(np.argmax(ratio))
+    if ratio[first] <= 1.0:
+        return None
+    span = np.array([first - 1.0, first + 1.0]) / len(y)
+    fine = np.abs(zoom_fft(y * taper, span * 2.0, _FINE, fs=2.0, endpoint=True))
+    at = int(np.clip(np.argmax(fine), 1, _FINE - 2))
+    left, top, right = np.log(fine[at - 1 : at + 2])
+    bend = left - 2.0 * top + right
+    moved = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
+    return float(first - 1.0 + 2.0 * (at + np.clip(moved, -1.0, 1.0)) / (_FINE - 1))
+
+
+def _fitted(cells: Array, cycles: list[float]) -> tuple[Array, Array]:
+    """Cells less the lines, and the lines' amplitudes; mean and slope are fitted beside them, and stay."""
+    n = len(cells)
+    t = (np.arange(n) - 0.5 * (n - 1)) / n
+    phase = 2.0 * pi * np.outer(cycles, t)
+    waves = np.concatenate([np.cos(phase), np.sin(phase), np.ones((1, n)), t[None]])
+    solved = np.linalg.solve(waves @ waves.T, waves @ cells)[: 2 * len(cycles)]
+    rest = cells - solved @ waves[: 2 * len(cycles)]
+    return rest, np.hypot(*solved.reshape(2, -1))

@@ -1,0 +1,45 @@
+"""Reading a catalogue folder, one entry a file; a file that cannot be read is named, and the others stand."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Generic, TypeVar
+
+E = TypeVar("E")
+
+
+@dataclass
+class Discovered(Generic[E]):
+    """What a folder gives: its entries by name, and of each file that gives none, why."""
+
+    entries: dict[str, E] = field(default_factory=dict[str, E])
+    broken: dict[str, Exception] = field(default_factory=dict[str, Exception])
+
+    def complete(self) -> dict[str, E]:
+        """All entries. Raises the error of the first file that is broken."""
+        for error in self.broken.values():
+            raise error
+        return self.entries
+
+
+def discovered(package: str, path: Sequence[str], attribute: str, kind: type[E]) -> Discovered[E]:
+    """Import every module of a package for the entry that it holds under `attribute`, an instance of `kind`.
+
+    A file is broken where its import fails, where it holds no such entry, or where that has another name than the file.
+    """
+    found: Discovered[E] = Discovered()
+    for module in iter_modules(path):
+        place = f"{package}.{module.name}"
+        try:
+            entry = getattr(import_module(place), attribute, None)
+            if not isinstance(entry, kind):
+                raise TypeError(f"{place}: there is no {attribute}, which must be a {kind.__name__}")
+            name = getattr(entry, "name", None)
+            if name != module.name:
+                raise ValueError(f"{place}: {attribute}.name is {name!r}, not the file's name")
+        except Exception as error:  # whatever one file does, the others can be used
+            found.broken[module.name] = error
+        else:
+            found.entries[module.name] = entry
+    return found

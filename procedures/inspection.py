@@ -1,0 +1,73 @@
+"""Every analysis by way of the inspection: the one place where methods and procedures meet their recordings.
+
+A recording is inspected while the analysis reads it. A refusal ends the analysis and names every station that is
+refused; warnings come first in the result's own. Where there are outliers the analysis is made again without them.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from procedures.analysis.fitness.findings import Kind
+from procedures.analysis.fitness.watched import Inspection, Watch
+from procedures.core.errors import BadParameter, DomainError, MissingChannel
+from procedures.core.recording import Recording, cut
+from procedures.core.unit import Unit
+from procedures.procedure import Context, Evidence, Method, P, Procedure, R, RecordedParameters
+
+
+def analyse_procedure(procedure: Procedure[P, R], recordings: Sequence[Recording], params: P, context: Context) -> R:
+    """`Procedure.analyse` on inspected recordings. Raises `DomainError`."""
+    return _inspected(recordings, procedure.inspection(params), lambda r: procedure.analyse(r, params, context))
+
+
+def analyse_method(method: Method[P, R], evidence: Evidence, params: P, unit: Unit | None) -> R:
+    """`Method.analyse` on inspected recordings, or on the stretch of them that is asked for. Raises `DomainError`."""
+    recordings = _stretches(evidence.recordings, params)
+
+    def analyse(watched: Sequence[Recording]) -> R:
+        return method.analyse(replace(evidence, recordings=tuple(watched)), params, unit)
+
+    return _inspected(recordings, method.inspection(params, len(recordings)), analyse)
+
+
+def _inspected(
+    recordings: Sequence[Recording], inspection: Inspection, analyse: Callable[[Sequence[Recording]], R]
+) -> R:
+    mending = replace(inspection.settings, mends_outliers=True)
+    watch = Watch(recordings, replace(inspection, settings=mending))
+    outcome = _explained(watch, analyse)
+    if watch.mend():
+        outcome = _explained(watch, analyse)
+    found = (*watch.warnings(), *outcome.warnings)
+    return outcome.model_copy(update={"warnings": tuple(dict.fromkeys(found))})
+
+
+def _explained(watch: Watch, analyse: Callable[[Sequence[Recording]], R]) -> R:
+    """The outcome. Where an analysis fails on a recording that is to be refused, the refusal is the reason; how many
+    samples it needs the analysis knows better."""
+    try:
+        return analyse(watch.recordings)
+    except (BadParameter, MissingChannel):
+        raise
+    except (DomainError, ArithmeticError, ValueError):
+        watch.refuse(but=Kind.TOO_FEW)
+        raise
+
+
+def _stretches(recordings: Sequence[Recording], params: object) -> tuple[Recording, ...]:
+    if not isinstance(params, RecordedParameters):
+        return tuple(recordings)
+    starts = _each(recordings, "start_s", params.start_s)
+    stops = _each(recordings, "stop_s", params.stop_s)
+    return tuple(cut(r, start, stop) for r, start, stop in zip(recordings, starts, stops, strict=True))
+
+
+def _each(
+    recordings: Sequence[Recording], field: str, given: float | tuple[float, ...] | None
+) -> tuple[float | None, ...]:
+    """One value for each recording. Raises `BadParameter`."""
+    if not isinstance(given, tuple):
+        return (given,) * len(recordings)
+    if len(given) != len(recordings):
+        raise BadParameter(field, len(given), f"one number, or one for each of the {len(recordings)} recordings")
+    return given

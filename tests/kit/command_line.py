@@ -1,0 +1,56 @@
+"""``bench`` as a process of its own, and what it printed."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+
+
+class Done:
+    """A command that has ended."""
+
+    def __init__(self, code: int, out: str, err: str) -> None:
+        self.code, self.out, self.err = code, out, err
+        assert "Traceback" not in out + err, err
+
+    def json(self) -> Any:
+        return json.loads(self.out)
+
+
+Command = Callable[..., Done]
+
+
+def environment(folder: Path, **settings: str) -> dict[str, str]:
+    """An environment with settings of ours alone."""
+    outer = {k: v for k, v in os.environ.items() if not k.startswith("BENCH_")}
+    given = {"BENCH_DATABASE_URL": f"sqlite:///{folder / 'bench.sqlite'}", **settings}
+    return {**outer, "COLUMNS": "200", "PYTHONPATH": str(ROOT), **given}
+
+
+def command_in(folder: Path) -> Command:
+    def run(*arguments: object, **settings: str) -> Done:
+        done = subprocess.run(
+            [sys.executable, "-m", "bench_service", *map(str, arguments)],
+            env=environment(folder, **settings),
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        return Done(done.returncode, done.stdout, done.stderr)
+
+    return run
+
+
+def one_line(done: Done, *words: str) -> None:
+    """A refusal: exit code 2, nothing said to standard output, one line to standard error."""
+    assert (done.code, done.out) == (2, ""), done.err
+    assert len(done.err.strip().splitlines()) == 1, done.err
+    assert done.err.startswith("bench: ")
+    assert all(word in done.err for word in words), done.err

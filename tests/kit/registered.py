@@ -1,0 +1,12 @@
+"""A bench that is registered and that nobody drives: a process has one job engine, which another service may have."""
+
+from contextlib import ExitStack
+
+from bench_service.app import open_service
+from bench_service.settings import Settings
+
+
+def register_bench(settings: Settings) -> None:
+    """Register the settings' bench and its units, as a service does that starts, and end before it works."""
+    with ExitStack() as closing:
+        open_service(settings, closing)
