@@ -1,8 +1,8 @@
 """When a campaign starts by itself: a cron expression in a time zone, and the rules for starts that were missed.
 
-Where clocks are set forward, a start in the hour that is left out is made up at its end; where they are set back, a
-start at a fixed hour happens once, one of every hour (or with a step or range in minute or hour) in both hours. That is
-the rule of Debian's cron, and cronsim's.
+Where clocks are set forward, a start in the hour that is left out is made up at its end; a day that a zone leaves out
+has none. Where clocks are set back, a start at a fixed hour happens once, in the first of the two hours, and one of
+every hour (minute or hour begin with a star) in both. That is the rule of Debian's cron.
 """
 
 from collections.abc import Iterator
@@ -78,11 +78,44 @@ def starts_after(cron: str, time_zone: str, moment: datetime) -> Iterator[dateti
     zone = zone_of(time_zone)
     if len(cron.split()) != FIELDS:
         raise BadParameter("cron", cron, "five fields: minute, hour, day of month, month, day of week")
+    local = moment.astimezone(zone)
     try:
-        found = CronSim(cron, moment.astimezone(zone))
+        found = CronSim(cron, local.replace(tzinfo=None, fold=0) if _at_fixed_times(cron) else local)
     except CronSimError as error:
         raise BadParameter("cron", cron, f"no cron expression that can ever be due: {error}") from None
-    return (start.astimezone(UTC) for start in found)
+    shown = (_moment_shown(start, zone) if start.tzinfo is None else start.astimezone(UTC) for start in found)
+    return _rising(shown, moment)
+
+
+def _at_fixed_times(cron: str) -> bool:
+    """Whether an expression means times on the wall clock, not every so many minutes or hours."""
+    return not any(part.startswith("*") for part in cron.split()[:2])
+
+
+def _moment_shown(local: datetime, zone: ZoneInfo) -> datetime | None:
+    """The first moment [UTC] at which the clock of a zone shows a time, or has jumped over it.
+
+    None where the zone leaves out the whole day.
+    """
+    day, before, skipped = local.date(), local.replace(tzinfo=zone, fold=1).astimezone(UTC), False
+    while not _exists(local, zone):
+        local, skipped = local + timedelta(minutes=1), True
+    if skipped and local.date() > day > before.astimezone(zone).date():
+        return None
+    return local.replace(tzinfo=zone).astimezone(UTC)
+
+
+def _exists(local: datetime, zone: ZoneInfo) -> bool:
+    shown = local.replace(tzinfo=zone).astimezone(UTC).astimezone(zone)
+    return shown.replace(tzinfo=None, fold=0) == local
+
+
+def _rising(moments: Iterator[datetime | None], after: datetime) -> Iterator[datetime]:
+    """Those later than a moment and than each other: the second of two equal hours repeats nothing."""
+    for moment in moments:
+        if moment is not None and moment > after:
+            after = moment
+            yield moment
 
 
 def next_start(cron: str, time_zone: str, moment: datetime) -> datetime:

@@ -179,7 +179,8 @@ def analyse(
     server: Server = None,
     as_json: AsJson = False,
 ) -> int:
-    """Run a method on stored recordings or calibrations."""
+    """Run a method on stored recordings or calibrations; prints its coefficients, checks and verdict."""
+    from bench_service.cli.report_tables import report_tables
     from bench_service.cli.tables import check_table, show_warnings
     from bench_service.cli.watching import exit_code
 
@@ -194,6 +195,8 @@ def analyse(
     if as_json:
         print(json.dumps(result, indent=2))
     else:
+        for table in report_tables(method, result["document"]):
+            console.print(table)
         console.print(check_table(result["document"]))
         show_warnings(result["document"], console)
         console.print(f"verdict {result['verdict']}, result {result['id']}", soft_wrap=True)

@@ -22,7 +22,9 @@ def _thermal(value: ThermalCorrection) -> Table:
             rows.append((None, "±", None, None, *axis.standard_uncertainties().tolist(), None, None))
     stage = "after the converter's own models" if value.first_stage else "of outputs as they are"
     columns = ("axis", "form", "K0", "B0, m/s^2", *COEFFICIENTS, "case reference, °C", "converter reference, °C")
-    return Table(f"Correction of the {value.triad} triad, {stage}", columns, tuple(rows))
+    fitted = "not known" if value.fitted_range is None else str(value.fitted_range)
+    note = f"Fitted at: {fitted}. Beyond that it is extrapolated."
+    return Table(f"Correction of the {value.triad} triad, {stage}", columns, tuple(rows), note)
 
 
 def _converter(models: ConverterTriad | tuple[()]) -> Table:

@@ -14,6 +14,7 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis.calibration.estimator import Weighting
+from procedures.analysis.calibration.misfit import MISFIT_MAX
 from procedures.analysis.calibration.plan import (
     TriadPlan,
     basis,
@@ -268,14 +269,19 @@ def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
     ]
     if t.p_value is not None:
         limit = Limit("1", minimum=limits.residual_p_value_min)
-        checks.append(check(f"{triad} residuals, p-value of chi-square", t.p_value, limit))
+        checks.append(check(f"{triad} residuals, p-value of chi-square", t.p_value, limit, note=f"worst: {t.worst}"))
+    elif t.misfit is not None:
+        limit = Limit("1", maximum=MISFIT_MAX, source="ours")
+        checks.append(
+            check(f"{triad} residuals over what noise and table allow", t.misfit, limit, note=f"worst: {t.worst}")
+        )
     return checks
 
 
 PROCEDURE = Procedure(
     "calibration_12_orientations",
     "Calibration in twelve orientations",
-    "1.2.0",
+    "1.3.0",
     Params,
     Result,
     resolve,

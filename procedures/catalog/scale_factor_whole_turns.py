@@ -68,6 +68,12 @@ class Params(Parameters):
     azimuth_deg: float | None = Field(None, ge=-360.0, le=360.0, description="heading of the table's zero")
     orthogonality_sd_arcsec: Arcsec | None = Field(None, description="of each of the table's two right angles")
     pointing_sd_arcsec: Arcsec | None = Field(None, description="of each axis, anew at each stop")
+    cross_coupling_sd: float = Field(
+        0.004,
+        ge=0.0,
+        le=0.5,
+        description="expected of each cross-coupling, for the preview of a unit not yet calibrated",
+    )
     make_calibration: bool = Field(
         False,
         description="true: bias and matrix become the unit's current calibration, of the gyro triad alone; its bias is "
@@ -189,6 +195,7 @@ def _plan(params: Params, context: Context) -> TurnPlan:
         uncertainty,
         params.terms,
         reference * units.DEG,
+        params.cross_coupling_sd,
     )
 
 
@@ -237,7 +244,7 @@ def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
 PROCEDURE = Procedure(
     "scale_factor_whole_turns",
     "Gyro scale factor by whole turns",
-    "1.0.0",
+    "1.1.0",
     Params,
     Result,
     resolve,

@@ -291,7 +291,7 @@ def _warnings(params: Params, context: Context) -> tuple[str, ...]:
 
 
 PROCEDURE = Procedure(
-    *("thermal_cycle", "Thermal cycle", "1.0.0"),
+    *("thermal_cycle", "Thermal cycle", "1.1.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report),
     uses_calibration=True,
     corrections=corrections,

@@ -104,6 +104,35 @@ class AxisCorrection:
         return scale * (v + bias)
 
 
+EXTRAPOLATED_C = 1.0
+"""Readings so far beyond the fitted range are worth a word."""
+
+
+@dataclass(frozen=True)
+class TemperatureRange:
+    """Between which readings of its two sensors a correction was fitted [°C]. Raises `BadParameter`."""
+
+    case_c: tuple[float, float]
+    converter_c: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in (("case_c", self.case_c), ("converter_c", self.converter_c)):
+            if not (np.isfinite([low, high]).all() and low <= high):
+                raise BadParameter(name, (low, high), "two finite temperatures, the lower one first")
+
+    def beyond_c(self, case_c: ArrayLike, converter_c: ArrayLike) -> Array:
+        """How far readings lie outside, the farther sensor's distance, zero inside, shape of the readings [°C]."""
+        found = [
+            np.maximum(low - np.asarray(t, dtype=np.float64), np.asarray(t, dtype=np.float64) - high)
+            for t, (low, high) in ((case_c, self.case_c), (converter_c, self.converter_c))
+        ]
+        return np.asarray(np.maximum(np.maximum(found[0], found[1]), 0.0), dtype=np.float64)
+
+    def __str__(self) -> str:
+        (a, b), (c, d) = self.case_c, self.converter_c
+        return f"case {a:.1f} … {b:.1f} °C, converter {c:.1f} … {d:.1f} °C"
+
+
 @dataclass(frozen=True)
 class ThermalCorrection:
     """T 4.1 of a triad, x, y, z."""
@@ -114,6 +143,8 @@ class ThermalCorrection:
     """The converter's models that were taken out of the outputs before the fit (`core.converter.at_reference`), and so
     must be wherever the correction is used; None: it is for outputs as they are. The reference of the whole is
     then these models' for the converter's own drift, and the axes' for the rest: best the same."""
+    fitted_range: TemperatureRange | None = None
+    """Where it was fitted; beyond that it is extrapolated. None: not known (corrections of older versions)."""
 
     @property
     def scales(self) -> Array:

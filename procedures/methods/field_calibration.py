@@ -6,16 +6,22 @@ neglected, and what that costs is in the uncertainty. Errata of F: `procedures.a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
-from procedures.analysis.calibration.reference import INPUT_UNITS, reference_vectors
-from procedures.analysis.calibration.station_means import StationMeans, station_means
+from procedures.analysis.calibration.misfit import (
+    MISFIT_MAX,
+    REMARKABLE,
+)
+from procedures.analysis.calibration.reference import reference_vectors
+from procedures.analysis.calibration.station_means import station_means
 from procedures.analysis.calibration.triad_analysis import noise_of_means
-from procedures.analysis.field.fit import FieldFit, FieldModel, FieldUncertainty, fit_field
+from procedures.analysis.field.examined import FittedTriad, examined_fit, require_accelerometers
+from procedures.analysis.field.fit import FieldFit, FieldModel, FieldUncertainty
+from procedures.analysis.field.summary import FieldTriad, field_summary
 from procedures.analysis.fitness.watched import Inspection
 from procedures.core import units
 from procedures.core.arrays import Array
@@ -59,23 +65,12 @@ class Params(RecordedParameters):
     scale_sd_max: float = Field(0.1, gt=0.0, le=1.0, description="relative; a worse scale factor is refused")
     scale_sd_limit: float = Field(0.005, gt=0.0, le=1.0, description="relative; a worse accelerometer fails")
     residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0)
-
-
-@dataclass(frozen=True)
-class FieldTriad:
-    """One triad's bias and scale with standard uncertainties, and the base as this triad saw it."""
-
-    calibration: TriadCalibration
-    bias: tuple[float, ...]
-    bias_sd: tuple[float, ...]
-    scale: tuple[float, ...]
-    scale_relative_sd: tuple[float, ...]
-    scale_estimated: bool
-    chi_square: float
-    degrees_of_freedom: int
-    p_value: float | None
-    residuals: tuple[tuple[float, ...], ...]
-    """Per recording, in the output's unit."""
+    misfit_max: float = Field(
+        MISFIT_MAX,
+        gt=1.0,
+        le=1e6,
+        description="where the noise comes from the data: residuals over what it and the declared uncertainties allow",
+    )
 
 
 class Result(Outcome):
@@ -93,12 +88,13 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
     Also `UnfitRecording` and `BadParameter` where positions are missing or too few.
     """
+    require_accelerometers(evidence.recordings)
     positions = _positions(evidence.recordings, params)
-    accelerometer, means = _accelerometer(evidence.recordings, positions, params, unit)
-    triads = [_told(accelerometer, means, params, estimated=True)]
+    fitted = _accelerometer(evidence.recordings, positions, params, unit)
+    accelerometer, triads = fitted.fit, [field_summary(fitted, params.cross_coupling_sd, estimated=True)]
     if params.gyro != "none":
-        gyro, gyro_means = _gyro(evidence.recordings, positions, params, unit, accelerometer)
-        triads.append(_told(gyro, gyro_means, params, estimated=params.gyro == "bias_and_scale"))
+        gyro = _gyro(evidence.recordings, positions, params, unit, accelerometer)
+        triads.append(field_summary(gyro, params.cross_coupling_sd, params.gyro == "bias_and_scale"))
     checks = tuple(_checks(triads, params))
     estimated = params.tilt != "level"
     sd = np.sqrt(np.diagonal(accelerometer.covariance)[6:]) / units.DEG
@@ -159,7 +155,7 @@ def _positions(recordings: Sequence[Recording], params: Params) -> list[TableAng
 
 def _accelerometer(
     recordings: Sequence[Recording], positions: list[TableAngles], params: Params, unit: Unit | None
-) -> tuple[FieldFit, StationMeans]:
+) -> FittedTriad:
     level = (params.level_sd_arcsec * units.ARCSEC) ** 2
     uncertainty = FieldUncertainty(
         params.angle_sd_arcsec * units.ARCSEC,
@@ -177,7 +173,7 @@ def _gyro(
     params: Params,
     unit: Unit | None,
     accelerometer: FieldFit,
-) -> tuple[FieldFit, StationMeans]:
+) -> FittedTriad:
     """On the base as the accelerometers found it."""
     level = (params.level_sd_arcsec * units.ARCSEC) ** 2
     tilt = accelerometer.covariance[6:, 6:] if params.tilt != "level" else level * np.eye(2)
@@ -211,7 +207,7 @@ def _model(triad: str, positions: list[TableAngles], params: Params, acceleromet
 
 def _fit(
     triad: str, recordings: Sequence[Recording], unit: Unit | None, model: FieldModel, uncertainty: FieldUncertainty
-) -> tuple[FieldFit, StationMeans]:
+) -> FittedTriad:
     means = station_means(recordings, triad)
     if means.output_unit == "count" and not model.estimate_scale:
         raise UnfitRecording(
@@ -219,23 +215,7 @@ def _fit(
         )
     noise, known = noise_of_means(means, unit.triad(triad) if unit else None)
     what = f"bias and scale of the {triad} triad in the field"
-    return fit_field(what, means.outputs, noise, model, uncertainty, known), means
-
-
-def _told(fit: FieldFit, means: StationMeans, params: Params, estimated: bool) -> FieldTriad:
-    triad = means.triad
-    return FieldTriad(
-        fit.calibration(triad, means.output_unit, INPUT_UNITS[triad], params.cross_coupling_sd),
-        tuple(fit.bias.tolist()),
-        tuple(np.sqrt(np.diagonal(fit.covariance)[:3]).tolist()),
-        tuple(fit.scale.tolist()),
-        tuple(fit.scale_relative_sd.tolist()),
-        estimated,
-        fit.chi_square,
-        fit.degrees_of_freedom,
-        fit.p_value,
-        tuple(tuple(row) for row in fit.residuals.tolist()),
-    )
+    return examined_fit(what, means, noise, known, model, uncertainty)
 
 
 def _checks(triads: Sequence[FieldTriad], params: Params) -> list[Check]:
@@ -243,21 +223,33 @@ def _checks(triads: Sequence[FieldTriad], params: Params) -> list[Check]:
     greatest = max(triads[0].scale_relative_sd)
     found = [check("accelerometer scale factor, greatest relative standard uncertainty", greatest, limit)]
     for t in triads:
+        note = "; ".join(filter(None, (f"worst: {t.worst}", t.suspected)))
+        name = t.calibration.triad
         if t.p_value is not None:
             limit = Limit("1", minimum=params.residual_p_value_min)
-            found.append(check(f"{t.calibration.triad} residuals, p-value of chi-square", t.p_value, limit))
+            found.append(check(f"{name} residuals, p-value of chi-square", t.p_value, limit, note=note))
+        elif t.misfit is not None:
+            limit = Limit("1", maximum=params.misfit_max, source="ours")
+            found.append(check(f"{name} residuals over what noise and positions allow", t.misfit, limit, note=note))
     return found
 
 
 def _warnings(triads: Sequence[FieldTriad], accelerometer: FieldFit, params: Params) -> list[str]:
-    found: list[str] = []
-    if not accelerometer.noise_known:
-        found.append("the noise is not known: uncertainties come from the scatter within the recordings")
-    found += [
-        f"{t.calibration.triad}: as many unknowns as measurements, nothing shows whether the base moved or was tilted"
-        for t in triads
-        if t.degrees_of_freedom == 0
-    ]
+    unknown = "the noise is not known: uncertainties come from the scatter within the recordings"
+    found = [] if accelerometer.noise_known else [unknown]
+    for t in triads:
+        name = t.calibration.triad
+        if t.degrees_of_freedom == 0:
+            found.append(
+                f"{name}: as many unknowns as measurements, nothing is left to check the fit with: nothing shows "
+                "whether the base moved or was tilted, or a position is wrong"
+            )
+        elif t.misfit is not None and t.misfit > REMARKABLE:
+            why = f"; {t.suspected}" if t.suspected else ""
+            found.append(
+                f"{name}: the residuals are {t.misfit:.3g} times what noise and declared positions allow, the worst "
+                f"at {t.worst}{why}"
+            )
     if params.tilt == "level":
         bias = params.gravity_m_s2 * units.DEG
         found.append(f"a base tilted by one degree makes the horizontal biases wrong by {bias:.2g} m/s^2: see tilt")
@@ -272,7 +264,7 @@ def inspection(params: Params, count: int) -> Inspection:
 METHOD = Method(
     "field_calibration",
     "Field calibration",
-    "1.0.0",
+    "1.1.0",
     Params,
     Result,
     analyse,

@@ -19,6 +19,7 @@ from procedures.analysis.navigation.alignment import (
     thesis_prediction,
 )
 from procedures.analysis.navigation.instrument_errors import calibrated_triad
+from procedures.analysis.navigation.knock import AttitudeStep, attitude_step, step_degrees
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, Undetermined, UnfitRecording
@@ -45,6 +46,9 @@ class Params(RecordedParameters):
     earth_rate_rad_s: float = Field(units.EARTH_RATE, ge=7.0e-5, le=7.6e-5)
     base_turn_arcsec: float = Field(0.0, ge=0.0, le=3600.0, description="turn of the base about east meanwhile")
     heading_sd_max_deg: float = Field(0.1, gt=0.0, le=180.0, description="limit of the heading's uncertainty (ours)")
+    step_max_deg: float = Field(
+        0.005, gt=0.0, le=180.0, description="limit of a step of the attitude meanwhile, a knock (ours)"
+    )
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,14 @@ class AlignedAttitude:
     magnitude_errors: tuple[float, float, float]
     """|f| − g [m/s²], |ω| − Ω and ω upwards − Ω·sin L [rad/s]."""
     magnitude_sd: tuple[float, float, float]
+    step_deg: float | None = None
+    """Size of a step of the attitude within the recording; zero: none was seen; None: too few samples to look."""
+    step_at_s: float | None = None
+    """When, since the recording's beginning; None: none was seen."""
+    step_by: str = ""
+    """"accelerometers" or "gyros"."""
+    step_visible_deg: float | None = None
+    """A tilt by less than this within the recording would not have been seen."""
 
 
 class Result(Outcome):
@@ -83,13 +95,15 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     calibrations, basis = _calibrations(evidence, unit)
     means = {triad: station_means(evidence.recordings, triad) for triad in TRIADS}
     found = [_aligned(i, r.info, means, calibrations, params, unit) for i, r in enumerate(evidence.recordings)]
-    attitudes = tuple(_told(i, means, params, unit, a) for i, a in enumerate(found))
+    steps = [attitude_step(r, calibrations) for r in evidence.recordings]
+    attitudes = tuple(_with_step(_told(i, means, params, unit, a), steps[i]) for i, a in enumerate(found))
     checks = tuple(c for a in attitudes for c in _checks(a, params))
     known = unit is not None and all(unit.triad(triad) is not None for triad in TRIADS)
     missing = (
         () if known else ("noise and change from launch to launch are not known: uncertainties are lower figures",)
     )
-    return Result(checks=checks, verdict=verdict(checks), warnings=missing, basis=basis, attitudes=attitudes)
+    warnings = (*missing, *(w for a in attitudes for w in _step_warnings(a, params)))
+    return Result(checks=checks, verdict=verdict(checks), warnings=warnings, basis=basis, attitudes=attitudes)
 
 
 def report(result: Result) -> Report:
@@ -177,6 +191,29 @@ def _told(
     )
 
 
+def _with_step(a: AlignedAttitude, step: AttitudeStep | None) -> AlignedAttitude:
+    if step is None:
+        return a
+    visible = step.visible_rad / units.DEG
+    if not step.seen:
+        return replace(a, step_deg=0.0, step_visible_deg=visible)
+    return replace(
+        a, step_deg=step_degrees(step), step_at_s=step.time_s, step_by=step.shown_by, step_visible_deg=visible
+    )
+
+
+def _step_warnings(a: AlignedAttitude, params: Params) -> tuple[str, ...]:
+    if a.step_deg is None or a.step_visible_deg is None:
+        return (f"{a.recording}: too few samples to see whether the unit was moved meanwhile",)
+    if a.step_at_s is None:
+        hidden = f"{a.recording}: a knock that tilts by less than {a.step_visible_deg:.2g}° would not have been seen"
+        return (hidden,) if a.step_visible_deg > params.step_max_deg else ()
+    return (
+        f"{a.recording}: the unit turned by about {a.step_deg:.2g}° at {a.step_at_s:.4g} s, by its {a.step_by}: it was "
+        "knocked, and the attitude is a mean of two; repeat, or cut the recording there",
+    )
+
+
 def _checks(a: AlignedAttitude, params: Params) -> tuple[Check, ...]:
     limit = Limit("deg", params.heading_sd_max_deg, source="ours")
     found = [check(f"{a.recording}: heading, standard uncertainty", a.heading_sd_deg, limit)]
@@ -184,13 +221,17 @@ def _checks(a: AlignedAttitude, params: Params) -> tuple[Check, ...]:
     for (name, unit), error, sd in zip(kinds, a.magnitude_errors, a.magnitude_sd, strict=True):
         bound = Limit(unit, LIKELY * sd, -LIKELY * sd, source=f"{LIKELY:g} standard uncertainties")
         found.append(check(f"{a.recording}: {name}", error, bound, sd))
+    if a.step_deg is not None:
+        note = "" if a.step_at_s is None else f"at {a.step_at_s:.4g} s, by the {a.step_by}"
+        limit = Limit("deg", maximum=params.step_max_deg, source="ours")
+        found.append(check(f"{a.recording}: step of the attitude meanwhile", a.step_deg, limit, note=note))
     return tuple(found)
 
 
 METHOD = Method(
     "initial_alignment_of_recording",
     "Initial alignment from a recording at rest",
-    "1.0.0",
+    "1.1.0",
     Params,
     Result,
     analyse,

@@ -50,7 +50,7 @@ class ChannelBias:
     channel: str
     unit: str
     noise: str
-    """"record": the unit's coefficients; "observed": variance and neighbours' covariance of the means themselves."""
+    """"record": the unit's coefficients; "observed": those that the spectrum of the means themselves shows."""
     bias: float
     standard_uncertainty: float
     white_standard_uncertainty: float
@@ -137,7 +137,7 @@ def _of_channel(
     noise = window_noise.known_noise(unit.channel_noise(info.channels[info.column(name)]) if unit else None)
     z = taken.means[:, column] - params.known_input.get(name, 0.0)
     covariance = (
-        window_noise.observed_covariance(z)
+        window_noise.spectral_covariance(z, taken.length_s)
         if noise is None
         else window_noise.contiguous_covariance(noise, taken.windows)
     )
@@ -199,8 +199,8 @@ def _warnings(biases: Sequence[ChannelBias]) -> list[str]:
     found: list[str] = []
     if observed:
         found.append(
-            f"{', '.join(observed)}: the unit's record has no noise in their unit; variance and covariance of "
-            "neighbouring means come from the recording itself, slower noise is not in the uncertainty"
+            f"{', '.join(observed)}: the unit's record has no noise in their unit; quantization, random walk and "
+            "flicker come from the recording's own spectrum, slower noise is not in the uncertainty"
         )
     for b in biases:
         name, size = units.DISPLAY[b.unit]
@@ -220,7 +220,7 @@ def inspection(params: Params, count: int) -> Inspection:
 METHOD = Method(
     "kalman_calibration",
     "Kalman calibration of a constant bias",
-    "1.0.0",
+    "1.1.0",
     Params,
     Result,
     analyse,

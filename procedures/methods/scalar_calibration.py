@@ -3,34 +3,45 @@
 For recordings at several stations, or for one long recording of a unit turned by hand from pose to pose.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from procedures.analysis.calibration.misfit import (
+    MISFIT_MAX,
+    Misfit,
+    require_live,
+    require_plausible_scales,
+    scalar_misfit,
+)
+from procedures.analysis.calibration.poses import (
+    NoiseSource,
+    Poses,
+    poses_of_recordings,
+    poses_of_rows,
+    poses_of_stretches,
+)
 from procedures.analysis.calibration.reference import INPUT_UNITS
 from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, fit_scalar, nominal_start, start_from_data
-from procedures.analysis.calibration.station_means import station_means
-from procedures.analysis.calibration.station_noise import outputs_covariance
-from procedures.analysis.calibration.still import StillSettings, pose_means, still_stretches
-from procedures.analysis.calibration.triad_analysis import noise_of_means, scatter_covariance
+from procedures.analysis.calibration.still import StillSettings
 from procedures.analysis.fitness.watched import Inspection
 from procedures.core import units
 from procedures.core.arrays import Array
-from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Check, Limit, check, verdict
-from procedures.core.recording import TRIADS, Recording, rates, require_finite
+from procedures.core.recording import TRIADS, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, Parameters, RecordedParameters
 
 TURNED = replace(STATIONS.settings, at_rest=False, beside_others=False)
 """One recording of a unit that is turned by hand from pose to pose."""
-
-_SMALLEST_SD = 1e-9
-"""Of the largest reading: the noise of pose means that nothing is known of, before it is scaled to the residuals."""
+LEAST_TO_JUDGE = 6
+"""Poses from which on a channel that none of them changes is dead, or not turned; of fewer the rank says enough."""
 
 
 class Still(Parameters):
@@ -67,6 +78,12 @@ class Params(RecordedParameters):
     )
     condition_max: float = Field(1000.0, ge=1.0, le=1e9, description="of the linear system of thesis 3.23")
     residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0)
+    misfit_max: float = Field(
+        MISFIT_MAX,
+        gt=1.0,
+        le=1e6,
+        description="where the noise comes from the data: residuals over what the scatter within the poses allows",
+    )
 
     @model_validator(mode="after")
     def _gravity_is_given(self) -> Self:
@@ -100,21 +117,25 @@ class Result(Outcome):
     residuals: tuple[float, ...]
     """|v̂| − reference per pose, SI."""
     residual_sd: tuple[float, ...]
+    misfit: float | None = None
+    """Residuals over what the scatter within the poses allows; None where no equation is spare."""
+    worst: str = ""
+    """Pose and channels with the greatest residual."""
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     """Several recordings are one pose each; a single one is searched for still stretches."""
     recordings = evidence.recordings
-    if len(recordings) == 1:
-        outputs, noise, known, output_unit = _poses_of_one(recordings[0], params, unit)
-    else:
-        means = station_means(recordings, params.triad)
-        noise, known = noise_of_means(means, unit.triad(params.triad) if unit else None)
-        outputs, output_unit = means.outputs, means.output_unit
+    poses = _poses(recordings, params, unit)
+    if len(poses.outputs) >= LEAST_TO_JUDGE:
+        require_live(params.triad, poses.outputs, poses.output_unit)
     reference = _reference(params)
-    start = start_from_data(outputs, reference) if output_unit == "count" else nominal_start()
-    fit = fit_scalar(f"the nine scalar {params.triad} parameters", outputs, noise, reference, start, known)
-    return _result(fit, params, output_unit)
+    start = start_from_data(poses.outputs, reference) if poses.output_unit == "count" else nominal_start()
+    what = f"the nine scalar {params.triad} parameters"
+    fit = fit_scalar(what, poses.outputs, poses.noise, reference, start, poses.noise_known)
+    gains = np.asarray(np.diagonal(np.linalg.inv(fit.correction)), dtype=np.float64)
+    require_plausible_scales(params.triad, gains, poses.output_unit != "count")
+    return _result(fit, params, poses)
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
@@ -140,53 +161,27 @@ def _reference(params: Params) -> float:
     return params.earth_rate_rad_s if params.triad == "gyro" else params.gravity_m_s2 or 0.0
 
 
-def _poses_of_one(recording: Recording, params: Params, unit: Unit | None) -> tuple[Array, Array, bool, str]:
-    """Pose means (n, 3) of one recording, their covariance (3, n, n), whether that is from a record, and their unit."""
-    info, s = recording.info, params.still
-    names = TRIADS[params.triad]
-    samples = rates(recording, names)
-    require_finite(info, names, samples)
+def _poses(recordings: Sequence[Recording], params: Params, unit: Unit | None) -> Poses:
+    """One pose a recording; of a single recording its still stretches, or its rows. Raises `BadParameter`."""
+    record = unit.triad(params.triad) if unit else None
+    if len(recordings) > 1:
+        return poses_of_recordings(recordings, params.triad, record)
     if params.rows == "pose_means":
-        return _rows_as_poses(recording, samples, params, unit)
+        poses = poses_of_rows(recordings[0], params.triad, record, params.pose_sd)
+        if poses.noise_source is NoiseSource.NOTHING and len(poses.outputs) <= len(PARAMETERS):
+            rows = f"{len(poses.outputs)} pose means of unknown noise: {len(PARAMETERS)} parameters"
+            raise BadParameter("pose_sd", None, f"needed with {rows} leave nothing to check")
+        return poses
+    s = params.still
     settings = StillSettings(s.initial_s, s.window_s, s.factor, s.shortest_s, s.margin_s)
-    stretches = still_stretches(samples, info.rate_hz, settings)
-    if not stretches:
-        raise UnfitRecording(f"recording {info.id}: no still stretch was found")
-    outputs, sd = pose_means(samples, stretches)
-    output_unit = info.channels[info.column(names[0])].rate_unit
-    windows = np.array([[p.start, p.stop] for p in stretches]) / info.rate_hz + info.start_s
-    known = outputs_covariance(unit.triad(params.triad) if unit else None, output_unit, windows)
-    if known is not None:
-        return outputs, known, True, output_unit
-    return outputs, scatter_covariance(outputs, np.maximum(sd, np.median(sd, axis=0))), False, output_unit
+    return poses_of_stretches(recordings[0], params.triad, record, settings)
 
 
-def _rows_as_poses(
-    recording: Recording, samples: Array, params: Params, unit: Unit | None
-) -> tuple[Array, Array, bool, str]:
-    """Each row as the mean over a pose, as `_poses_of_one`; a row lasts as long as its sample period.
-
-    The noise is what is given, else the unit's record over each row's time, else what the residuals show, for which
-    more poses are needed than the nine that the parameters take. Raises `BadParameter`.
-    """
-    info, rows = recording.info, len(samples)
-    output_unit = info.channels[info.column(TRIADS[params.triad][0])].rate_unit
-    if params.pose_sd is not None:
-        return samples, np.broadcast_to(params.pose_sd**2 * np.eye(rows), (3, rows, rows)), True, output_unit
-    windows = (np.arange(rows)[:, None] + np.array([0.0, 1.0])) / info.rate_hz + info.start_s
-    known = outputs_covariance(unit.triad(params.triad) if unit else None, output_unit, windows)
-    if known is not None:
-        return samples, known, True, output_unit
-    if rows <= len(PARAMETERS):
-        allowed = f"needed with {rows} pose means of unknown noise: {len(PARAMETERS)} parameters leave nothing to check"
-        raise BadParameter("pose_sd", None, allowed)
-    least = (_SMALLEST_SD * float(np.max(np.abs(samples)))) ** 2
-    return samples, np.broadcast_to(least * np.eye(rows), (3, rows, rows)), False, output_unit
-
-
-def _result(fit: ScalarFit, params: Params, output_unit: str) -> Result:
-    input_unit = INPUT_UNITS[params.triad]
-    checks = _checks(fit, params)
+def _result(fit: ScalarFit, params: Params, poses: Poses) -> Result:
+    input_unit, output_unit = INPUT_UNITS[params.triad], poses.output_unit
+    slow = None if poses.noise_source is NoiseSource.NOTHING else poses.slow
+    misfit = scalar_misfit(fit, poses.outputs, poses.labels, slow)
+    checks = _checks(fit, params, misfit)
     kinds = (
         (output_unit,) * 3 + (f"{input_unit}/{output_unit}" if output_unit != input_unit else "1",) * 3 + ("rad",) * 3
     )
@@ -199,7 +194,7 @@ def _result(fit: ScalarFit, params: Params, output_unit: str) -> Result:
     return Result(
         checks=checks,
         verdict=verdict(checks),
-        warnings=_warnings(fit, params),
+        warnings=_warnings(fit, params, misfit),
         calibration=fit.calibration(params.triad, output_unit, input_unit),
         parameters=parameters,
         reference=_reference(params),
@@ -210,30 +205,47 @@ def _result(fit: ScalarFit, params: Params, output_unit: str) -> Result:
         p_value=fit.p_value,
         residuals=tuple(fit.residuals.tolist()),
         residual_sd=tuple(fit.residual_sd.tolist()),
+        misfit=misfit.ratio,
+        worst=misfit.worst,
     )
 
 
-def _checks(fit: ScalarFit, params: Params) -> tuple[Check, ...]:
-    checks = [check("condition number", fit.condition, Limit("1", maximum=params.condition_max))]
+def _checks(fit: ScalarFit, params: Params, misfit: Misfit) -> tuple[Check, ...]:
+    relative = _relative_sd(fit, params)
+    checks = [
+        check("condition number", fit.condition, Limit("1", maximum=params.condition_max)),
+        check(
+            "greatest relative standard uncertainty of a parameter",
+            float(relative.max()),
+            Limit("1", maximum=params.uncertainty_max),
+            note=f"{PARAMETERS[int(np.argmax(relative))]}; beyond the limit it is practically undetermined",
+        ),
+    ]
     if fit.p_value is not None:
         limit = Limit("1", minimum=params.residual_p_value_min)
-        checks.append(check("residuals, p-value of chi-square", fit.p_value, limit))
+        checks.append(check("residuals, p-value of chi-square", fit.p_value, limit, note=f"worst: {misfit.worst}"))
+    elif not fit.noise_known:
+        checks += misfit.checks("residuals over the scatter within the poses", params.misfit_max)
     return tuple(checks)
 
 
-def _warnings(fit: ScalarFit, params: Params) -> tuple[str, ...]:
-    """Parameters that the poses leave practically open, and a noise that had to be guessed from the data."""
+def _relative_sd(fit: ScalarFit, params: Params) -> Array:
+    """Standard uncertainties (9,): of b relative to the reference in the output's unit, of s relative, of t in rad."""
     scale = np.abs(fit.parameters[3:6])
-    relative = fit.standard_uncertainties / np.concatenate([_reference(params) / scale, scale, np.ones(3)])
+    return fit.standard_uncertainties / np.concatenate([_reference(params) / scale, scale, np.ones(3)])
+
+
+def _warnings(fit: ScalarFit, params: Params, misfit: Misfit) -> tuple[str, ...]:
+    """Parameters that the poses leave practically open, noise that had to be taken from the data, and a misfit."""
     found = [
         f"{name} is practically undetermined by these poses: its standard uncertainty is {value:.2g} "
         f"({'rad' if name.startswith('t') else 'relative'})"
-        for name, value in zip(PARAMETERS, relative.tolist(), strict=True)
+        for name, value in zip(PARAMETERS, _relative_sd(fit, params).tolist(), strict=True)
         if value > params.uncertainty_max
     ]
     if not fit.noise_known:
         found.append("the noise is not known: uncertainties come from the scatter within the poses and the residuals")
-    return tuple(found)
+    return (*found, *misfit.sentences)
 
 
 def inspection(params: Params, count: int) -> Inspection:
@@ -244,7 +256,7 @@ def inspection(params: Params, count: int) -> Inspection:
 METHOD = Method(
     "scalar_calibration",
     "Scalar calibration",
-    "1.0.0",
+    "1.1.0",
     Params,
     Result,
     analyse,

@@ -10,6 +10,7 @@ from procedures.analysis.recursive_bias.window_noise import (
     dwell_needed,
     predicted_sd,
     slow_noise_p,
+    spectral_covariance,
     window_means,
 )
 from procedures.core import units
@@ -191,6 +192,21 @@ def test_the_method_without_a_record_and_a_wandering_channel():
     wandering = quiet + 1e-7 * np.cumsum(rng.normal(size=3000))
     failed = METHOD.analyse(Evidence((recording(wandering),)), METHOD.params(gyro_target_sd_deg_h=1.0), None)
     assert not failed.checks[0].passed
+
+
+@pytest.mark.parametrize(("q", "seed"), [(0.0, 1), (1.0, 2), (3.0, 3)])
+def test_unknown_noise_with_quantization_has_about_the_width_of_the_known_one(q: float, seed: int):
+    """Random walk and quantization drawn as they happen; each record's interval against the true covariance's.
+
+    The random walk of 300 windows under quantization is known to 15 % by itself (its spectrum has a few dozen useful
+    frequencies), and its uncertainty is added: .6 to 1.6 is four of these.
+    """
+    rng, n = np.random.default_rng(seed), 300
+    true = RecursiveBias(contiguous_covariance(NoiseCoefficients(q, 1.0), windows(n))).variances[-1] ** 0.5
+    for _ in range(3):
+        angle = np.concatenate([[0.0], np.cumsum(rng.normal(size=n))])
+        z = np.diff(angle + q * rng.normal(size=n + 1))
+        assert 0.6 < RecursiveBias(spectral_covariance(z, 1.0)).variances[-1] ** 0.5 / true < 1.6
 
 
 def test_known_input_is_taken_off_and_must_name_a_channel():

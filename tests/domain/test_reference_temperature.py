@@ -16,7 +16,7 @@ from procedures.catalog.calibration_12_orientations import PROCEDURE, Params, sc
 from procedures.core.converter import ConverterModel, Normalised
 from procedures.core.errors import BadParameter, MissingChannel
 from procedures.core.recording import ACCELEROMETER, Channel, MemoryRecording, Quantity, RecordingInfo
-from procedures.core.thermal_correction import AxisCorrection, Form, ThermalCorrection
+from procedures.core.thermal_correction import AxisCorrection, Form, TemperatureRange, ThermalCorrection
 from procedures.core.unit import TriadRecord
 from simulators.chamber.behaviour import response
 from simulators.truth.thermal import REFERENCE_C, AccelerometerThermalTruth, ConverterTruth, UnitThermalTruth
@@ -89,7 +89,8 @@ def true_correction(truth: UnitThermalTruth, form: Form = Form.BOTH) -> ThermalC
         beta = (*a.bias_static, *a.bias_dynamic)
         b0 = -float(B_ACCELEROMETER[i]) + 5e-5
         axes.append(AxisCorrection(scale, b0, tuple(alpha.tolist()), beta, *references, form, covariance=covariance))
-    return ThermalCorrection("accelerometer", (axes[0], axes[1], axes[2]))
+    seen = TemperatureRange((-40.0, 60.0), (-40.0, 60.0))
+    return ThermalCorrection("accelerometer", (axes[0], axes[1], axes[2]), fitted_range=seen)
 
 
 def drawn_correction(truth: UnitThermalTruth, rng: np.random.Generator) -> ThermalCorrection:

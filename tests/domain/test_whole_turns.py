@@ -297,3 +297,44 @@ def test_how_much_longer_is_found_in_powers_of_two(turnable: Context) -> None:
     assert longer_needed(plan, 1.0) == 2
     assert len(bench_time_s(plan)[1]) == 3
     assert sum(bench_time_s(plan)[1]) == pytest.approx(bench_time_s(plan)[0])
+
+
+def test_the_preview_of_a_unit_not_yet_calibrated_knows_of_cross_couplings(turnable: Context) -> None:
+    """An axis that leans by ε puts K_ij·ε into a scale factor: a spread that the identity for K does not show.
+
+    600 tables and units drawn; what is left of their outputs by the plan's own weights, against the prediction. The
+    standard deviation of 600 draws is known to 1/√1200 = 3 % for a normal figure; a product of two is heavier in its
+    tails (kurtosis 9: 6 %), so 25 % are four standard deviations.
+    """
+    sd, cross, rng = 30.0, 0.004, np.random.default_rng(31)
+    unit = replace(turnable.unit, calibrations=())
+    params = PROCEDURE.params(orthogonality_sd_arcsec=sd, pointing_sd_arcsec=0.0, cross_coupling_sd=cross)
+    predicted = {u.name: u.from_table for u in PROCEDURE.predict(params, Context(unit, turnable.bench)).uncertainties}
+    plan = TurnPlan(
+        SHORT, unit, turnable.bench.axis_motion, SITE, TableUncertainty(sd), TERMS, REFERENCE, cross_coupling_sd=cross
+    )
+    made = plan.estimator()
+    assert made is not None
+    stations = SHORT.stations()
+    angles = np.array([s.turn.angle_deg for s in stations if s.turn]) * units.DEG
+    errors = []
+    for _ in range(600):
+        first, second = sd / 3600.0 * rng.standard_normal(2)
+        k = np.eye(3) + cross * rng.standard_normal((3, 3)) * (1.0 - np.eye(3))
+        leaning = []
+        for s in stations:
+            assert s.angles is not None
+            inner, middle = turn("x", s.angles.inner_deg), turn("z", s.angles.middle_deg)
+            skew = turn("x", first) @ middle @ turn("y", second) @ inner
+            up = np.array([0.0, 1.0, 0.0])
+            leaning.append(skew.T @ up - (middle @ inner).T @ up)
+        change = angles[:, None] * np.array(leaning) @ k.T
+        errors.append((made.gain @ change.T.ravel()).reshape(3, -1)[[0, 1, 2], [1, 2, 3]])
+    spread = np.std(errors, axis=0)
+    table = np.sqrt(np.sum(made.table_per_sd**2, axis=1)).reshape(3, -1)[[0, 1, 2], [1, 2, 3]]
+    assert spread[1:] == pytest.approx(table[1:], rel=0.25)
+    assert spread[0] <= 1.25 * table[0]  # x turns about the outer axis with both right angles beyond it
+    assert all(predicted[f"gyro.K{i}{i}"] > 0.3 * cross * sd * ARCSEC for i in (2, 3))
+    without = params.model_copy(update={"cross_coupling_sd": 0.0})
+    bare = {u.name: u.from_table for u in PROCEDURE.predict(without, Context(unit, turnable.bench)).uncertainties}
+    assert all(bare[f"gyro.K{i}{i}"] < 0.3 * predicted[f"gyro.K{i}{i}"] for i in (2, 3))

@@ -140,6 +140,10 @@ def test_a_file_is_imported_and_analysed(bench: Command, tmp_path: Path) -> None
     assert done.code == {"pass": 0, "fail": 1}[done.json()["verdict"]]
     assert [found[f"b_{axis}"] for axis in "xyz"] == pytest.approx([0.05, -0.03, 0.02], abs=0.002)
     assert [found[f"s_{axis}"] for axis in "xyz"] == pytest.approx([1 / 1.01, 1 / 0.99, 1 / 1.02], rel=2e-4)
+    printed = bench(*arguments, "--set", "gravity_m_s2=9.81").out
+    rows = {line.split()[1]: line for line in printed.splitlines() if line.startswith(("│ b_", "│ s_"))}
+    assert set(rows) == {f"{kind}_{axis}" for kind in "bs" for axis in "xyz"}
+    assert f"{found['s_x']:.6g}"[:6] in rows["s_x"]
     refused = bench(*arguments)
     assert refused.code == 2
     assert "gravity_m_s2 is needed" in refused.err

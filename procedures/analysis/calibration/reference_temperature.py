@@ -28,6 +28,7 @@ from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import Recording
 from procedures.core.thermal_correction import (
+    EXTRAPOLATED_C,
     POWERS_OF_ALPHA,
     POWERS_OF_BETA,
     AxisCorrection,
@@ -124,6 +125,12 @@ def bring_to_reference(
     """
     if means.output_unit != "m/s^2":
         raise UnfitRecording(f"outputs in {means.output_unit} cannot be corrected for temperature: m/s^2 are needed")
+    if means.at_reference_c is not None:
+        case_c, converter_c = means.at_reference_c
+        raise UnfitRecording(
+            f"these outputs were already brought to {case_c:g} °C (case) and {converter_c:g} °C (converter): a thermal "
+            "correction is applied once"
+        )
     found = station_temperatures(recordings, lag_s)
     case, converter = found.mean_c.T
 
@@ -144,8 +151,9 @@ def bring_to_reference(
     if correction.first_stage is not None:
         staged = at_reference(staged, converter, correction.first_stage)
     of_correction = [_of_correction(axis, staged[:, i], case, converter) for i, axis in enumerate(correction.axes)]
+    references = correction.axes[0].case_reference_c, correction.axes[0].converter_reference_c
     return AtReference(
-        replace(means, outputs=outputs),
+        replace(means, outputs=outputs, at_reference_c=references),
         found,
         outputs - means.outputs,
         np.array(of_correction),
@@ -192,7 +200,7 @@ def thermal_share(at: AtReference, correction: ThermalCorrection, fit: TriadFit)
 
 def thermal_warnings(at: AtReference, correction: ThermalCorrection) -> tuple[str, ...]:
     """What the reader must know of a correction's use at these temperatures."""
-    warnings: list[str] = []
+    warnings = _of_range(at.temperatures.mean_c, correction)
     unknown = [name for name, axis in zip("xyz", correction.axes, strict=True) if not axis.covariance]
     if unknown:
         warnings.append(
@@ -207,3 +215,19 @@ def thermal_warnings(at: AtReference, correction: ThermalCorrection) -> tuple[st
             "form 'switched' was applied as in the static regime: let the unit warm through, or use the form 'both'"
         )
     return tuple(warnings)
+
+
+def _of_range(mean_c: Array, correction: ThermalCorrection) -> list[str]:
+    """A sentence where stations (n, 2) [°C] are warmer or colder than the correction has seen, or nobody knows."""
+    if correction.fitted_range is None:
+        return ["the thermal correction does not say at which temperatures it was fitted: it may be extrapolated here"]
+    beyond = correction.fitted_range.beyond_c(mean_c[:, 0], mean_c[:, 1])
+    outside = int(np.sum(beyond > EXTRAPOLATED_C))
+    if not outside:
+        return []
+    return [
+        f"at {outside} of {len(beyond)} stations the unit was up to {beyond.max():.1f} K beyond the range in which its "
+        f"thermal correction was fitted ({correction.fitted_range}): the correction is extrapolated there, and its "
+        "uncertainty does not tell by how much it is wrong; calibrate within the range, or repeat the thermal cycle "
+        "over the temperatures of use"
+    ]

@@ -157,6 +157,7 @@ def fit_scalar(
     for _ in range(_PASSES):
         weights = whitener(_magnitude_covariance(parameters, outputs, noise_covariance))
         parameters = _solve(parameters, outputs, reference, weights)
+    parameters = _upright(parameters)
     covariance_f = _magnitude_covariance(parameters, outputs, noise_covariance)
     weights = whitener(covariance_f)
     jacobian = _jacobian(parameters, outputs)
@@ -206,6 +207,15 @@ def _solve(start: Array, outputs: Array, reference: float, weights: Array) -> Ar
 
     found = least_squares(whitened, np.zeros(9), jac=derivative, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
     return start + found.x * units
+
+
+def _upright(parameters: Array) -> Array:
+    """The same magnitudes with positive scale factors: a row of T·S may be negated, no magnitude sees its sign."""
+    signs = np.where(parameters[3:6] < 0.0, -1.0, 1.0)
+    scale = parameters[3:6] * signs
+    t_xy, t_xz, t_yz = parameters[6:]
+    angles = [t_xy * signs[0] * signs[1], t_xz * signs[0] * signs[2], t_yz * signs[1] * signs[2]]
+    return np.array([*parameters[:3], *scale, *angles])
 
 
 def _steps(parameters: Array, reference: float) -> Array:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from procedures.analysis.calibration.slow_noise import slow_excess
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.imu_model import TriadCalibration
@@ -39,11 +40,15 @@ class StationMeans:
     """Standard deviation of single samples within the dwell, shape (n, 3)."""
     mean_sd: Array
     """Standard uncertainty of the mean from the scatter of batch means within the dwell, shape (n, 3)."""
+    slow_excess: Array
+    """What slow noise adds to the variance of the mean (`slow_excess`), shape (n, 3)."""
     windows: Array
     """[start, stop] of each dwell since the first one's launch [s], shape (n, 2)."""
     counts: tuple[int, ...]
     labels: tuple[str, ...]
     angles: tuple[TableAngles | None, ...]
+    at_reference_c: tuple[float, float] | None = None
+    """Readings of case and converter that a thermal correction has brought the outputs to; None: as they were."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,7 @@ class _Summary:
     mean: Array
     scatter_sd: Array
     mean_sd: Array
+    slow_excess: Array
     frozen_at: tuple[float | None, ...]
     """The raw value of a channel that never changed, else None."""
 
@@ -73,6 +79,7 @@ def station_means(recordings: Sequence[Recording], triad: str) -> StationMeans:
         np.array([s.mean for s in summaries]),
         np.array([s.scatter_sd for s in summaries]),
         np.array([s.mean_sd for s in summaries]),
+        np.array([s.slow_excess for s in summaries]),
         np.array([[i.start_s, i.start_s + i.duration_s] for i in infos]) - (infos[0].launched_s or 0.0),
         tuple(i.count for i in infos),
         tuple(i.station.label if i.station else i.id for i in infos),
@@ -151,6 +158,7 @@ def _in_units(
         scale.rates(first + mean),
         np.sqrt(variance) * np.abs(scale.gain),
         batch_sd / np.sqrt(BATCHES) * np.abs(scale.gain),
+        slow_excess(sums / sizes) * scale.gain**2,
         frozen,
     )
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from procedures.analysis.calibration.slow_noise import slow_excess
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 
@@ -89,3 +90,9 @@ def pose_means(samples: Array, stretches: tuple[Stretch, ...], batches: int = 10
         means.append(pose.mean(axis=0))
         sds.append(parts.std(axis=0, ddof=1) / np.sqrt(count))
     return np.array(means).reshape(-1, 3), np.array(sds).reshape(-1, 3)
+
+
+def pose_excess(samples: Array, stretches: tuple[Stretch, ...], batches: int = 12) -> Array:
+    """What slow noise adds to the variance of every stretch's mean (`slow_excess`), shape (poses, 3)."""
+    parts = (np.array_split(samples[p.start : p.stop], batches) for p in stretches)
+    return np.array([slow_excess(np.array([part.mean(axis=0) for part in pose])) for pose in parts]).reshape(-1, 3)

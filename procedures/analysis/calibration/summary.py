@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from procedures.analysis.calibration.estimator import Weighting
+from procedures.analysis.calibration.misfit import residual_misfit
 from procedures.analysis.calibration.multiposition import TriadFit
 from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, observable_derivative, scalar_parameters
 from procedures.analysis.calibration.verification import Magnitudes
@@ -74,6 +75,10 @@ class TriadSummary:
     scalar: ScalarCheck | None = None
     weighting: Weighting = "noise"
     """Results of procedure versions before 1.1.0 do not say: theirs is this."""
+    misfit: float | None = None
+    """Residuals over what noise and table allow; None where no equation is spare, or an older version did not say."""
+    worst: str = ""
+    """Station and channel with the greatest residual."""
 
 
 def coefficient_unit(name: str, output_unit: str, input_unit: str) -> str:
@@ -84,9 +89,14 @@ def coefficient_unit(name: str, output_unit: str, input_unit: str) -> str:
 
 
 def triad_summary(
-    fit: TriadFit, magnitudes: Magnitudes, labels: Sequence[str], scalar: ScalarCheck | None = None
+    fit: TriadFit,
+    magnitudes: Magnitudes,
+    labels: Sequence[str],
+    scalar: ScalarCheck | None = None,
+    slow: float = 0.0,
 ) -> TriadSummary:
-    """Numbers of a fit, ready to be stored."""
+    """Numbers of a fit, ready to be stored; `slow` is the share of slow noise where the noise is not known."""
+    misfit = residual_misfit(fit.residuals, fit.residual_sd, fit.chi_square, fit.degrees_of_freedom, labels, slow)
     return TriadSummary(
         fit.calibration(),
         _coefficients(fit),
@@ -102,6 +112,8 @@ def triad_summary(
         magnitudes,
         scalar,
         fit.weighting,
+        misfit.ratio,
+        misfit.worst,
     )
 
 

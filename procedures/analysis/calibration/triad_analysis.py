@@ -15,6 +15,7 @@ from procedures.analysis.calibration.reference_temperature import (
     thermal_warnings,
 )
 from procedures.analysis.calibration.scalar import fit_scalar, nominal_start, start_from_data
+from procedures.analysis.calibration.slow_noise import slow_share
 from procedures.analysis.calibration.station_means import StationMeans, station_means
 from procedures.analysis.calibration.station_noise import outputs_covariance
 from procedures.analysis.calibration.summary import (
@@ -72,7 +73,19 @@ def analyse_means(
     reference = reference_magnitude(triad, site)
     scalar = _scalar(means, reference, noise, known, fit) if with_scalar else None
     after = magnitudes(means.outputs, fit.calibration(), reference, means.labels, fit.magnitude_sd)
-    return triad_summary(fit, after, means.labels, scalar), fit
+    return triad_summary(fit, after, means.labels, scalar, _slow(means, noise, fit, known)), fit
+
+
+def _slow(means: StationMeans, noise: Array, fit: TriadFit, known: bool) -> float:
+    """Share of slow noise in what noise and table allow; none of noise that is known."""
+    if known:
+        return 0.0
+    own = float(np.sum(np.diagonal(noise, axis1=1, axis2=2)))
+    return slow_share(means.slow_excess, noise) * own / (own + float(np.sum(fit.of_table**2)))
+
+
+LEAST_SCATTER = 0.5
+"""A dwell's own scatter counts as no less than this part of the median of all."""
 
 
 @dataclass(frozen=True)
@@ -110,12 +123,14 @@ def analyse_accelerometers(
 def noise_of_means(means: StationMeans, record: TriadRecord | None) -> tuple[Array, bool]:
     """Covariance of the station means, (3, n, n), and whether it comes from the unit's record.
 
-    Outputs in counts have no record in their unit. Without one the scatter of batch means within each dwell stands in.
+    Outputs in counts have no record in their unit. Without one the scatter of batch means within each dwell stands in,
+    for a dwell that hardly scatters (clipped, held) a part of the dwells' median.
     """
     known = outputs_covariance(record, means.output_unit, means.windows)
     if known is not None:
         return known, True
-    return scatter_covariance(means.outputs, means.mean_sd), False
+    floor = LEAST_SCATTER * np.median(means.mean_sd, axis=0)
+    return scatter_covariance(means.outputs, np.maximum(means.mean_sd, floor)), False
 
 
 def scatter_covariance(outputs: Array, sd: Array) -> Array:

@@ -74,9 +74,13 @@ class FieldFit:
     """Of (b, k, α₀, β₀), shape (8, 8); zero for what was not estimated, but for a nominal scale."""
     residuals: Array
     """Shape (n, 3), in the output's unit."""
+    residual_sd: Array
+    """Their expected standard deviations, shape (n, 3)."""
     chi_square: float
     degrees_of_freedom: int
     noise_known: bool
+    noise_share: float
+    """Part of the outputs' variance that is noise; the rest is what is declared uncertain."""
 
     @property
     def p_value(self) -> float | None:
@@ -137,7 +141,7 @@ def fit_field(
     asked = _asked(model)
     theta = _start(outputs, model)
     noise = block_diag(*noise_covariance)
-    whitened = np.eye(3 * len(outputs))
+    whitened, flaws = np.eye(3 * len(outputs)), np.empty((3 * len(outputs), 0))
     jacobian = _jacobian(theta, model)[:, asked]
     require_full_rank(what, jacobian, [_NAMES[k] for k in asked])
     magnitude = float(np.linalg.norm(model.vector_r))
@@ -152,6 +156,8 @@ def fit_field(
             break
     residuals = _residuals(theta, outputs, model)
     inverse = scaled_pinv(whitened @ jacobian)
+    remaining = np.eye(len(residuals)) - jacobian @ inverse @ whitened
+    left = np.einsum("ij,jk,ik->i", remaining, noise + flaws @ flaws.T, remaining, optimize=True)
     chi_square = float(np.sum((whitened @ residuals) ** 2))
     degrees = 3 * len(outputs) - len(asked)
     factor = residual_factor(chi_square, degrees, noise_known)
@@ -165,9 +171,11 @@ def fit_field(
         theta[6:],
         covariance,
         residuals.reshape(3, -1).T,
+        np.sqrt(np.maximum(left * factor, 0.0)).reshape(3, -1).T,
         chi_square,
         degrees,
         noise_known,
+        float(np.trace(noise) / np.trace(noise + flaws @ flaws.T)),
     )
     if model.estimate_scale:
         _require_scales(what, fit, model.scale_sd_max)

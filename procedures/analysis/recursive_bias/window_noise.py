@@ -14,9 +14,12 @@ from procedures.analysis.calibration.station_plan import dwell_for
 from procedures.analysis.cells import cell_means
 from procedures.analysis.least_squares.chi_square import tail_probability
 from procedures.analysis.least_squares.whitening import whitener
+from procedures.analysis.noise_fit.estimate import Estimate
+from procedures.analysis.noise_fit.likelihood import fit_noise
+from procedures.analysis.noise_fit.powers import slow_powers
 from procedures.analysis.recursive_bias.kalman import RecursiveBias
 from procedures.core.arrays import Array
-from procedures.core.errors import MissingChannel, UnfitRecording
+from procedures.core.errors import DomainError, MissingChannel, UnfitRecording
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import Recording
 
@@ -89,6 +92,35 @@ def observed_covariance(means: Array) -> Array:
     column = np.zeros(len(means))
     column[:2] = variance, correlation * variance
     return np.asarray(toeplitz(column), dtype=np.float64)
+
+
+def spectral_covariance(means: Array, length_s: float) -> Array:
+    """Covariance (n, n) from what the spectrum of the means (n,) over windows of `length_s` says of their noise.
+
+    Quantization, random walk and flicker of `fit_noise`; each coefficient counts with its standard uncertainty added,
+    for the bias leans on a random walk that quantization nearly hides. One not observed at all counts with half of its
+    upper limit, where the random walk is concerned: nothing else keeps the uncertainty from falling for ever. A rate
+    random walk or a ramp is left out: with them there is no constant bias, and `slow_noise_p` says so. Where the
+    spectrum cannot be fitted it is `observed_covariance`. Raises `UnfitRecording` of a constant channel.
+    """
+    observed = observed_covariance(means)
+    try:
+        fit = fit_noise(slow_powers(means, length_s))
+    except DomainError:
+        return observed
+    walk = _with_uncertainty(fit.random_walk) or 0.5 * fit.random_walk.upper_limit
+    if not np.isfinite(walk):
+        return observed
+    noise = NoiseCoefficients(
+        _with_uncertainty(fit.quantization), walk, _with_uncertainty(fit.bias_instability), 0.0, 0.0
+    )
+    edges = np.arange(len(means) + 1, dtype=np.float64) * length_s
+    return contiguous_covariance(noise, np.column_stack([edges[:-1], edges[1:]]))
+
+
+def _with_uncertainty(estimate: Estimate) -> float:
+    """Value and standard uncertainty; zero where the process was not observed."""
+    return 0.0 if estimate.value is None else estimate.value + (estimate.standard_uncertainty or 0.0)
 
 
 def slow_noise_p(means: Array, covariance: Array) -> float:

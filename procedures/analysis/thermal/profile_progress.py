@@ -71,6 +71,46 @@ class LegEvidence:
     """The last reading."""
 
 
+_SAME_C = 1e-9
+"""Readings closer than this are the same."""
+
+
+class ReadingSteps:
+    """By which steps a sensor's readings change, and what drift may hide between two of them.
+
+    The resolution is the smallest change seen. A drift of r shows as a step every q/r at the latest, so a reading that
+    has stood for a time t excludes no drift under q/t. Readings that went up and down meanwhile are dithered by noise,
+    and the line through them knows better.
+    """
+
+    def __init__(self) -> None:
+        self.resolution_c = 0.0
+        """Smallest change between two readings so far [°C]; zero before the first."""
+        self._last: float | None = None
+        self._changed_s = 0.0
+        self._rose_s = self._fell_s = -np.inf
+
+    def take(self, t_s: float, reading_c: float) -> None:
+        """One more reading."""
+        if self._last is None:
+            self._last, self._changed_s = reading_c, t_s
+        change = reading_c - self._last
+        if abs(change) <= _SAME_C:
+            return
+        self.resolution_c = min(self.resolution_c or abs(change), abs(change))
+        self._last, self._changed_s = reading_c, t_s
+        if change > 0.0:
+            self._rose_s = t_s
+        else:
+            self._fell_s = t_s
+
+    def hidden_c_min(self, t_s: float, window_s: float) -> float:
+        """The greatest drift that the readings may hide [°C/min]."""
+        if min(self._rose_s, self._fell_s) >= t_s - window_s:
+            return 0.0
+        return self.resolution_c / max(window_s, t_s - self._changed_s) * MINUTE_S
+
+
 class ProfileProgress:
     """State along a profile. `leg` is the present one, None when all are done."""
 
@@ -81,6 +121,8 @@ class ProfileProgress:
         self._began_s = 0.0
         self._reached_s: float | None = None
         self._soaked_s: float | None = None
+        self._now_s = 0.0
+        self._steps = (ReadingSteps(), ReadingSteps())
         length = max(3, round(profile.criterion.window_s / CHECK_S) + 1)
         self._window: deque[tuple[float, float]] = deque(maxlen=length)
         axis = CHECK_S / MINUTE_S * (np.arange(length) - 0.5 * (length - 1))
@@ -107,13 +149,17 @@ class ProfileProgress:
         leg = self.leg
         if leg is None:
             raise BadParameter("t_s", t_s, "no reading after the profile's end")
+        self._now_s = t_s
         self._window.append((case_c, converter_c))
+        for seen, reading in zip(self._steps, (case_c, converter_c), strict=True):
+            seen.take(t_s, reading)
         criterion = self.profile.criterion
         there = abs(air_c - leg.target_c) <= criterion.air_within_c
         if there and self._reached_s is None:
             self._reached_s = t_s
         slopes = self.slopes_c_min
-        if not (there and all(abs(slope) <= criterion.slope_c_min for slope in slopes)):
+        slow = all(abs(slope) <= criterion.slope_c_min for slope in slopes)
+        if not (there and slow and not self._hidden(t_s)):
             self._soaked_s = None
         elif self._soaked_s is None:
             self._soaked_s = t_s
@@ -123,6 +169,17 @@ class ProfileProgress:
             self._end(leg, t_s, slopes, air_c)
             return Standing.DONE
         return Standing.LATE if since_s >= leg.longest_s else Standing.UNDER_WAY
+
+    def _hidden(self, t_s: float) -> str:
+        """A sentence where a drift beyond the limit may hide in the steps of a sensor's readings, else empty."""
+        limit, window_s = self.profile.criterion.slope_c_min, self.profile.criterion.window_s
+        for name, seen in zip(("case", "converter"), self._steps, strict=True):
+            if seen.hidden_c_min(t_s, window_s) > limit:
+                return (
+                    f"the {name} reads in steps of {seen.resolution_c:g} °C, so that it must stand still for "
+                    f"{seen.resolution_c / limit * MINUTE_S:.0f} s to show a drift under {limit:g} °C/min"
+                )
+        return ""
 
     def why_late(self, air_c: float) -> str:
         """A sentence on what the present leg lacks."""
@@ -138,6 +195,7 @@ class ProfileProgress:
                 f"the unit still drifts by {case:+.3f} °C/min at its case and {converter:+.3f} °C/min at its converter "
                 f"(allowed: {criterion.slope_c_min:g}, for {leg.least_soak_s:g} s), the air is at {air_c:.1f} °C"
             )
+            what = "; ".join(filter(None, (what, self._hidden(self._now_s))))
         return f"{number}, is not soaked {leg.longest_s:g} s after it was begun: {what}"
 
     def _end(self, leg: ProfileLeg, t_s: float, slopes: tuple[float, float], air_c: float) -> None:

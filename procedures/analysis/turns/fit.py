@@ -43,6 +43,8 @@ RAMP_SQUARE, RAMP_CUBE = 13.0 / 35.0, 43.0 / 140.0
 UNKNOWN_NOISE_SD = units.ARCSEC
 """Stands in [rad] for a noise that is not known until the residuals scale it."""
 
+_CROSS = np.eye(9).reshape(9, 3, 3)[[1, 2, 3, 5, 6, 7]]
+"""A matrix of one for each cross-coupling, (6, 3, 3)."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 
 
@@ -198,11 +200,14 @@ def turn_estimator(
     noise: Array | None,
     flaws: TableErrors,
     matrix: Array,
+    cross_sd: float = 0.0,
 ) -> TurnEstimator:
     """``x̂ = (AᵀS⁻¹A)⁻¹AᵀS⁻¹·y`` with ``S = C + F·Fᵀ``, C the noise of the integrated outputs and F the table's flaws.
 
     `noise` (3, n, n) is the covariance of the station means [(rad/s)²], None where it is not known: then all outputs
-    weigh alike, and only the flaws that stay through the job are added. `matrix` K carries the flaws into the outputs.
+    weigh alike, and only the flaws that stay through the job are added. `matrix` K carries the flaws into the outputs;
+    its cross-couplings may each be off by `cross_sd`, as before a unit is calibrated: an axis that lies wrong by ε puts
+    ``K_ij·ε`` into a scale factor, of which the diagonal of K knows nothing.
     Raises `Undetermined` naming what the rates cannot tell apart.
     """
     columns = design(motion, slopes, terms, reference_rad_s)
@@ -213,14 +218,16 @@ def turn_estimator(
     )
     seconds = np.outer(motion.seconds, motion.seconds)
     own = np.eye(channels * n) * UNKNOWN_NOISE_SD**2 if noise is None else block_diag(*[c * seconds for c in noise])
-    of_table = flaws.of_outputs(matrix).transpose(1, 0, 2).reshape(channels * n, -1)
+    matrices = [matrix, *(cross_sd * unknown for unknown in _CROSS if cross_sd > 0.0)]
+    of_table = np.hstack([flaws.of_outputs(m).transpose(1, 0, 2).reshape(channels * n, -1) for m in matrices])
+    source = flaws.source * len(matrices)
     if noise is None:
-        of_table = of_table * np.array([source != "pointing" for source in flaws.source], dtype=np.float64)
+        of_table = of_table * np.array([s != "pointing" for s in source], dtype=np.float64)
         weights = whitener(own)
     else:
         weights = whitener(own + of_table @ of_table.T)
     gain = scaled_pinv(weights @ block_diag(*columns)) @ weights
-    return TurnEstimator(columns, gain, weights, gain @ own @ gain.T, gain @ of_table, flaws.source, condition)
+    return TurnEstimator(columns, gain, weights, gain @ own @ gain.T, gain @ of_table, source, condition)
 
 
 @dataclass(frozen=True)

@@ -71,11 +71,14 @@ class TurnPlan:
     uncertainty: TableUncertainty
     terms: tuple[Term, ...]
     reference_rad_s: float
+    cross_coupling_sd: float = 0.0
+    """Of each cross-coupling of a unit that has no calibration."""
 
     def estimator(self) -> TurnEstimator | None:
         """What the plan will give; None where the unit's noise is not known. Raises `Undetermined`.
 
-        K is that of the current calibration, else the identity (nominal outputs).
+        K is that of the current calibration, else the identity (nominal outputs) with cross-couplings of
+        `cross_coupling_sd`: they carry the table's orthogonality into the scale factors.
         """
         stations = self.program.stations()
         spans = windows(stations, self.axes)
@@ -85,7 +88,8 @@ class TurnPlan:
         matrix = np.eye(3) if known is None else known
         flaws = turn_flaws(motion, self.uncertainty)
         slopes = motion.axis_b @ matrix.T
-        made = turn_estimator(motion, slopes, self.terms, self.reference_rad_s, noise, flaws, matrix)
+        cross_sd = self.cross_coupling_sd if known is None else 0.0
+        made = turn_estimator(motion, slopes, self.terms, self.reference_rad_s, noise, flaws, matrix, cross_sd)
         return None if noise is None else made
 
     def times_longer(self, factor: int) -> "TurnPlan":

@@ -7,6 +7,7 @@ from math import isfinite
 import numpy as np
 
 from procedures.analysis.thermal.correlation import correlation
+from procedures.analysis.thermal.cycle.fitted_range import extrapolated, range_of
 from procedures.analysis.thermal.cycle.forms import RunSoaks, normalised_triad, soak_table, soaks_of, worth
 from procedures.analysis.thermal.cycle.gyros import found, gyro_noises, gyro_temperatures
 from procedures.analysis.thermal.cycle.results import (
@@ -76,7 +77,7 @@ def analyse_cycle(
     cells = [run.cells for run in runs]
     lags = (settings.lag_sd_s, settings.lag_sd_s)
     fitted, fits = fit_correction(cells, settings.reference_c, form, lags)
-    correction = replace(fitted, first_stage=converter)
+    correction = replace(fitted, first_stage=converter, fitted_range=range_of(cells))
     judged = known.correction if judge_current and known.correction is not None else correction
     soaked = [soaks_of(run, judged.axes[0].case_reference_c) for run in runs]
     comparable = known.correction if known.correction and known.correction.first_stage == converter else None
@@ -103,7 +104,7 @@ def analyse_cycle(
         gyros=gyro_temperatures(runs, settings, None if noise_from_cycle else known.gyro_noise),
         gyro_noise=gyro_noises(runs, settings, known.gyro_noise),
         allan=tuple(curve for run in runs for curve in allan_of(run, judged)),
-        warnings=(*warnings, *refused, *_doubts(found_runs, soaked, axes, settings)),
+        warnings=(*warnings, *refused, *_doubts(found_runs, soaked, axes, settings), *extrapolated(cells, judged)),
     )
 
 
