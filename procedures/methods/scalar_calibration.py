@@ -137,7 +137,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     start = start_from_data(poses.outputs, reference) if poses.output_unit == "count" else nominal_start()
     what = f"the nine scalar {params.triad} parameters"
     fit = fit_scalar(what, poses.outputs, poses.noise, reference, start, poses.known)
-    gains = np.diagonal(np.linalg.inv(fit.correction))
+    gains: Array = np.diagonal(np.linalg.inv(fit.correction)).astype(np.float64)
     require_plausible_scales(params.triad, gains, poses.output_unit != "count")
     return _result(fit, params, poses)
 
