@@ -5,6 +5,7 @@ from contextlib import ExitStack, asynccontextmanager
 from functools import partial
 from importlib.metadata import version
 
+from anyio import CapacityLimiter
 from fastapi import Depends, FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
@@ -51,6 +52,8 @@ from bench_service.settings import Settings
 from bench_service.telemetry.code_version import code_version
 from bench_service.telemetry.tracing import traces_to
 
+IMPORT_THREADS = 4
+"""Imports that are stored or wait for a reader at one time; more wait without a thread."""
 DRAWINGS = 30
 """So many figures may be drawn or wait at one time."""
 ROUTERS = (
@@ -187,6 +190,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
     app.state.service = service
     app.state.hub = EventHub(service.stores.jobs, service.live, event_stream.FRAMES)
     app.state.max_import_bytes = max_import_bytes
+    app.state.import_threads = CapacityLimiter(IMPORT_THREADS)
     for module in ROUTERS:
         app.include_router(module.router)
     for page in (static_files, docs, images, pages, campaign_pages):

@@ -129,6 +129,7 @@ class BenchService:
         self.campaigns.conductor.stop()
         if self._worker is not None:
             self._worker.shut_down()
+        self.imports.close()
 
     def _wake(self, bench_id: str) -> None:
         """There may be something to do for a bench: for this process's worker, or for one beside it on this host."""

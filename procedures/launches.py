@@ -109,13 +109,12 @@ def analyse_launches(result: type[R], recordings: Sequence[Recording], params: N
 
 
 def _warnings(launches: Sequence[LaunchNoise]) -> tuple[str, ...]:
-    """What the inspection and the noise model say of each channel, each sentence once."""
+    """What the noise model says of each channel, each sentence once; what the inspection says is added elsewhere."""
     several = len(launches) > 1
     found: list[str] = []
     for launch in launches:
         begin = f"{launch.label}, " if several else ""
         for channel in launch.channels:
-            found += channel.findings
             found += (f"{begin}{channel.channel}: {sentence}" for sentence in channel.warnings)
     return tuple(dict.fromkeys(found))
 

@@ -3,6 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Any
 
+from anyio import CapacityLimiter, to_thread
 from fastapi import APIRouter, File, Form, Query, Request, Response, UploadFile
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import StreamingResponse
@@ -17,6 +18,7 @@ from bench_service.formats.import_file import ImportFile
 from bench_service.formats.plain_json import shown
 from bench_service.mapping import copied
 from bench_service.model.records import RecordingState, StoredRecording
+from bench_service.service import BenchService
 from procedures.core.errors import BadParameter
 from procedures.core.recording import Channel, Station
 
@@ -43,12 +45,14 @@ class RecordingView(BaseModel):
     stored_bytes: int
     chunks: int
     created_at: datetime
-    source: dict[str, Any]
+    source: dict[str, Any] = Field(description="Of an import: files, description, and `clock`, what its stamps say")
+    warnings: list[str] = Field(description="Of an import: what was found in the file that a person should know")
     results: list[str] | None = Field(None, description="Results that used it; only where one recording is asked for")
 
     @classmethod
     def of(cls, stored: StoredRecording, results: tuple[str, ...] | None = None) -> "RecordingView":
-        return copied(cls, stored, stored.info, job=stored.job_id, results=results)
+        warnings = [str(warning) for warning in stored.source.get("warnings", ())]
+        return copied(cls, stored, stored.info, job=stored.job_id, warnings=warnings, results=results)
 
 
 class RecordingPage(BaseModel):
@@ -110,9 +114,11 @@ def read_data(
 
 
 @router.post(
-    "", status_code=201, responses={**problems(409, 507), **made(201, "recording_id", "read_recording", "read_data")}
+    "",
+    status_code=201,
+    responses={**problems(409, 413, 507), **made(201, "recording_id", "read_recording", "read_data")},
 )
-def import_recording(
+async def import_recording(
     request: Request,
     response: Response,
     service: Service,
@@ -135,6 +141,15 @@ def import_recording(
     if size > limit:
         raise BadParameter("files", f"{size} bytes", f"at most {limit} bytes (BENCH_MAX_IMPORT_MB)")
     parts = [ImportFile(shown(file.filename or f"file {number}"), file.file) for number, file in enumerate(files)]
-    info = service.imports.import_recording(parts, wanted, key)
-    response.headers["Location"] = f"/api/v1/recordings/{info.id}"
-    return RecordingView.of(service.stores.recordings.get(info.id))
+    # Readers of files wait for one another in threads of their own: those that answer everything else stay free.
+    limiter: CapacityLimiter = request.app.state.import_threads
+    stored = await to_thread.run_sync(_imported, service, parts, wanted, key, limiter=limiter)
+    response.headers["Location"] = f"/api/v1/recordings/{stored.info.id}"
+    return RecordingView.of(stored)
+
+
+def _imported(
+    service: BenchService, files: list[ImportFile], description: ImportDescription, key: str | None
+) -> StoredRecording:
+    info = service.imports.import_recording(files, description, key)
+    return service.stores.recordings.get(info.id)

@@ -6,6 +6,7 @@ Tables and progress bars are imported by the commands that show them: a server t
 import json
 import logging
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -159,10 +160,13 @@ def import_(
 ) -> None:
     """Import a recorded file, or several that are columns of one recording."""
     data = {"description": text_of(description)}
-    with connect(context.obj, server, drive=False) as client:
-        parts = [("files", (path.name, path.read_bytes(), "application/octet-stream")) for path in files]
-        recording = call(client, "POST", "/api/v1/recordings", ("id",), files=parts, data=data)
+    with connect(context.obj, server, drive=False) as client, ExitStack() as closing:
+        opened = [(path.name, closing.enter_context(path.open("rb"))) for path in files]
+        parts = [("files", (name, file, "application/octet-stream")) for name, file in opened]
+        recording = call(client, "POST", "/api/v1/recordings", ("id", "warnings"), files=parts, data=data)
     console.print_json(json.dumps(recording))
+    for warning in recording["warnings"]:
+        errors.print(f"warning: {warning}", soft_wrap=True)
 
 
 @app.command()

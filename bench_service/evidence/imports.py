@@ -1,12 +1,15 @@
 """Imports: recorded files that come in as recordings of a unit."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from datetime import timedelta
 
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.evidence.units import register
 from bench_service.formats.description import ImportDescription
-from bench_service.formats.import_file import ImportFile, read_import
+from bench_service.formats.import_file import Imported, ImportFile
+from bench_service.formats.reader.client import FileReader, NoReader, NoRoom
+from bench_service.model.errors import NotReady, StorageFull
 from bench_service.model.records import Idempotency, NewRecording
 from bench_service.model.request import fingerprint
 from bench_service.wall_clock import now
@@ -22,6 +25,11 @@ class ImportService:
 
     def __init__(self, stores: EvidenceStores) -> None:
         self._stores = stores
+        self._reader = FileReader()
+
+    def close(self) -> None:
+        """End the process that reads files."""
+        self._reader.close()
 
     def discard_crashed(self) -> int:
         """Remove imports that a crash left unsealed; the number removed."""
@@ -34,7 +42,22 @@ class ImportService:
 
         Raises `DomainError` naming file and row, `StorageFull`; then nothing of the recording remains.
         """
-        imported = read_import(files, description)
+        with self._reading(files, description) as imported:
+            return self._store(imported, key)
+
+    @contextmanager
+    def _reading(self, files: Sequence[ImportFile], description: ImportDescription) -> Generator[Imported]:
+        """Files that are read in a process of their own."""
+        try:
+            with self._reader.reading(files, description) as imported:
+                yield imported
+        except NoRoom as error:
+            raise StorageFull(str(error)) from error
+        except NoReader as error:
+            raise NotReady([str(error)]) from error
+
+    def _store(self, imported: Imported, key: str | None) -> RecordingInfo:
+        description = imported.description
         idempotency = None if key is None else Idempotency(f"recordings:{key}", fingerprint(imported.source))
         recordings = self._stores.recordings
         known = self._stores.keys.made(idempotency, "recording")
@@ -50,6 +73,7 @@ class ImportService:
                 simulated=description.simulated,
                 dtype=imported.dtype,
                 source=imported.source,
+                gaps=description.gaps == "mark",
                 idempotency=idempotency,
             )
         )

@@ -1,182 +1,138 @@
 """Columns of numbers out of delimited text, plain or gzipped, a block at a time.
 
-Arrow reads the numbers fast; where it stumbles, the file is read again slowly to say which line is wrong and why.
+Arrow reads the numbers fast; where it stumbles, the piece is read again slowly to say which line is wrong and why.
 """
 
-import gzip
-import io
-import math
 import re
-import zlib
 from collections.abc import Iterator, Sequence
-from typing import Any, BinaryIO, cast
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 from pyarrow import csv
 
+from bench_service.formats.blocks import Block
+from bench_service.formats.bounds import LINE_BYTES, Bounds
+from bench_service.formats.clock_text import NoClock, nanoseconds
 from bench_service.formats.description import DELIMITERS, Column, ImportDescription
 from bench_service.formats.errors import UnreadableFile
+from bench_service.formats.text_cells import first_fault
+from bench_service.formats.text_source import too_long
+from bench_service.formats.text_table import TextTable
 from procedures.core.arrays import Array
 
 _BLOCK_BYTES = 4 * 1024 * 1024
-_LONGEST_LINE_BYTES = 1024 * 1024
 _BLANKS = re.compile(rb"[ \t]+")
-_MARGINS = re.compile(rb"(?m)^[ \t]+|[ \t]+\r?$")
-
-
-def text_columns(
-    stream: BinaryIO, name: str, columns: Sequence[Column], description: ImportDescription
-) -> Iterator[Array]:
-    """The named columns, block by block, each (n, len(columns)). Raises `UnreadableFile`."""
-    try:
-        yield from _fast(stream, name, columns, description)
-    except (pa.ArrowInvalid, _NotANumber) as error:
-        _say_which_line(stream, name, columns, description)
-        raise UnreadableFile(name, f"cannot be read as a table of numbers: {error}") from error
-    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-        raise UnreadableFile(name, f"the compressed file is cut off or damaged ({error})") from error
+_MARGINS = re.compile(rb"(?m)^\t|\t(?=\r?$)")
+"""Tabs at the ends of lines, in a text whose blanks are single tabs: on blanks it would take their square."""
 
 
 class _NotANumber(Exception):
-    """A cell is empty, NaN or infinite."""
+    """A cell is empty, NaN or infinite where it may not be."""
 
 
-class _Table:
-    """The text after the lines that are no data, with the names of its columns."""
-
-    def __init__(self, stream: BinaryIO, name: str, description: ImportDescription) -> None:
-        self._name = name
-        self._delimiter = DELIMITERS[description.delimiter]
-        self.text = _opened(stream)
-        for _ in range(description.header_lines):
-            self.text.readline()
-        head = self.text.readline()
-        self.first_line = description.header_lines + 1
-        self.names: list[str] | None = None
-        self.rest = b""
-        if description.header:
-            self.names = [c.decode("utf-8-sig", errors="replace").strip().strip('"') for c in self.cells(head)]
-            self.first_line += 1
-        else:
-            self.rest = head
-        self.width = len(self.cells(head))
-        if not head.strip():
-            raise UnreadableFile(name, f"line {description.header_lines + 1} is empty; a table was expected there")
-
-    def cells(self, line: bytes) -> list[bytes]:
-        """The cells of a line."""
-        return line.split() if self._delimiter == b" " else line.rstrip(b"\r\n").split(self._delimiter)
-
-    def indices(self, columns: Sequence[Column]) -> list[int]:
-        """Where the columns stand. Raises `UnreadableFile`."""
-        present = ", ".join(self.names) if self.names else f"0 … {self.width - 1}"
-        found: list[int] = []
-        for column in columns:
-            if isinstance(column, str):
-                if self.names is None or self.names.count(column) != 1:
-                    raise UnreadableFile(self._name, f"there is not one column {column!r}; the columns are {present}")
-                column = self.names.index(column)
-            if not 0 <= column < self.width:
-                raise UnreadableFile(self._name, f"there is no column {column}; the columns are {present}")
-            found.append(column)
-        return found
+def text_columns(
+    stream: BinaryIO, name: str, columns: Sequence[Column], description: ImportDescription, bounds: Bounds
+) -> Iterator[Block]:
+    """The named columns, block by block, the time first where the description has one. Raises `UnreadableFile`."""
+    table = TextTable(stream, name, description, bounds)
+    reader = _Reader(table, name, columns, description)
+    for number, text in _pieces(table, description):
+        if not text.strip():
+            continue
+        try:
+            yield reader.block(text)
+        except (pa.ArrowInvalid, _NotANumber, NoClock) as error:
+            problem = first_fault(table, text, number, columns, reader.indices, description)
+            raise UnreadableFile(name, problem or f"cannot be read as a table of numbers: {_short(error)}") from error
 
 
-def _fast(stream: BinaryIO, name: str, columns: Sequence[Column], description: ImportDescription) -> Iterator[Array]:
-    table = _Table(stream, name, description)
-    indices = table.indices(columns)
-    names = [f"c{index}" for index in range(table.width)]
-    wanted = [names[index] for index in indices]
-    blanks = description.delimiter == "whitespace"
-    delimiter = "," if blanks else DELIMITERS[description.delimiter].decode()
-    for text in _pieces(table, blanks):
-        parsed = csv.read_csv(
+class _Reader:
+    """Makes blocks of whole lines of a table."""
+
+    def __init__(self, table: TextTable, name: str, columns: Sequence[Column], description: ImportDescription) -> None:
+        self._description = description
+        self.indices = table.indices(columns)
+        self._names = [f"c{index}" for index in range(table.width)]
+        wanted = [self._names[index] for index in self.indices]
+        self._time = wanted.pop(0) if description.time_column is not None else None
+        self._values = wanted
+        self._blanks = description.delimiter == "whitespace"
+        self._delimiter = "\t" if self._blanks else DELIMITERS[description.delimiter].decode()
+        self._stamps = pa.string() if description.time_unit == "clock" else pa.int64()
+        self._missing = description.gaps == "mark"
+
+    def block(self, text: bytes) -> Block:
+        """The block of some whole lines. Raises `ArrowInvalid`, `_NotANumber`, `NoClock`."""
+        if self._blanks:
+            text = _MARGINS.sub(b"", _BLANKS.sub(b"\t", text))
+        parsed = self._parsed(text)
+        values = np.empty((parsed.num_rows, len(self._values)))
+        for position, column in enumerate(self._values):
+            values[:, position] = parsed.column(column).to_numpy()
+        if np.any(np.isinf(values)) or (not self._missing and np.any(np.isnan(values))):
+            raise _NotANumber("a cell is empty or not a finite number")
+        return Block(None if self._time is None else self._times(parsed.column(self._time)), values)
+
+    def _parsed(self, text: bytes) -> Any:
+        """Arrow's table; a time column that holds integers stays so, until a piece has another number in it."""
+        try:
+            return self._read(text)
+        except pa.ArrowInvalid:
+            if self._time is None or self._stamps != pa.int64():
+                raise
+            self._stamps = pa.float64()
+            return self._read(text)
+
+    def _read(self, text: bytes) -> Any:
+        types = dict.fromkeys(self._values, pa.float64())
+        if self._time is not None:
+            types[self._time] = self._stamps
+        return csv.read_csv(
             pa.BufferReader(text),
-            csv.ReadOptions(use_threads=True, column_names=names),
-            csv.ParseOptions(delimiter=delimiter),
+            csv.ReadOptions(use_threads=False, column_names=self._names),
+            csv.ParseOptions(delimiter=self._delimiter),
             csv.ConvertOptions(
-                column_types=dict.fromkeys(wanted, pa.float64()),
-                include_columns=list(dict.fromkeys(wanted)),
-                null_values=[""],
+                column_types=types,
+                include_columns=list(types),
+                null_values=["", "NaN", "nan"] if self._missing else [""],
+                decimal_point=self._description.decimal,
             ),
         )
-        block = np.column_stack([parsed.column(column).to_numpy() for column in wanted])
-        if not np.all(np.isfinite(block)):
-            raise _NotANumber("a cell is empty or not a finite number")
-        yield block
+
+    def _times(self, column: Any) -> NDArray[np.int64] | Array:
+        if self._stamps == pa.string():
+            return nanoseconds(column.combine_chunks(), self._description.clock_fraction)
+        if column.null_count:
+            raise _NotANumber("a stamp is missing")
+        stamps = column.to_numpy()
+        if not np.all(np.isfinite(stamps)):
+            raise _NotANumber("a stamp is no finite number")
+        return stamps
 
 
-def _pieces(table: _Table, blanks: bool) -> Iterator[bytes]:
-    """The text in pieces that end with a line, blanks between cells made commas where they delimit."""
-    rest = table.rest
-    while True:
-        more = table.text.read(_BLOCK_BYTES)
-        cut = more.rfind(b"\n") + 1
-        if more and not cut:
-            rest += more
-            if len(rest) > _LONGEST_LINE_BYTES:
-                raise pa.ArrowInvalid("a line has no end")
-            continue
-        piece, rest = (rest + more[:cut], more[cut:]) if more else (rest, b"")
-        if piece.strip():
-            yield _BLANKS.sub(b",", _MARGINS.sub(b"", piece)) if blanks else piece
-        if not more:
-            return
+def _pieces(table: TextTable, description: ImportDescription) -> Iterator[tuple[int, bytes]]:
+    """Whole lines of the rows that are wanted, with the number of the first. Raises `UnreadableFile`."""
+    number, row = table.first_line, 1
+    first, last = description.rows.first, description.rows.last
+    while piece := table.text.piece(_BLOCK_BYTES):
+        if len(piece) > LINE_BYTES and piece.find(b"\n", 0, LINE_BYTES) < 0:
+            raise too_long(table.name, number)
+        lines = piece.count(b"\n")
+        if first == 1 and last is None:
+            yield number, piece
+        else:
+            filled = [line for line in piece.splitlines(keepends=True) if line.strip()]
+            part = filled[max(0, first - row) : None if last is None else max(0, last - row + 1)]
+            row += len(filled)
+            if part:
+                yield number, b"".join(part)
+            if last is not None and row > last:
+                return
+        number += lines
 
 
-def _say_which_line(stream: BinaryIO, name: str, columns: Sequence[Column], description: ImportDescription) -> None:
-    """Read again, a line at a time, and raise `UnreadableFile` for the first that is wrong."""
-    table = _Table(stream, name, description)
-    indices = table.indices(columns)
-    lines = iter(lambda: table.text.readline(_LONGEST_LINE_BYTES), b"")
-    if table.rest:
-        lines = (line for part in ([table.rest], lines) for line in part)
-    for number, line in enumerate(lines, table.first_line):
-        if not line.strip():
-            continue
-        cells = table.cells(line)
-        if len(cells) != table.width:
-            cut = "" if line.endswith(b"\n") else "; the file seems to be cut off"
-            raise UnreadableFile(name, f"line {number} has {len(cells)} columns, {table.width} were expected{cut}")
-        for column, index in zip(columns, indices, strict=True):
-            cell = cells[index].decode(errors="replace").strip().strip('"')
-            if not _is_number(cell):
-                raise UnreadableFile(
-                    name, f"line {number}, column {column!r}: {cell!r} where a finite number was expected"
-                )
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        return math.isfinite(float(cell))
-    except ValueError:
-        return False
-
-
-def _opened(stream: BinaryIO) -> BinaryIO:
-    """The text of a file from its beginning, unpacked where it is gzipped."""
-    stream.seek(0)
-    packed = stream.read(2) == b"\x1f\x8b"
-    stream.seek(0)
-    return (
-        cast(BinaryIO, gzip.GzipFile(fileobj=stream, mode="rb"))
-        if packed
-        else cast(BinaryIO, io.BufferedReader(cast(Any, _Kept(stream))))
-    )
-
-
-class _Kept(io.RawIOBase):
-    """A stream of somebody else's: read here, closed by its owner."""
-
-    def __init__(self, stream: BinaryIO) -> None:
-        super().__init__()
-        self._stream = stream
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: bytearray) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
-        data = self._stream.read(len(buffer))
-        buffer[: len(data)] = data
-        return len(data)
+def _short(error: Exception) -> str:
+    """The beginning of what Arrow says: it repeats the line."""
+    return str(error)[:200]

@@ -1,12 +1,14 @@
-"""What a person says of a file that is to be imported: which column is which channel, and in which unit.
+"""A person's description of a file that is to be imported: which column is which channel, and in which unit.
 
 Nothing is guessed: a channel without a unit, or an unknown key, is refused before the file is opened.
 """
 
+from enum import StrEnum
 from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from bench_service.formats.input_units import stored_channel
 from procedures.core.recording import Channel, Quantity
 from procedures.core.unit import SERIAL
 
@@ -14,6 +16,22 @@ Column = str | int
 """By name, or by index from 0."""
 
 DELIMITERS = {",": b",", ";": b";", "tab": b"\t", "whitespace": b" "}
+
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Seconds in one unit of a time column that holds numbers."""
+
+
+class Accumulated(StrEnum):
+    """Quantity that a column adds up since some beginning; its steps from row to row are stored as increments."""
+
+    ANGLE = "angle"
+    VELOCITY = "velocity"
+
+
+_INCREMENT_OF = {
+    Accumulated.ANGLE: Quantity.ANGLE_INCREMENT,
+    Accumulated.VELOCITY: Quantity.VELOCITY_INCREMENT,
+}
 
 
 class _Strict(BaseModel):
@@ -26,23 +44,50 @@ class ImportedChannel(_Strict):
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,63}$", description="e.g. gyro_x")
     column: Column | None = Field(None, description="name, or index from 0; None: the column of the channel's name")
     file: int = Field(0, ge=0, description="which of the files, from 0")
-    quantity: Quantity
-    unit: str = Field(description="of scale·(raw − offset); count: the scale is not known")
+    quantity: Quantity | Accumulated = Field(
+        description="angle and velocity are accumulated values (a phase): their steps are stored as increments"
+    )
+    unit: str = Field(description="of scale·(raw − offset): rad/s, deg/s, m/s^2, g, …; count: the scale is not known")
     scale: float = 1.0
     offset: float = 0.0
+    period: float | None = Field(
+        None, gt=0, description="of an angle or velocity: where its raw value begins again, 360 or 65536 for example"
+    )
 
     @model_validator(mode="after")
     def _means_something(self) -> Self:
+        if self.period is not None and not self.is_accumulated:
+            raise ValueError(f"channel {self.name!r}: period is for the quantities angle and velocity")
         self.channel()
         return self
 
+    @property
+    def is_accumulated(self) -> bool:
+        """Whether the steps of the column are stored, not its values."""
+        return isinstance(self.quantity, Accumulated)
+
     def channel(self) -> Channel:
-        """The channel of the recording."""
-        return Channel(self.name, self.quantity, self.unit, self.scale, self.offset)
+        """The channel of the recording, in the unit that is stored."""
+        if isinstance(self.quantity, Accumulated):
+            return stored_channel(self.name, _INCREMENT_OF[self.quantity], self.unit, self.scale, 0.0)
+        return stored_channel(self.name, self.quantity, self.unit, self.scale, self.offset)
 
     @property
     def source_column(self) -> Column:
         return self.name if self.column is None else self.column
+
+
+class Rows(_Strict):
+    """A part of a table, counted in rows of data from 1; both ends belong to it."""
+
+    first: int = Field(1, ge=1)
+    last: int | None = Field(None, ge=1, description="None: to the end")
+
+    @model_validator(mode="after")
+    def _is_in_order(self) -> Self:
+        if self.last is not None and self.last < self.first:
+            raise ValueError(f"rows: the last, {self.last}, is before the first, {self.first}")
+        return self
 
 
 class ImportDescription(_Strict):
@@ -52,12 +97,29 @@ class ImportDescription(_Strict):
     channels: tuple[ImportedChannel, ...] = Field(min_length=1, max_length=64)
     rate_hz: float | None = Field(None, gt=0, description="where there is no time column, or to be checked against it")
     time_column: Column | None = Field(None, description="name, or index from 0, the same in every file")
-    time_unit: Literal["s", "ms", "us", "ns"] = "s"
+    time_unit: Literal["s", "ms", "us", "ns", "clock"] = Field(
+        "s",
+        description="of numbers; clock: text such as 14:03:59.250, or with a date; typed time stamps know their own",
+    )
+    clock_fraction: Literal["decimal", "ms", "us"] = Field(
+        "decimal", description="of a clock's text: ms where 31.18 means 31.018 s, milliseconds without leading zeros"
+    )
+    unwrap_clock: bool = Field(False, description="whether a counter of time that began again is carried on")
+    repeats: Literal["refuse", "drop"] = Field("refuse", description="rows that were written twice with one time")
+    gaps: Literal["refuse", "mark"] = Field(
+        "refuse", description="lost rows; mark: NaN takes their place, for analyses that leave gaps out"
+    )
     start_s: float = Field(0.0, description="bench time of the first sample")
+    rows: Rows = Field(
+        default_factory=lambda: Rows.model_validate({}), description="the part of the table that is read"
+    )
     header_lines: int = Field(0, ge=0, le=10_000, description="lines of a text file before the table")
     header: bool = Field(True, description="whether a line of column names follows (text files)")
     delimiter: Literal[",", ";", "tab", "whitespace"] = ","
-    gap_tolerance: float = Field(0.2, gt=0, lt=1, description="of a time step against the median, relative")
+    decimal: Literal[".", ","] = Field(".", description="the decimal mark of a text file's numbers")
+    gap_tolerance: float = Field(
+        0.2, gt=0, lt=1, description="of a time step against the sample period, relative: less is never looked at"
+    )
     rate_tolerance: float = Field(
         0.005, gt=0, lt=1, description="of rate_hz, and of every 256 rows, against the time column, relative"
     )
@@ -80,8 +142,8 @@ class ImportDescription(_Strict):
 
     @property
     def time_scale_s(self) -> float:
-        """Seconds in one unit of the time column."""
-        return {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[self.time_unit]
+        """Seconds in one unit of the time column; text of a clock is read in nanoseconds."""
+        return SECONDS.get(self.time_unit, 1e-9)
 
     def declared(self) -> dict[str, Any]:
         """As JSON, to be kept with the recording."""

@@ -15,7 +15,7 @@ from bench_service.bench.stop.word import StopWord
 from bench_service.jobs.stop_entry import StopEntry
 from bench_service.jobs.stop_ledger import StopLedger
 from bench_service.jobs.stores import JobStores
-from bench_service.model.errors import NotFound, ServiceError, SeveralStops
+from bench_service.model.errors import NotFound, ServiceError, SeveralStops, StorageFailure
 from bench_service.model.records import BenchStop
 from bench_service.telemetry.audit import AuditTrail
 from bench_service.wall_clock import monotonic_s, now
@@ -63,7 +63,7 @@ class StopService:
 
         `by`: who stops it; `via`: over which way. It waits for the bench and for the books, for a second each at the
         most, and neither waits for the other; where it is not `patient`, for neither. Raises `NotFound` for a bench
-        that nobody knows.
+        that nobody knows, and `StorageFailure` where the stop has reached neither bench nor books.
         """
         books_by_s = monotonic_s() + (BOOKS_S if patient else 0.0)
         word = StopWord(reason, by, via)
@@ -76,9 +76,9 @@ class StopService:
             job = job or (safety.devices.job if safety.devices is not None and safety.worker is not None else None)
         else:
             job, books = self._entered(entering, books_by_s - monotonic_s())
-            safety = found or (
-                self._safety.stopping_elsewhere(bench_id) if not books else self._roads.unreached(bench_id)
-            )
+            if found is None and books:
+                raise StorageFailure(f"{self._roads.unreached(bench_id)} ({books}; it is tried again)")
+            safety = found or self._safety.stopping_elsewhere(bench_id)
         return Stopped(BenchStop(bench_id, word.at, reason, by=by, id=word.id), job, safety, books)
 
     def _enter(self, bench_id: str, word: StopWord) -> str | None:

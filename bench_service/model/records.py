@@ -73,6 +73,8 @@ class NewRecording:
     station: Station | None = None
     source: dict[str, Any] = field(default_factory=dict[str, Any])
     launched_s: float | None = None
+    gaps: bool = False
+    """Whether samples may be NaN, in the place of those that are missing."""
     idempotency: Idempotency | None = None
     """A client's key, remembered when the recording is sealed."""
 

@@ -55,6 +55,9 @@ class Params(RecordedParameters):
         "every whole number of samples; or a list [s], each taken as the nearest whole number of samples",
     )
     confidence: float = Field(0.6827, gt=0.0, lt=1.0, description="of the intervals")
+    gaps: Literal["refuse", "leave_out"] = Field(
+        "refuse", description="samples that are NaN; leave_out: every term that touches one is left out"
+    )
 
 
 @dataclass(frozen=True)
@@ -159,6 +162,7 @@ def _deviations(
                 sizes=sizes,
                 increments=channel.quantity in INCREMENTS,
                 confidence=params.confidence,
+                gaps="refuse" if params.gaps == "refuse" else "aware",
                 correlate=correlate,
             )
             for channel in channels
@@ -226,7 +230,8 @@ def _figure(curve: Curve, name: str, confidence: float) -> Figure:
 
 def inspection(params: Params, count: int) -> Inspection:
     """Each recording by itself, the channels that are asked for."""
-    return Inspection(FitnessSettings(least_samples=1), params.channels)
+    gaps = "refuse" if params.gaps == "refuse" else "aware"
+    return Inspection(FitnessSettings(least_samples=1, gaps=gaps), params.channels)
 
 
 METHOD = Method(

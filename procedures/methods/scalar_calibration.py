@@ -3,7 +3,6 @@
 For recordings at several stations, or for one long recording of a unit turned by hand from pose to pose.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Self
 
@@ -17,13 +16,13 @@ from procedures.analysis.calibration.misfit import (
     require_plausible_scales,
     scalar_misfit,
 )
+from procedures.analysis.calibration.poses import Poses, rows_as_poses, station_poses
 from procedures.analysis.calibration.reference import INPUT_UNITS
 from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, fit_scalar, nominal_start, start_from_data
 from procedures.analysis.calibration.slow_noise import slow_share
-from procedures.analysis.calibration.station_means import station_means
 from procedures.analysis.calibration.station_noise import outputs_covariance
 from procedures.analysis.calibration.still import StillSettings, pose_excess, pose_means, still_stretches
-from procedures.analysis.calibration.triad_analysis import noise_of_means, scatter_covariance
+from procedures.analysis.calibration.triad_analysis import scatter_covariance
 from procedures.analysis.fitness.watched import Inspection
 from procedures.core import units
 from procedures.core.arrays import Array
@@ -57,6 +56,15 @@ class Params(RecordedParameters):
     triad: Literal["accelerometer", "gyro"] = "accelerometer"
     gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9, description="needed for the accelerometers")
     earth_rate_rad_s: float = Field(units.EARTH_RATE, ge=7.0e-5, le=7.6e-5)
+    rows: Literal["samples", "pose_means"] = Field(
+        "samples",
+        description="of a single recording; pose_means: each row is the mean over a pose, no stretch is sought",
+    )
+    pose_sd: float | None = Field(
+        None,
+        gt=0.0,
+        description="standard uncertainty of pose means, in the recording's unit; None: from the residuals",
+    )
     still: Still = Field(default_factory=lambda: Still.model_validate({}))
     uncertainty_max: float = Field(
         0.01,
@@ -111,26 +119,14 @@ class Result(Outcome):
     """Pose and channels with the greatest residual."""
 
 
-@dataclass(frozen=True)
-class _Poses:
-    """Means of the poses and what is known of their noise."""
-
-    outputs: Array
-    """Shape (n, 3), in `output_unit`."""
-    noise: Array
-    """Covariance by channel, (3, n, n)."""
-    known: bool
-    """Whether that comes from the unit's record."""
-    slow: float
-    """Share of slow noise, of noise that is not known."""
-    output_unit: str
-    labels: tuple[str, ...]
-
-
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     """Several recordings are one pose each; a single one is searched for still stretches."""
     recordings = evidence.recordings
-    poses = _poses_of_one(recordings[0], params, unit) if len(recordings) == 1 else _poses(recordings, params, unit)
+    poses = (
+        _poses_of_one(recordings[0], params, unit)
+        if len(recordings) == 1
+        else station_poses(recordings, params.triad, unit)
+    )
     if len(poses.outputs) >= LEAST_TO_JUDGE:
         require_live(params.triad, poses.outputs, poses.output_unit)
     reference = _reference(params)
@@ -165,21 +161,14 @@ def _reference(params: Params) -> float:
     return params.earth_rate_rad_s if params.triad == "gyro" else params.gravity_m_s2 or 0.0
 
 
-def _poses(recordings: Sequence[Recording], params: Params, unit: Unit | None) -> _Poses:
-    """One recording a pose."""
-    means = station_means(recordings, params.triad)
-    noise, known = noise_of_means(means, unit.triad(params.triad) if unit else None)
-    slow = 0.0 if known else slow_share(means.slow_excess, noise)
-    labels = tuple(f"pose {i} ({label})" for i, label in enumerate(means.labels, start=1))
-    return _Poses(means.outputs, noise, known, slow, means.output_unit, labels)
-
-
-def _poses_of_one(recording: Recording, params: Params, unit: Unit | None) -> _Poses:
+def _poses_of_one(recording: Recording, params: Params, unit: Unit | None) -> Poses:
     """The still stretches of one recording."""
     info, s = recording.info, params.still
     names = TRIADS[params.triad]
     samples = rates(recording, names)
     require_finite(info, names, samples)
+    if params.rows == "pose_means":
+        return rows_as_poses(recording, samples, params.triad, params.pose_sd, unit)
     settings = StillSettings(s.initial_s, s.window_s, s.factor, s.shortest_s, s.margin_s)
     stretches = still_stretches(samples, info.rate_hz, settings)
     if not stretches:
@@ -190,14 +179,15 @@ def _poses_of_one(recording: Recording, params: Params, unit: Unit | None) -> _P
     labels = tuple(f"pose {i} ({a:.4g} to {b:.4g} s)" for i, (a, b) in enumerate(windows.tolist(), start=1))
     known = outputs_covariance(unit.triad(params.triad) if unit else None, output_unit, windows)
     if known is not None:
-        return _Poses(outputs, known, True, 0.0, output_unit, labels)
+        return Poses(outputs, known, True, 0.0, output_unit, labels)
     noise = scatter_covariance(outputs, np.maximum(sd, np.median(sd, axis=0)))
-    return _Poses(outputs, noise, False, slow_share(pose_excess(samples, stretches), noise), output_unit, labels)
+    return Poses(outputs, noise, False, slow_share(pose_excess(samples, stretches), noise), output_unit, labels)
 
 
-def _result(fit: ScalarFit, params: Params, poses: _Poses) -> Result:
+def _result(fit: ScalarFit, params: Params, poses: Poses) -> Result:
     input_unit, output_unit = INPUT_UNITS[params.triad], poses.output_unit
     misfit = scalar_misfit(fit, poses.outputs, poses.labels, poses.slow)
+    misfit = misfit if poses.scatters else replace(misfit, ratio=None)
     checks = _checks(fit, params, misfit)
     kinds = (
         (output_unit,) * 3 + (f"{input_unit}/{output_unit}" if output_unit != input_unit else "1",) * 3 + ("rad",) * 3

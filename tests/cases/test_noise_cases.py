@@ -9,6 +9,7 @@ from scipy.signal import butter, sosfilt
 from procedures.core.errors import DomainError
 from procedures.core.recording import Channel, MemoryRecording, Quantity, RecordingInfo
 from procedures.core.units import DEG_PER_SQRT_HOUR
+from procedures.inspection import analyse_method
 from procedures.methods.noise_analysis import METHOD, Params
 from procedures.procedure import Evidence
 
@@ -21,7 +22,7 @@ def launch(samples: np.ndarray, rate_hz: float, quantity: Quantity = Quantity.AN
     name, unit = ("gyro_x", "rad/s") if quantity is Quantity.ANGULAR_RATE else ("accelerometer_z", "m/s^2")
     info = RecordingInfo("case", "CASE", (Channel(name, quantity, unit),), rate_hz, len(samples))
     evidence = Evidence(recordings=(MemoryRecording(info, samples[:, None]),))
-    return METHOD.analyse(evidence, Params.model_validate({}), None)
+    return analyse_method(METHOD, evidence, Params.model_validate({}), None)
 
 
 def walk(result: Any) -> Any:

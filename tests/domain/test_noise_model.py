@@ -12,6 +12,7 @@ from procedures.analysis.noise_fit.joined import Joined, joined_at
 from procedures.analysis.noise_fit.powers import FastPowers, slow_powers
 from procedures.analysis.noise_fit.slow_lines import without_lines
 from procedures.core.arrays import Array
+from procedures.core.noise import NoiseCoefficients
 from tests.validation.foreign_noise import analysed
 from tests.validation.foreign_records import FOREIGN, WALK, Record, counter, walk, white
 
@@ -74,7 +75,7 @@ def test_a_flicker_of_another_corner_has_the_powers_of_its_covariance(corner_s: 
     fast = tapered_powers(covariances(length, 1.0 / RATE_HZ, band), taper)[2]
     told = bins.frequency_hz < 8.0 / (2.0 * np.pi * corner_s)
     ratio = (flicker_from(bins, corner_s) / exact_in_bins(bins, slow, fast, length))[told]
-    assert np.quantile(np.abs(ratio - 1.0), 0.9) < 0.02
+    assert np.quantile(np.abs(ratio - 1.0), 0.9) < 0.03
     assert np.max(np.abs(ratio - 1.0)) < 0.15
 
 
@@ -173,3 +174,11 @@ def test_a_resonance_is_left_out_and_the_rest_keeps_its_claims() -> None:
     for process in ("quantization", "bias_instability", "rate_random_walk"):
         assert found.coefficient(process).likelihood.value is None
     assert found.warnings
+
+
+def test_a_record_keeps_what_a_counter_without_dither_does_not_tell() -> None:
+    """What was known of N stays; where nothing was known, the record has the limit, never zero."""
+    (summary,) = analysed(counter(np.random.default_rng((8, 0)))).channels
+    limit = summary.mean("random_walk").values[0].upper_limit
+    assert summary.noise_over(NoiseCoefficients(random_walk=0.25)).random_walk == 0.25
+    assert summary.noise_over(None).random_walk == limit > 0.0

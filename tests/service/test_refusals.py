@@ -315,7 +315,7 @@ FILES = {
     "gap": (
         {"time_column": "t"},
         [b"t,gyro_x,gyro_y\n" + b"".join(b"%g,1,2\n" % t for t in TIMED)],
-        ("gap between rows 3 and 4", "0.03 s where 0.01 s"),
+        ("2 samples are missing in 1 place: 2 between rows 3 and 4", 'gaps = "mark"'),
     ),
     "lengths": (
         {"channels": [GYRO_X, {**GYRO_Y, "file": 1}]},
@@ -340,7 +340,7 @@ NO_UNIT = {"name": "gyro_x", "quantity": "angular_rate"}
     ("changes", "field", "words"),
     [
         ({"channels": [NO_UNIT]}, "channels.0.unit", "required"),
-        ({"channels": [{**NO_UNIT, "unit": "m/s^2"}]}, "channels.0", "'m/s^2' is none of rad/s, count"),
+        ({"channels": [{**NO_UNIT, "unit": "m/s^2"}]}, "channels.0", "'m/s^2' is none of rad/s, mrad/s, deg/s"),
         ({"channels": [{**GYRO_X, "scale": 0}]}, "channels.0", "the scale not zero"),
         ({"rate_hz": -1}, "rate_hz", "greater than 0"),
         ({"rate_hz": float("nan")}, "rate_hz", "finite number"),

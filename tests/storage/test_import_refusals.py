@@ -85,14 +85,14 @@ REFUSALS: dict[str, Refusal] = {
         _timed([0, 0.01, 0.01, 0.02]),
         {"time_column": "t"},
         UnfitRecording,
-        "does not grow: 0.01 s in row 2, 0.01 s in row 3",
+        "the time has no room for 1 of the rows: 1 between rows 2 and 3 (0.01 s from the first)",
     ),
     "time goes back": (_timed([0, 0.01, 0.02, 0.015]), {"time_column": "t"}, UnfitRecording, "row 3, 0.015 s in row 4"),
     "gap": (
         _timed([0, 0.01, 0.02, 0.05, 0.06]),
         {"time_column": "t"},
         UnfitRecording,
-        "gap between rows 3 and 4: the step is 0.03 s where 0.01 s",
+        "at 100 Hz 2 samples are missing in 1 place: 2 between rows 3 and 4 (0.02 s from the first)",
     ),
     "another rate": (
         _timed([0, 0.01, 0.02]),
@@ -124,7 +124,7 @@ def test_what_does_not_fit_is_refused_in_words(case: str) -> None:
     ("changes", "words"),
     [
         ({"channels": [{k: v for k, v in GYRO_X.items() if k != "unit"}]}, "Field required"),
-        ({"channels": [{**GYRO_X, "unit": "deg/s"}]}, "'deg/s' is none of rad/s, count"),
+        ({"channels": [{**GYRO_X, "unit": "knots"}]}, "'knots' is none of rad/s, mrad/s, deg/s, mdeg/s, deg/h, count"),
         ({"channels": [{**GYRO_X, "scale": 0.0}]}, "the scale not zero"),
         ({"channels": [{**GYRO_X, "scale": float("nan")}]}, "finite number"),
         ({"channels": [{**GYRO_X, "colour": "red"}]}, "Extra inputs"),

@@ -21,6 +21,7 @@ from scipy.stats import binom
 
 from procedures.core.errors import DomainError
 from procedures.core.recording import Channel, MemoryRecording, Quantity, RecordingInfo
+from procedures.inspection import analyse_method
 from procedures.methods.noise_analysis import METHOD, Params
 from procedures.procedure import Evidence
 from tests.validation.foreign_records import CLEAN, FOREIGN, Record
@@ -61,7 +62,7 @@ def recording(record: Record, name: str = "made") -> MemoryRecording:
 
 def analysed(record: Record) -> Any:
     """The result document of ``noise_analysis``."""
-    return METHOD.analyse(Evidence(recordings=(recording(record),)), Params.model_validate({}), None)
+    return analyse_method(METHOD, Evidence(recordings=(recording(record),)), Params.model_validate({}), None)
 
 
 def claim(record: Record) -> Claim:

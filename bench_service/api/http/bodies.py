@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from bench_service.formats.plain_json import faults
 
 BODY_BYTES = 1_000_000
-"""Largest body of a route that takes no files; one that does bounds them itself, and they go to disk as they come."""
+"""Largest body of a route that takes no files; beside files, room for their description."""
 SMALL_BYTES = 10_000
 """A body of this length is looked through in a few milliseconds."""
 TOLD = 20
@@ -65,15 +65,25 @@ class Bounded:
 
         async def receive_so_much() -> Message:
             nonlocal came
-            if not _takes_json(scope):  # asked here: before the body is read, no route is found yet
+            most = _most_bytes(scope)  # asked here: before the body is read, no route is found yet
+            if most is None:
                 return await receive()
-            _refuse_longer(_declared_bytes(scope))
+            _refuse_longer(_declared_bytes(scope), most)
             message = await receive()
             came += len(message.get("body", b""))
-            _refuse_longer(came)
+            _refuse_longer(came, most)
             return message
 
         await self._app(scope, receive_so_much, send)
+
+
+def _most_bytes(scope: Scope) -> int | None:
+    """The longest body that a route takes; None: it takes none."""
+    if _takes_json(scope):
+        return BODY_BYTES
+    if getattr(scope.get("route"), "body_field", None) is None:
+        return None
+    return scope["app"].state.max_import_bytes + BODY_BYTES  # files, with what describes and parts them
 
 
 def _takes_json(scope: Scope) -> bool:
@@ -87,6 +97,6 @@ def _declared_bytes(scope: Scope) -> int:
     return int(declared) if declared.isdecimal() else 0
 
 
-def _refuse_longer(size: int) -> None:
-    if size > BODY_BYTES:  # of FastAPI's reading of a body, this kind of error alone comes out as it is
-        raise HTTPException(413, f"the body has {size} bytes or more: at most {BODY_BYTES} bytes are taken")
+def _refuse_longer(size: int, most: int) -> None:
+    if size > most:  # of FastAPI's reading of a body, this kind of error alone comes out as it is
+        raise HTTPException(413, f"the body has {size} bytes or more: at most {most} bytes are taken")

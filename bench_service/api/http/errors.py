@@ -12,7 +12,6 @@ from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from bench_service.api.http.bodies import BODY_BYTES
 from bench_service.api.http.headers import SECURITY_HEADERS
 from bench_service.formats.plain_json import A_NUMBER, NOT_SO_DEEP, is_finite, shown
 from bench_service.model.errors import (
@@ -88,7 +87,6 @@ RETRY_AFTER_S = "2"
 MOST_FIELDS = 100
 """Of a megabyte of wrong fields so many are told."""
 _NO_BODY = FieldError(field="body", message="UTF-8 text of one JSON document is expected")
-_TOO_LONG = FieldError(field="body", message=f"at most {BODY_BYTES} bytes are taken")
 _UNREAD: dict[type, str] = {RecursionError: NOT_SO_DEEP, ValueError: A_NUMBER}
 """What is allowed instead where `json.loads` itself gave up, at a thousand brackets or at an integer of 4300 digits."""
 
@@ -227,7 +225,8 @@ def _on_http(request: Request, error: Exception) -> Response:
     if status == 400 and (allowed := _UNREAD.get(type(error.__cause__))) is not None:
         return respond(request, 422, f"body: {allowed}", "Invalid", [FieldError(field="body", message=allowed)])
     kind = HTTPStatus(status).phrase.replace(" ", "")
-    fields = {400: [_NO_BODY], 413: [_TOO_LONG]}.get(status, [])
+    allowed = str(error.detail).rpartition(": ")[2]
+    fields = {400: [_NO_BODY], 413: [FieldError(field="body", message=allowed)]}.get(status, [])
     response = respond(request, status, str(error.detail), kind, fields)
     response.headers.update(error.headers or {})
     return response

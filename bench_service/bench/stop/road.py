@@ -88,13 +88,12 @@ class StopRoads:
         if channel is not None:
             channel.wake()
 
-    def unreached(self, bench_id: str) -> Safety:
-        """What is known of a bench that a stop has not reached."""
+    def unreached(self, bench_id: str) -> str:
+        """What a person must know whose stop has reached nothing."""
         host = self._where(bench_id)
         at = f"host {host}" if host else "the bench's own host"
-        text = (
-            f"The stop has NOT reached bench {bench_id!r}: its devices are not on this host, its supervisor cannot be "
+        return (
+            f"the stop has NOT reached bench {bench_id!r}: its devices are not on this host, its supervisor cannot be "
             f"reached from here, and the database does not answer. Press the hardware emergency stop, or run `bench "
             f"stop --bench {bench_id}` at {at}."
         )
-        return Safety(None, text, None, None, None)

@@ -43,6 +43,7 @@ class SqlRecordingWriter:
         self._new = new
         self._names = tuple(channel.name for channel in new.channels)
         self._dtype: SampleType = sample_type(np.dtype(new.dtype).name)
+        self._gaps = new.gaps
         self._created_at = wall_clock.now()
         self._rows = rows_per_chunk(len(self._names), self._dtype)
         self._buffer = _empty(self._rows, len(self._names), self._dtype)
@@ -197,8 +198,10 @@ class SqlRecordingWriter:
             raise UnfitRecording(f"a block of shape {samples.shape} was given, (n, {len(self._names)}) is wanted")
         if not np.can_cast(samples.dtype, self._dtype, "safe"):
             raise UnfitRecording(f"samples of type {samples.dtype} do not fit a recording of {self._dtype}")
-        if self._dtype.kind == "f" and not np.all(np.isfinite(samples)):
-            raise UnfitRecording("a block has samples that are not finite numbers")
+        if self._dtype.kind == "f":
+            unfit = np.isinf(samples) if self._gaps else ~np.isfinite(samples)
+            if np.any(unfit):
+                raise UnfitRecording("a block has samples that are not finite numbers")
         return block
 
 

@@ -48,6 +48,11 @@ class Misfit:
     @property
     def sentences(self) -> tuple[str, ...]:
         """What to know of a fit that is not perfect, whether it passes or not."""
+        if self.ratio is None and self.spare > 0:
+            return (
+                "nothing of the poses' noise is in the data and none is given: a bad fit cannot be told from noise; "
+                f"the greatest residual is at {self.worst}",
+            )
         if self.ratio is None:
             return (
                 "as many unknowns as equations: nothing is left to check the fit with, and its residuals are zero "

@@ -154,7 +154,7 @@ def _has_run(same: Mask, zeros: NDArray[np.int64]) -> NDArray[np.bool_]:
     if same.shape[1] < SHORTEST or not np.any(zeros >= SHORTEST):
         return zeros >= min(SHORTEST, same.shape[1])
     two = same[:, 1:] & same[:, :-1]
-    return (two[:, 3:] & two[:, :-3] & same[:, 2:-2]).any(axis=1)
+    return np.asarray((two[:, 3:] & two[:, :-3] & same[:, 2:-2]).any(axis=1))
 
 
 def _trailing(same: Mask) -> NDArray[np.int64]:

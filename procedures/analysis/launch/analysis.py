@@ -70,15 +70,15 @@ def _first_pass(
 ) -> tuple[Cells, dict[str, Beside]]:
     """Cell means, temperatures' too, and what else is known, channel by channel. Raises `UnfitRecording`."""
     info = recording.info
-    columns = [info.column(name) for name in names]
-    watched = recording if isinstance(recording, Watched) else Watched(recording, INSPECTION)
     temperatures = temperature_names(info)
+    columns = [info.column(name) for name in names]
     resolution = Resolution([info.channels[c] for c in columns])
+    watched = recording if isinstance(recording, Watched) else Watched(recording, INSPECTION)
     stream = CellStream(info, (*names, *temperatures), settings.cell_s)
 
     def seen() -> Iterator[RawArray]:
         for block in watched.blocks():
-            resolution.add(block[:, columns])
+            resolution.add(block, columns)
             yield block
 
     for rows in channel_rows(info, (*names, *temperatures), seen()):
@@ -91,10 +91,8 @@ def _first_pass(
             f"analysis, at least {FEWEST_CELLS} are needed"
         )
     coarse, warm = resolution.finish(), smooth_temperatures(cells, temperatures)
-    return cells, {
-        f.channel: Beside(tuple(finding.sentence for finding in f.findings), coarse.get(f.channel, ""), warm)
-        for f in found
-    }
+    sentences = {f.channel: tuple(finding.sentence for finding in f.findings) for f in found}
+    return cells, {name: Beside(sentences.get(name, ()), coarse.get(name, ""), warm) for name in names}
 
 
 @dataclass

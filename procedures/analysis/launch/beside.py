@@ -76,10 +76,10 @@ class Resolution:
         self._parts: list[RawArray] = []
         self._seen = 0
 
-    def add(self, block: RawArray) -> None:
-        """The next samples, (n, channels)."""
+    def add(self, block: RawArray, columns: Sequence[int]) -> None:
+        """The next samples (n, …), of which these columns are the channels."""
         if self._seen < LOOKED_AT:
-            part = block[: LOOKED_AT - self._seen].copy()
+            part = block[: LOOKED_AT - self._seen][:, list(columns)]
             self._parts.append(part)
             self._seen += len(part)
 

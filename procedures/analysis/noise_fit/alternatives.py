@@ -18,6 +18,8 @@ from procedures.analysis.noise_fit.selection import Selection, inverse_informati
 
 DOUBT = 4.0
 """Twice the log likelihood that another process gains, from which on intervals allow for it."""
+STRONG_DOUBT = 6.0
+"""The same, from which on it is more than a note."""
 SLOW = (BIAS_INSTABILITY, RATE_RANDOM_WALK)
 _EVERY = 3
 
@@ -49,6 +51,8 @@ class Doubt:
     """By process, with intervals that allow for it."""
     model: Extension | None
     """The likeliest other model; None: there is no doubt."""
+    strong: bool = False
+    """A reader must know: without the other a flicker would be sure, or the other model is clearly likelier."""
 
 
 def allowed_for(
@@ -79,7 +83,9 @@ def allowed_for(
         # how fast a flicker ends is part of its level; another process only where there is a doubt
         others = fits if doubtful else [f for f in fits if f.model.corner_s is not None and k == BIAS_INSTABILITY]
         changed[k] = _wider(estimates[k], k, others, top, losses, zero=k in missing)
-    return Doubt(changed, fits[0].model if doubtful else None)
+    sure = (estimates[BIAS_INSTABILITY].lower or 0.0) > 0.0
+    strong = (sure and BIAS_INSTABILITY in missing) or 2.0 * (top - own.log_likelihood) >= STRONG_DOUBT
+    return Doubt(changed, fits[0].model if doubtful else None, strong)
 
 
 def _can_miss(k: int, fits: list[_Fit], top: float, loss: float) -> bool:

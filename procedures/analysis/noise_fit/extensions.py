@@ -34,7 +34,7 @@ GAIN_OF_TIME, GAIN_OF_CORNER = 16.0, 11.0
 """Twice the log likelihood that an extension must gain: χ² of two and of one degree at 5e-4, of several times tried."""
 _RATIO = 2.0**0.5
 """Between two times that are tried."""
-_PER_E_FOLD = 3
+_PER_E_FOLD = 4
 _EVERY = 2
 """Of the times, so many are looked at first."""
 _FIRST_CORNER_S = FLICKER_BAND_S[0]

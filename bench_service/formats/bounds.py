@@ -1,0 +1,53 @@
+"""How much a file may demand before it is refused: lines, columns, numbers, unpacked bytes, memory and time.
+
+Compressed formats give a small file room to ask for a thousand times its size, so every bound is checked before the
+bytes are made. Must not know formats or processes.
+"""
+
+from dataclasses import dataclass
+
+MEGABYTE = 1_000_000
+LINE_BYTES = 256 * 1024
+"""Longest line of a text file: 64 channels of 25 characters are 1.6 kB."""
+COLUMNS = 4096
+"""Most columns of a table, of which 65 can be read at once."""
+SHOWN_NAMES = 12
+"""So many column names are listed in a message."""
+SHOWN_CHARACTERS = 80
+"""So much of a cell or a name is quoted in a message."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Most that an import may take; grows with the size of the files beyond 100 MB."""
+
+    cells: int = 100_000_000
+    """Numbers that are read: six channels at 400 Hz for 11 h."""
+    unpacked_bytes: int = 4_000 * MEGABYTE
+    """Text after unpacking, or columns of a columnar file."""
+    memory_bytes: int = 250 * MEGABYTE
+    """Memory of the process that reads, above what it takes idle."""
+    time_s: float = 25.0
+    """For which the reading process may be waited for."""
+
+    @classmethod
+    def of(cls, file_bytes: int) -> "Bounds":
+        """The bounds of files that have so many bytes together."""
+        hundreds = max(1.0, file_bytes / (100 * MEGABYTE))
+        return cls(
+            cells=int(cls.cells * hundreds),
+            unpacked_bytes=int(cls.unpacked_bytes * hundreds),
+            memory_bytes=int(cls.memory_bytes + MEGABYTE * 100 * (hundreds - 1.0)),
+            time_s=cls.time_s * hundreds,
+        )
+
+
+def quoted(text: str) -> str:
+    """A cell or a name as a message quotes it, shortened."""
+    return repr(text if len(text) <= SHOWN_CHARACTERS else text[: SHOWN_CHARACTERS - 1] + "…")
+
+
+def listed(names: list[str]) -> str:
+    """Column names as a message lists them: the first few, and how many there are."""
+    shown = ", ".join(n if len(n) <= SHOWN_CHARACTERS else n[: SHOWN_CHARACTERS - 1] + "…" for n in names[:SHOWN_NAMES])
+    return shown if len(names) <= SHOWN_NAMES else f"{shown}, … ({len(names)} columns)"

@@ -1,0 +1,32 @@
+"""Files of other kinds by their first bytes, each with the way to a table that can be read."""
+
+_SAVE = "save it as CSV, Parquet or Arrow"
+_KINDS: tuple[tuple[bytes, str], ...] = (
+    (b"PK\x03\x04", f"a zip archive or a workbook: unpack it, or {_SAVE}"),
+    (b"BZh", "compressed by bzip2: unpack it, or compress it by gzip"),
+    (b"\xfd7zXZ\x00", "compressed by xz: unpack it, or compress it by gzip"),
+    (b"\x28\xb5\x2f\xfd", "compressed by zstd: unpack it, or compress it by gzip"),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive: unpack it"),
+    (b"\x89HDF\r\n\x1a\n", f"an HDF5 file: {_SAVE}"),
+    (b"MATLAB 5.0 MAT-file", f"a MATLAB file: {_SAVE}"),
+    (b"ULog\x01\x12\x35", f"a ULog of a flight controller: {_SAVE}"),
+    (b"\xa3\x95\x80", f"a DataFlash log of a flight controller: {_SAVE}"),
+    (b"#ROSBAG", f"a ROS bag: {_SAVE}"),
+    (b"\x89MCAP0\r\n", f"an MCAP file: {_SAVE}"),
+    (b"SQLite format 3\x00", f"an SQLite database: {_SAVE}"),
+    (b"TDSm", f"a TDMS file: {_SAVE}"),
+    (b"MDF ", f"an MDF file: {_SAVE}"),
+    (b"\x93NUMPY", f"a NumPy file: {_SAVE}"),
+    (b"\x80\x04\x95", f"a Python pickle, which is never opened: {_SAVE}"),
+    (b"$IMURAW", f"a Waypoint IMR file: {_SAVE}"),
+    (b"%PDF", "a PDF: no table can be read from it"),
+    (b"\xd0\xcf\x11\xe0", f"an old workbook (xls): {_SAVE}"),
+    (b"<", f"HTML or XML: {_SAVE}"),
+    (b"{", f"JSON: {_SAVE}"),
+)
+
+
+def foreign_kind(start: bytes) -> str | None:
+    """The kind of a file that begins so, and the way out; None: it may be text."""
+    begin = start.lstrip(b" \t\r\n") if start[:1] in b" \t\r\n" else start
+    return next((words for magic, words in _KINDS if begin.startswith(magic)), None)

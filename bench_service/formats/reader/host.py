@@ -1,0 +1,40 @@
+"""The process that has the readers of files loaded: it forks one child an import, which begins in milliseconds.
+
+It has one thread and opens no file itself. It ends when the service closes the line between them.
+"""
+
+import gc
+import os
+import signal
+import socket
+
+from bench_service.formats.reader.child import serve
+
+
+def main(descriptor: int) -> None:
+    """Fork a child for each line that comes through the socket of that descriptor."""
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # children are not waited for
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the service, which then closes the line
+    gc.collect()
+    gc.freeze()
+    with socket.socket(fileno=descriptor) as control:
+        control.sendall(b"r")
+        while True:
+            data, lines, _, _ = socket.recv_fds(control, 1, 1)
+            if not data:
+                return
+            if not os.fork():
+                _child(control, lines)
+            for line in lines:
+                os.close(line)
+
+
+def _child(control: socket.socket, lines: list[int]) -> None:
+    """Serve one import in this process, and end it whatever happens."""
+    try:
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        control.close()
+        for line in lines:
+            serve(socket.socket(fileno=line))
+    finally:
+        os._exit(0)
