@@ -28,8 +28,9 @@ ALIKE = 0.75
 """Channels that see a pose at least so much as the most concerned one are named with it."""
 DEAD = 0.02
 """A channel whose means span less than this part of the triad's middle one does not feel the poses."""
-SCALE_WITHIN = 2.0
-"""Scale factors of nominal outputs beyond this, or under its inverse, are a wrong unit and not a unit's error."""
+SCALE_WITHIN = 2.5
+"""Scale factors of nominal outputs beyond this, or under its inverse, are a wrong unit. A rate that is
+off by two leaves a scale factor of two, which the inspection names."""
 SCALES_ALIKE = 20.0
 """Scale factors of one triad in counts that differ by more are not those of three like channels."""
 
