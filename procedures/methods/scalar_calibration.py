@@ -3,7 +3,6 @@
 For recordings at several stations, or for one long recording of a unit turned by hand from pose to pose.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Self
 
@@ -17,23 +16,20 @@ from procedures.analysis.calibration.misfit import (
     require_plausible_scales,
     scalar_misfit,
 )
-from procedures.analysis.calibration.poses import (
-    NoiseSource,
-    Poses,
-    poses_of_recordings,
-    poses_of_rows,
-    poses_of_stretches,
-)
+from procedures.analysis.calibration.poses import Poses, rows_as_poses, station_poses
 from procedures.analysis.calibration.reference import INPUT_UNITS
 from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, fit_scalar, nominal_start, start_from_data
-from procedures.analysis.calibration.still import StillSettings
+from procedures.analysis.calibration.slow_noise import slow_share
+from procedures.analysis.calibration.station_noise import outputs_covariance
+from procedures.analysis.calibration.still import StillSettings, pose_excess, pose_means, still_stretches
+from procedures.analysis.calibration.triad_analysis import scatter_covariance
 from procedures.analysis.fitness.watched import Inspection
 from procedures.core import units
 from procedures.core.arrays import Array
-from procedures.core.errors import BadParameter
+from procedures.core.errors import UnfitRecording
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Check, Limit, check, verdict
-from procedures.core.recording import TRIADS, Recording
+from procedures.core.recording import TRIADS, Recording, rates, require_finite
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, Parameters, RecordedParameters
@@ -126,14 +122,18 @@ class Result(Outcome):
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     """Several recordings are one pose each; a single one is searched for still stretches."""
     recordings = evidence.recordings
-    poses = _poses(recordings, params, unit)
+    poses = (
+        _poses_of_one(recordings[0], params, unit)
+        if len(recordings) == 1
+        else station_poses(recordings, params.triad, unit)
+    )
     if len(poses.outputs) >= LEAST_TO_JUDGE:
         require_live(params.triad, poses.outputs, poses.output_unit)
     reference = _reference(params)
     start = start_from_data(poses.outputs, reference) if poses.output_unit == "count" else nominal_start()
     what = f"the nine scalar {params.triad} parameters"
-    fit = fit_scalar(what, poses.outputs, poses.noise, reference, start, poses.noise_known)
-    gains = np.asarray(np.diagonal(np.linalg.inv(fit.correction)), dtype=np.float64)
+    fit = fit_scalar(what, poses.outputs, poses.noise, reference, start, poses.known)
+    gains: Array = np.diagonal(np.linalg.inv(fit.correction)).astype(np.float64)
     require_plausible_scales(params.triad, gains, poses.output_unit != "count")
     return _result(fit, params, poses)
 
@@ -161,26 +161,33 @@ def _reference(params: Params) -> float:
     return params.earth_rate_rad_s if params.triad == "gyro" else params.gravity_m_s2 or 0.0
 
 
-def _poses(recordings: Sequence[Recording], params: Params, unit: Unit | None) -> Poses:
-    """One pose a recording; of a single recording its still stretches, or its rows. Raises `BadParameter`."""
-    record = unit.triad(params.triad) if unit else None
-    if len(recordings) > 1:
-        return poses_of_recordings(recordings, params.triad, record)
+def _poses_of_one(recording: Recording, params: Params, unit: Unit | None) -> Poses:
+    """The still stretches of one recording."""
+    info, s = recording.info, params.still
+    names = TRIADS[params.triad]
+    samples = rates(recording, names)
+    require_finite(info, names, samples)
     if params.rows == "pose_means":
-        poses = poses_of_rows(recordings[0], params.triad, record, params.pose_sd)
-        if poses.noise_source is NoiseSource.NOTHING and len(poses.outputs) <= len(PARAMETERS):
-            rows = f"{len(poses.outputs)} pose means of unknown noise: {len(PARAMETERS)} parameters"
-            raise BadParameter("pose_sd", None, f"needed with {rows} leave nothing to check")
-        return poses
-    s = params.still
+        return rows_as_poses(recording, samples, params.triad, params.pose_sd, unit)
     settings = StillSettings(s.initial_s, s.window_s, s.factor, s.shortest_s, s.margin_s)
-    return poses_of_stretches(recordings[0], params.triad, record, settings)
+    stretches = still_stretches(samples, info.rate_hz, settings)
+    if not stretches:
+        raise UnfitRecording(f"recording {info.id}: no still stretch was found")
+    outputs, sd = pose_means(samples, stretches)
+    output_unit = info.channels[info.column(names[0])].rate_unit
+    windows = np.array([[p.start, p.stop] for p in stretches]) / info.rate_hz + info.start_s
+    labels = tuple(f"pose {i} ({a:.4g} to {b:.4g} s)" for i, (a, b) in enumerate(windows.tolist(), start=1))
+    known = outputs_covariance(unit.triad(params.triad) if unit else None, output_unit, windows)
+    if known is not None:
+        return Poses(outputs, known, True, 0.0, output_unit, labels)
+    noise = scatter_covariance(outputs, np.maximum(sd, np.median(sd, axis=0)))
+    return Poses(outputs, noise, False, slow_share(pose_excess(samples, stretches), noise), output_unit, labels)
 
 
 def _result(fit: ScalarFit, params: Params, poses: Poses) -> Result:
     input_unit, output_unit = INPUT_UNITS[params.triad], poses.output_unit
-    slow = None if poses.noise_source is NoiseSource.NOTHING else poses.slow
-    misfit = scalar_misfit(fit, poses.outputs, poses.labels, slow)
+    misfit = scalar_misfit(fit, poses.outputs, poses.labels, poses.slow)
+    misfit = misfit if poses.scatters else replace(misfit, ratio=None)
     checks = _checks(fit, params, misfit)
     kinds = (
         (output_unit,) * 3 + (f"{input_unit}/{output_unit}" if output_unit != input_unit else "1",) * 3 + ("rad",) * 3

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -30,9 +31,9 @@ EARTH = 7.292115e-5
 class Trial:
     """A method's input, and the truth it was drawn from."""
 
-    method: Method
+    method: Method[Any, Any]
     recordings: tuple[MemoryRecording, ...]
-    parameters: dict
+    parameters: dict[str, Any]
     truth: np.ndarray
     """The nine of a scalar calibration; empty of the others."""
 
@@ -218,7 +219,9 @@ def half_scale(rng: np.random.Generator) -> Trial:
     return changed(clean_scalar(rng, "white"), lambda _, x: x * np.where(np.arange(3) == axis, factor, 1.0))
 
 
-def clean_field(rng: np.random.Generator, positions: tuple = TURNS, gyro: str = "none") -> Trial:
+def clean_field(
+    rng: np.random.Generator, positions: tuple[tuple[float, float], ...] = TURNS, gyro: str = "none"
+) -> Trial:
     """Positions set by hand within a minute of arc, cross-couplings of a thousandth."""
     listed = np.array(positions, float)
     n = int(rng.integers(400, 900))

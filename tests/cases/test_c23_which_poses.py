@@ -29,7 +29,7 @@ def recordings(directions: np.ndarray, rng: np.random.Generator) -> tuple[Memory
 
 
 def asked(given: tuple[MemoryRecording, ...], **parameters: float):
-    return METHOD.analyse(Evidence(given), METHOD.params(gravity_m_s2=G, **parameters), None)
+    return METHOD.analyse(Evidence(given), METHOD.params.model_validate({"gravity_m_s2": G, **parameters}), None)
 
 
 @pytest.mark.parametrize(("poses", "rank"), [(FACES[:5], 5), (FACES, 6), (LEVEL, 5)])
@@ -85,11 +85,13 @@ def test_a_misfit_within_one_long_recording_names_the_pose_by_its_time() -> None
     given[4] = MemoryRecording(given[4].info, given[4].raw + np.array([0.0, 0.5, 0.0]))
     shake = [rng.normal(0.0, 2.0, (100, 3)) for _ in given]
     parts = [given[0].raw, given[0].raw, *(p for r, s in zip(given, shake, strict=True) for p in (s, r.raw))]
-    raw = np.vstack(parts)
+    raw = np.vstack(parts).astype(np.float64)
     first = given[0].info
     info = RecordingInfo("one", "U", first.channels, 50.0, len(raw))
     result = METHOD.analyse(
-        Evidence((MemoryRecording(info, raw),)), METHOD.params(gravity_m_s2=G, still={"initial_s": 15.0}), None
+        Evidence((MemoryRecording(info, raw),)),
+        METHOD.params.model_validate({"gravity_m_s2": G, "still": {"initial_s": 15.0}}),
+        None,
     )
     assert result.poses == 19
     assert result.verdict is Verdict.FAIL

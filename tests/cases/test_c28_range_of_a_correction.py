@@ -33,7 +33,7 @@ def fitted(low: float, high: float, reference: float) -> ThermalCorrection:
     (square, line), *_ = np.linalg.lstsq(np.column_stack([t**2, t]), np.polyval([*CUBIC, 0.0], t), rcond=None)
     axis = AxisCorrection(1.0, 0.0, beta=(-line, -square, 0.0, 0.0), case_reference_c=reference)
     return ThermalCorrection(
-        "accelerometer", (axis,) * 3, fitted_range=TemperatureRange((low, high), (low - 1.0, high + 1.0))
+        "accelerometer", (axis, axis, axis), fitted_range=TemperatureRange((low, high), (low - 1.0, high + 1.0))
     )
 
 

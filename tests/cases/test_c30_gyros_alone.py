@@ -32,7 +32,7 @@ def turned(rng: np.random.Generator, recordings: int, walk: float, heading_deg: 
 
 
 def asked(recordings: tuple[MemoryRecording, ...], **parameters: object) -> Result:
-    params = METHOD.params(up="z", latitude_deg=LATITUDE, relative_sd_max=0.5, **parameters)
+    params = METHOD.params.model_validate({"up": "z", "latitude_deg": LATITUDE, "relative_sd_max": 0.5, **parameters})
     return METHOD.analyse(Evidence(recordings), params, None)
 
 
@@ -70,9 +70,11 @@ def test_turns_about_one_axis_give_no_matrix() -> None:
     recordings = turned(np.random.default_rng(32), 20, 0.0)
     assert any("do not determine scale factors" in w for w in asked(recordings).warnings)
     with pytest.raises(DomainError):
-        made.SCALAR.analyse(Evidence(recordings), made.SCALAR.params(triad="gyro"), None)
+        made.SCALAR.analyse(Evidence(recordings), made.SCALAR.params.model_validate({"triad": "gyro"}), None)
     with pytest.raises(UnfitRecording, match="gyro_half_turns needs none"):
-        FIELD.analyse(Evidence(recordings), FIELD.params(latitude_deg=LATITUDE, gravity_m_s2=9.81), None)
+        FIELD.analyse(
+            Evidence(recordings), FIELD.params.model_validate({"latitude_deg": LATITUDE, "gravity_m_s2": 9.81}), None
+        )
 
 
 def test_the_order_of_headings_may_be_given_and_too_few_pairs_are_refused() -> None:
@@ -89,6 +91,6 @@ def test_the_order_of_headings_may_be_given_and_too_few_pairs_are_refused() -> N
 
 def test_a_wrong_latitude_fails() -> None:
     recordings = turned(np.random.default_rng(34), 20, 0.0)
-    params = METHOD.params(up="z", latitude_deg=5.0, relative_sd_max=0.5)
+    params = METHOD.params.model_validate({"up": "z", "latitude_deg": 5.0, "relative_sd_max": 0.5})
     assert METHOD.analyse(Evidence(recordings), params, None).verdict is Verdict.FAIL
     assert len(METHOD.report(asked(recordings)).sections) == 1

@@ -42,7 +42,7 @@ def parked(rng: np.random.Generator, knock_deg: float, about: str, seconds: floa
 def aligned(recording: MemoryRecording) -> Result:
     triads = (ideal("accelerometer", "m/s^2", 1e-4), ideal("gyro", "rad/s", 1e-8))
     evidence = Evidence((recording,), (DatedCalibration("c", "2026-01-01T00:00:00Z", triads),))
-    return METHOD.analyse(evidence, METHOD.params(latitude_deg=50.0, gravity_m_s2=G), None)
+    return METHOD.analyse(evidence, METHOD.params.model_validate({"latitude_deg": 50.0, "gravity_m_s2": G}), None)
 
 
 @pytest.mark.parametrize("seed", range(20))

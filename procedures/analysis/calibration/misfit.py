@@ -28,8 +28,9 @@ ALIKE = 0.75
 """Channels that see a pose at least so much as the most concerned one are named with it."""
 DEAD = 0.02
 """A channel whose means span less than this part of the triad's middle one does not feel the poses."""
-SCALE_WITHIN = 2.0
-"""Scale factors of nominal outputs beyond this, or under its inverse, are a wrong unit and not a unit's error."""
+SCALE_WITHIN = 2.5
+"""Scale factors of nominal outputs beyond this, or under its inverse, are a wrong unit. A rate that is
+off by two leaves a scale factor of two, which the inspection names."""
 SCALES_ALIKE = 20.0
 """Scale factors of one triad in counts that differ by more are not those of three like channels."""
 
@@ -39,8 +40,7 @@ class Misfit:
     """How far a fit's residuals are beyond what the noise within its poses allows."""
 
     ratio: float | None
-    """Root mean square of the residuals over what the scatter allows; None where no equation is spare, or where nothing
-    but the residuals tells the noise."""
+    """Root mean square of the residuals over what the scatter allows; None where no equation is spare."""
     spare: int
     """Equations more than unknowns."""
     worst: str
@@ -50,7 +50,10 @@ class Misfit:
     def sentences(self) -> tuple[str, ...]:
         """What to know of a fit that is not perfect, whether it passes or not."""
         if self.ratio is None and self.spare > 0:
-            return ("nothing but the residuals tells the noise of the poses, so that a misfit cannot be told from it",)
+            return (
+                "nothing of the poses' noise is in the data and none is given: a bad fit cannot be told from noise; "
+                f"the greatest residual is at {self.worst}",
+            )
         if self.ratio is None:
             return (
                 "as many unknowns as equations: nothing is left to check the fit with, and its residuals are zero "
@@ -76,12 +79,9 @@ def ratio_of(chi_square: float, spare: int, slow: float = 0.0) -> float | None:
     return float(np.sqrt(chi_square / spare / (1.0 + slow))) if spare > 0 else None
 
 
-def scalar_misfit(fit: ScalarFit, outputs: Array, labels: tuple[str, ...], slow: float | None) -> Misfit:
-    """Of a scalar calibration of outputs (n, 3): a magnitude is off by those channels most that point along it.
-
-    `slow`: the share of slow noise κ; None where nothing but the residuals tells the noise.
-    """
-    ratio = None if slow is None else ratio_of(fit.chi_square, fit.degrees_of_freedom, slow)
+def scalar_misfit(fit: ScalarFit, outputs: Array, labels: tuple[str, ...], slow: float) -> Misfit:
+    """Of a scalar calibration of outputs (n, 3): a magnitude is off by those channels most that point along it."""
+    ratio = ratio_of(fit.chi_square, fit.degrees_of_freedom, slow)
     if ratio is None:
         return Misfit(None, fit.degrees_of_freedom, "")
     shown = fit.residual_sd > 1e-6 * np.max(fit.residual_sd)

@@ -69,7 +69,7 @@ def _line(outputs: Array, model: FieldModel, positions: Array) -> tuple[float, b
         design = np.column_stack([np.ones(len(vectors)), vectors[:, c]])
         if model.estimate_scale:
             found = np.linalg.lstsq(design, outputs[:, c], rcond=None)[0]
-            positive = positive and bool(found[1] > 0.0 or np.ptp(vectors[:, c]) < 1e-6)
+            positive = positive and (float(found[1]) > 0.0 or float(np.ptp(vectors[:, c])) < 1e-6)
         else:
             found = np.array([np.mean(outputs[:, c] - vectors[:, c]), 1.0])
         total += float(np.sum((outputs[:, c] - design @ found) ** 2))

@@ -114,8 +114,8 @@ def spectral_covariance(means: Array, length_s: float) -> Array:
     noise = NoiseCoefficients(
         _with_uncertainty(fit.quantization), walk, _with_uncertainty(fit.bias_instability), 0.0, 0.0
     )
-    edges = np.arange(len(means) + 1, dtype=np.float64) * length_s
-    return contiguous_covariance(noise, np.column_stack([edges[:-1], edges[1:]]))
+    edges = length_s * np.arange(len(means) + 1, dtype=np.float64)
+    return contiguous_covariance(noise, np.column_stack([edges[:-1], edges[1:]]).astype(np.float64))
 
 
 def _with_uncertainty(estimate: Estimate) -> float:
