@@ -97,7 +97,8 @@ class Stalls:
             if several and len(group.rows) < len(self.repeats) and not able[list(group.rows)].all():
                 group.runs = []
                 continue
-            own = [run for run in group.runs if self._beyond_chance(group, run.length, whole)]
+            shortest = self._shortest(group, whole)
+            own = [run for run in group.runs if run.length >= shortest]
             group.runs = [run for run in own if not _within(run, larger)]
             larger += group.runs
             self.inside[list(group.rows)] += sum(run.length for run in group.runs)
@@ -128,25 +129,28 @@ class Stalls:
         if len(ends) and ends[-1] == len(rows):
             group.open = int(lengths[-1])
             begins, ends, lengths = begins[:-1], ends[:-1], lengths[:-1]
-        for i in np.flatnonzero(lengths >= SHORTEST).tolist():
+        for i in np.flatnonzero(lengths >= self._shortest(group, part)).tolist():
             self._keep(group, start + int(ends[i]) - int(lengths[i]), int(lengths[i]), part)
 
     def _keep(self, group: Group, first: int, length: int, part: Array, shift: int = 0) -> None:
-        if length < SHORTEST or not self._beyond_chance(group, length, part):
+        if length < self._shortest(group, part):
             return
         if len(group.runs) < KEPT:
             group.runs.append(Run(first + shift, length))
         else:
             group.lost += 1
 
-    def _beyond_chance(self, group: Group, length: int, part: Array) -> bool:
-        """Whether ``N·Π p_c^L`` over the channels that bear witness is below `CHANCE`."""
+    def _shortest(self, group: Group, part: Array) -> float:
+        """Least length of a run that is beyond chance, and no less than `SHORTEST`; infinite where nothing tells.
+
+        ``N·Π p_c^L < CHANCE`` over the channels that bear witness, solved for L.
+        """
         p = part[list(group.rows)]
         witnesses = p[p < BUSY]
         if not len(witnesses) or (len(group.rows) > 1 and len(witnesses) < 2):
-            return False
-        chance = np.log(max(self._seen, 1)) + length * float(np.sum(np.log(np.maximum(witnesses, LEAST_PART))))
-        return bool(chance < np.log(CHANCE))
+            return np.inf
+        each = float(np.sum(np.log(np.maximum(witnesses, LEAST_PART))))
+        return max(float(SHORTEST), np.floor((np.log(CHANCE) - np.log(max(self._seen, 1))) / each) + 1.0)
 
 
 def _has_run(same: Mask, zeros: NDArray[np.int64]) -> NDArray[np.bool_]:
