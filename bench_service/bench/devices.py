@@ -1,4 +1,4 @@
-"""PORT to a bench's devices without a job: what they last said of themselves, and the way to make them safe.
+"""PORT to a bench's devices without a job: their last known state, and the way to make them safe.
 
 Light on purpose: the supervisor imports this and little else.
 """
@@ -13,36 +13,36 @@ MOVING = "moving"
 
 @dataclass(frozen=True)
 class DeviceState:
-    """What a bench's devices last said of themselves. Angles in degrees, temperatures in °C."""
+    """The last reported state of a bench's devices. Angles in degrees, temperatures in °C."""
 
     table: str = AT_REST
-    """"at rest" (locked) or "moving": a demand was sent and has not ended, whoever sent it."""
+    """"at rest" (locked) or "moving": a demand was sent, by any process, and has not ended."""
     angles_deg: tuple[float, float, float] | None = None
     """Outer, middle, inner axis where the table last came to rest; None: not known."""
     powered: bool = False
-    """Whether the unit has power."""
+    """True while the unit has power."""
     chamber_target_c: float | None = None
-    """Where the chamber goes; None: there is none, or it was never commanded."""
+    """The chamber's commanded temperature; None: there is no chamber, or it was never commanded."""
     chamber_ambient_c: float | None = None
-    """Where it goes when the bench is made safe."""
+    """The chamber's target temperature when the bench is made safe."""
     current_ma: float = 0.0
-    """What the precision current source was asked for."""
+    """The current requested of the precision current source."""
     fault: str = ""
-    """Why the devices could not be made safe the last time that it was tried."""
+    """The reason why the last attempt to make the devices safe failed."""
     at: datetime | None = None
-    """When something was last asked of them; None: nothing ever was."""
+    """Time of the last command to any device; None: no command was ever sent."""
     by: str = ""
-    """The process that asked, in words."""
+    """The process that sent that command, as text."""
     job: str | None = None
-    """The job for which it asked."""
+    """The job for which the command was sent."""
     openings: int = 0
-    """How often the devices' link was taken so far."""
+    """The number of times that the devices' link was taken so far."""
     linked: bool = False
-    """Whether a process has, or at its death had, the devices' link."""
+    """True while a process has the devices' link, or had it when it died."""
 
     @property
     def unsafe(self) -> tuple[str, ...]:
-        """What is not as it must be on a bench that is left alone; empty: the bench is safe."""
+        """The conditions that keep the unattended bench from being safe; empty: the bench is safe."""
         found: list[str] = []
         if self.table != AT_REST:
             found.append("the table moves")
@@ -66,13 +66,13 @@ class BenchDevices(Protocol):
     """The devices of one bench, usable without a job."""
 
     def device_state(self) -> DeviceState | None:
-        """What they last said; None where this host does not know. Never waits for whoever drives them."""
+        """The devices' last reported state; None where unknown on this host. Never waits for the driving process."""
         ...
 
     def make_safe(self, by: str) -> DeviceState:
-        """Stop the table, lead the chamber to ambient, no current, the unit off; on a safe bench nothing is asked.
+        """Stop the table, send the chamber to ambient, cut current and power; a safe bench gets no command.
 
-        Raises `DeviceBusy` where another process has the devices' link, `BenchError`, or an `ExceptionGroup` of what
-        failed; then the state says it.
+        Raises `DeviceBusy` where another process has the devices' link, `BenchError`, or an `ExceptionGroup` of the
+        failures; the state then has the fault.
         """
         ...

@@ -11,7 +11,7 @@ from procedures.core.unit import Unit
 
 
 class BenchDirectory:
-    """What can be known of a bench by its name, in any process of the database."""
+    """Everything that any process of the database can know of a bench by its name."""
 
     def __init__(
         self,
@@ -22,10 +22,10 @@ class BenchDirectory:
         drawn: Callable[[str], Unit | None],
         holder: Callable[[str], str | None],
     ) -> None:
-        """`driver`: of this process's own bench, if it drives one. `preferred`: the bench of jobs that name none.
+        """Set up with this process's own bench (`driver`, if any) and the bench of jobs that name none (`preferred`).
 
         `drawn`: the unit that every simulated bench has by drawing it from its serial; None for another serial.
-        `holder`: who drives a bench now, in a person's words; None: nobody.
+        `holder`: the process that drives a bench now, as text; None: no process does.
         """
         self._registry = registry
         self._units = units
@@ -39,7 +39,7 @@ class BenchDirectory:
         return tuple(bench.id for bench in self._registry.benches())
 
     def description(self, bench_id: str) -> BenchDescription:
-        """Raises `NotFound`, naming those that there are."""
+        """Return a bench's description. Raises `NotFound`, naming the registered benches."""
         if self._driver is not None and self._driver.description.id == bench_id:
             return self._driver.description
         try:
@@ -76,9 +76,9 @@ class BenchDirectory:
         return tuple(units) if drawn is None else (*units, drawn)
 
     def driven(self, bench_id: str) -> bool:
-        """Whether a worker drives a bench now: whether somebody holds its lease."""
+        """Tell if a worker drives the bench now, that is, if some process holds its lease."""
         return self.holder(bench_id) is not None
 
     def holder(self, bench_id: str) -> str | None:
-        """Who drives a bench now."""
+        """The holder of a bench's lease now, as text; None where the lease is free."""
         return self._holder(bench_id)

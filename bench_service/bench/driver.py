@@ -1,4 +1,4 @@
-"""PORT to the machine: what turns a bench's name into devices."""
+"""PORT to the machine: opens the devices of a bench by the bench's name."""
 
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -10,7 +10,7 @@ from procedures.core.unit import Unit
 
 @dataclass(frozen=True)
 class TrueTriad:
-    """What a simulated triad really was in one launch: ``U = bias + matrix·v`` in the nominal output's unit."""
+    """The true values of a simulated triad in one launch: ``U = bias + matrix·v`` in the nominal output's unit."""
 
     triad: str
     output_unit: str
@@ -22,7 +22,7 @@ class Lease(Protocol):
     """The right to drive a bench, held for a process's life unless it is lost."""
 
     def held(self) -> bool:
-        """Whether it is still ours."""
+        """Tell if this process still holds the lease."""
         ...
 
     def regain(self) -> bool:
@@ -35,7 +35,7 @@ class Lease(Protocol):
 
 
 class BenchDriver(BenchDevices, Protocol):
-    """One bench's devices. `open` is called once per job, and again after a restart."""
+    """The devices of one bench. `open` is called once per job, and again after a restart."""
 
     @property
     def description(self) -> BenchDescription: ...
@@ -59,5 +59,5 @@ class BenchDriver(BenchDevices, Protocol):
         ...
 
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:
-        """What a simulated unit really is in a job with this seed; empty on a real bench."""
+        """The true values of a simulated unit in a job with this seed; empty on a real bench."""
         ...

@@ -1,7 +1,7 @@
-"""The sign that the process which drives a bench lives, in the bench's device folder.
+"""The heartbeat of the process that drives a bench, in the bench's device folder.
 
-One preallocated record, written in place: it needs neither a database nor a free byte. Whoever watches it counts on his
-own clock for how long it has not changed, so no clock of the other process matters.
+One preallocated record, written in place: it needs neither a database nor a free byte. Its reader counts, on its
+own clock, how long it has not changed, so no clock of the other process matters.
 """
 
 import os
@@ -12,13 +12,13 @@ from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.records_in_place import Unreadable, encoded, preallocate, read_record, write_record
 
 BEAT_S = 0.5
-"""A process that drives a bench says so often that it is there [s, real time]."""
+"""Interval between two heartbeats of a process that drives a bench [s, real time]."""
 SILENT_S = 10.0
-"""After so long without a word, while its bench is not safe, it is killed [s]."""
+"""A driving process without a heartbeat for so long, on a bench that is not safe, is killed [s]."""
 
 
 class HeartbeatFile:
-    """The heartbeat of one bench on its host: written by who drives it, read by the supervisor."""
+    """The heartbeat of one bench on its host: written by the driving process, read by the supervisor."""
 
     def __init__(self, folder: Path, bench_id: str) -> None:
         self._path = folder / f"bench-{bench_id}.heartbeat"
@@ -36,7 +36,7 @@ class HeartbeatFile:
             os.close(file)
 
     def beat(self) -> None:
-        """Say that this process lives. Raises `OSError`."""
+        """Write the next heartbeat of this process. Raises `OSError`."""
         self._count += 1
         record = encoded({"pid": self._own.pid, "started": self._own.started, "count": self._count})
         assert record is not None, "three short fields"
@@ -45,7 +45,7 @@ class HeartbeatFile:
         write_record(self._file, 0, record)
 
     def last(self, process: ProcessIdentity) -> int:
-        """The number of a process's last word; 0 where it has said none. Raises nothing."""
+        """The number of a process's last heartbeat; 0 where it has written none. Raises nothing."""
         with suppress(OSError, Unreadable):
             file = os.open(self._path, os.O_RDONLY | os.O_CLOEXEC)
             try:
@@ -57,7 +57,7 @@ class HeartbeatFile:
         return 0
 
     def close(self) -> None:
-        """Close the file; the next word opens it again."""
+        """Close the heartbeat file; the next heartbeat opens it again."""
         if self._file is not None:
             os.close(self._file)
             self._file = None

@@ -18,10 +18,10 @@ from procedures.bench.errors import BenchError, DeviceBusy, Disconnected
 
 
 class DrivingSession(Protocol):
-    """What is needed of a job's session (`bench_service.bench.session.BenchSession`)."""
+    """The part of a job's session that is needed here (`bench_service.bench.session.BenchSession`)."""
 
     def make_safe(self) -> None:
-        """Raises an `ExceptionGroup` of failures, and `Disconnected` where a device does not answer."""
+        """Make the devices safe. Raises an `ExceptionGroup`, and `Disconnected` where a device does not answer."""
         ...
 
     def close(self) -> None:
@@ -31,11 +31,11 @@ class DrivingSession(Protocol):
 
 @dataclass(frozen=True)
 class Obstacle:
-    """Why a bench could not be made safe."""
+    """The reasons why a bench could not be made safe."""
 
     reasons: tuple[str, ...]
     busy: bool = False
-    """Another process has the devices' link."""
+    """True where another process has the devices' link."""
 
     @property
     def why(self) -> str:
@@ -48,12 +48,12 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class RoadEnd:
-    """How far the whole road had to be walked."""
+    """The outcome of making a bench safe after a job's session."""
 
     obstacle: Obstacle | None = None
-    """None: the bench is safe."""
+    """The failure that remains; None: the bench is safe."""
     detour: str = ""
-    """Why the job's own link did not do, where a new one did."""
+    """The failure of the job's own link, where a new link was then used."""
 
 
 def over_new_link(devices: BenchDevices, by: str) -> Obstacle | None:
@@ -73,7 +73,7 @@ def over_new_link(devices: BenchDevices, by: str) -> Obstacle | None:
 
 @dataclass(frozen=True)
 class Rescue:
-    """What a process that starts found of a bench that was left unsafe, and did before anything else."""
+    """The unsafe state of a bench that a starting process found, and the result of making it safe."""
 
     left: DeviceState
     obstacle: Obstacle | None

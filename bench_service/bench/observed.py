@@ -1,6 +1,6 @@
-"""A bench whose every verb is seen as it begins and as it ends: for the devices' register, and for the watchdog.
+"""A bench that reports each verb's begin and end to an observer: the devices' register, or the watchdog.
 
-Whoever drives the bench notices nothing; knows no device.
+The bench's caller notices nothing. This module knows no device.
 """
 
 from collections.abc import AsyncGenerator, AsyncIterator, Generator, Mapping
@@ -21,22 +21,22 @@ from procedures.core.turn import Turn
 
 
 class Observer(Protocol):
-    """Sees verbs, named "device.verb", with their arguments as JSON."""
+    """Receives the begin and end of verbs, named "device.verb", with their arguments as JSON."""
 
     def begin(self, verb: str, arguments: Mapping[str, Any]) -> None:
-        """Before the device is asked; where this raises, it is not asked, and the verb ends with that failure."""
+        """Called before the device is asked; where this raises, the verb ends with that failure instead."""
         ...
 
     def end(self, verb: str, failure: BaseException | None) -> None:
-        """After it has answered, or failed to."""
+        """Called after the device has answered, or failed to answer."""
         ...
 
     def asked(self, device: str) -> None:
-        """The next block of a recording is wanted."""
+        """Called when the next block of a recording is wanted."""
         ...
 
     def heard(self, device: str) -> None:
-        """It has come, or the recording has ended."""
+        """Called when that block has come, or the recording has ended."""
         ...
 
 
@@ -56,7 +56,7 @@ class _Seen:
 
 
 class ObservedTurntable(_Seen):
-    """`Turntable`."""
+    """A `Turntable` that reports its verbs to an observer."""
 
     def __init__(self, table: Turntable, observer: Observer) -> None:
         super().__init__(observer)
@@ -88,7 +88,7 @@ class ObservedTurntable(_Seen):
 
 
 class ObservedSupply(_Seen):
-    """`Supply`."""
+    """A `Supply` that reports its verbs to an observer."""
 
     def __init__(self, supply: Supply, observer: Observer) -> None:
         super().__init__(observer)
@@ -112,7 +112,7 @@ class ObservedSupply(_Seen):
 
 
 class ObservedChamber(_Seen):
-    """`Chamber`."""
+    """A `Chamber` that reports its verbs to an observer."""
 
     def __init__(self, chamber: Chamber, observer: Observer) -> None:
         super().__init__(observer)
@@ -136,7 +136,7 @@ class ObservedChamber(_Seen):
 
 
 class ObservedCurrentSource(_Seen):
-    """`CurrentSource`."""
+    """A `CurrentSource` that reports its verbs to an observer."""
 
     def __init__(self, source: CurrentSource, observer: Observer) -> None:
         super().__init__(observer)
@@ -156,7 +156,7 @@ class ObservedCurrentSource(_Seen):
 
 
 class ObservedOperator(_Seen):
-    """`Operator`."""
+    """An `Operator` that reports its requests to an observer."""
 
     def __init__(self, operator: Operator, observer: Observer) -> None:
         super().__init__(observer)
@@ -168,7 +168,7 @@ class ObservedOperator(_Seen):
 
 
 class ObservedImu(_Seen):
-    """`Imu`."""
+    """An `Imu` that reports its verbs and blocks to an observer."""
 
     def __init__(self, imu: Imu, observer: Observer) -> None:
         super().__init__(observer)

@@ -1,4 +1,4 @@
-"""Who a process is, so that it can be told from a later one with the same number."""
+"""Identity of processes: distinguishes a process from a later one with the same number."""
 
 import os
 import signal
@@ -10,12 +10,12 @@ from typing import Protocol
 
 HOST = socket.gethostname()
 GONE = frozenset("ZXx")
-"""States of a process that has ended, and only waits for its parent to notice."""
+"""States of a process that has ended but was not yet reaped by its parent."""
 
 
 @dataclass(frozen=True)
 class ProcessIdentity:
-    """A process of one host, by number and the moment of its start in the system's own words."""
+    """A process of one host, by number and by its start time as the system gives it."""
 
     host: str
     pid: int
@@ -23,16 +23,16 @@ class ProcessIdentity:
 
     @classmethod
     def own(cls) -> "ProcessIdentity":
-        """The process that asks."""
+        """The identity of the calling process."""
         return cls(HOST, os.getpid(), _started(os.getpid()))
 
     @property
     def here(self) -> bool:
-        """Whether it is, or was, a process of this host."""
+        """True for a process, living or dead, of this host."""
         return self.host == HOST
 
     def alive(self) -> bool:
-        """Whether it lives; of a process on another host nobody here can say, it counts as dead."""
+        """Tell if the process lives; a process of another host cannot be checked, and counts as dead."""
         return self.here and self.started != "" and _started(self.pid) == self.started
 
     def kill(self) -> bool:
@@ -55,7 +55,7 @@ class Driving:
 
     process: ProcessIdentity
     ended: bool = False
-    """Whether it ended in order."""
+    """True where the process ended in an orderly way."""
 
     @property
     def alive(self) -> bool:
@@ -63,7 +63,7 @@ class Driving:
 
 
 class Watch(Protocol):
-    """What processes of one host tell one another about a bench."""
+    """The processes of one host that drive or supervise a bench, as they register themselves."""
 
     def driving(self) -> Driving | None:
         """Which process drives the bench; None where none of this host ever did."""
@@ -75,7 +75,7 @@ class Watch(Protocol):
 
 
 def _started(pid: int) -> str:
-    """When a living process began; empty for one that is gone."""
+    """Start time of a living process, as text; empty for one that is gone."""
     if Path("/proc/self/stat").exists():
         try:
             fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
@@ -88,7 +88,7 @@ def _started(pid: int) -> str:
 
 
 def _boot() -> str:
-    """Which start of the machine this is: ticks are counted from it."""
+    """Identifier of the machine's current boot: process start times count from it."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
     except OSError:

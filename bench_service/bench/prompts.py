@@ -1,4 +1,4 @@
-"""What a person at the bench is asked while a job runs, and the answer: PORT of memory, and the operator behind it."""
+"""Requests to the person at the bench while a job runs, and the answers: PORT of memory, and the operator behind it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from procedures.bench.errors import Stopped
 from procedures.core.table_angles import TableAngles
 
 LOOK_S = 0.2
-"""How often it is looked for an answer [s, real time]."""
+"""Interval between two looks for an answer [s, real time]."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a person said: the work is done, or will not be."""
+    """A person's answer to a request: the work is done, or refused."""
 
     done: bool
     remark: str = ""
@@ -25,29 +25,29 @@ class Answer:
 
 
 class PromptStore(Protocol):
-    """One question at a time a job. Asked and answered, it is an event of the job too."""
+    """One open request per job. Request and answer are events of the job too."""
 
     def ask(self, job_id: str, text: str, at: datetime) -> None:
-        """Ask; a question that was there before is forgotten."""
+        """Store a request; it replaces an earlier request of the job."""
         ...
 
     def answer(self, job_id: str, answer: Answer, at: datetime) -> Job:
-        """Answer what is asked. Raises `IllegalTransition` where nothing is, `NotFound`."""
+        """Store the answer to the open request. Raises `IllegalTransition` where none is open, `NotFound`."""
         ...
 
     def answered(self, job_id: str) -> Answer | None:
-        """The answer to what was asked; None: not yet."""
+        """The answer to the open request; None: not yet answered."""
         ...
 
     def withdraw(self, job_id: str) -> None:
-        """Ask no more."""
+        """Remove the job's open request."""
         ...
 
 
 class AskedOperator:
-    """`procedures.bench.Operator`: a person who reads the job's page and says when the work is done.
+    """A `procedures.bench.Operator` that asks a person through the job's page.
 
-    `then`: an operator who does it afterwards, as the simulated bench's own does in an exercise.
+    `then`: an operator who is asked afterwards, as the simulated bench's own does in an exercise.
     """
 
     def __init__(self, prompts: PromptStore, job_id: str, then: Operator | None = None) -> None:
@@ -70,4 +70,4 @@ class AskedOperator:
 
 
 Asking = Callable[[str, Operator | None], Operator]
-"""From a job's id and the bench's own operator, whom the procedure asks."""
+"""Makes, from a job's id and the bench's own operator, the operator that the procedure asks."""

@@ -1,8 +1,8 @@
-"""Small records at fixed places of a file, each written over the one before in a single write.
+"""Small records at fixed places of a file, each overwritten in place by a single write.
 
 Once the file has its full length no write needs a free byte or a free inode, so a record changes on a full disk too.
 (On a file system that copies on write, such as btrfs or zfs, it may still need room: `StopChannel` has sockets
-beside its file for that.) Processes of one host see a record at once; a checksum tells a whole one from a torn one.
+for that, in addition to its file.) Processes of one host see a record at once; a checksum detects a torn record.
 """
 
 import json
@@ -14,9 +14,9 @@ from typing import Any
 from bench_service.wall_clock import pause
 
 RECORD_BYTES = 4096
-"""One page: a longer record could be torn by a machine that fails."""
+"""Length of a record, one page: a longer one could be torn by a power failure."""
 TRIES = 50
-"""How often a reader looks again that met a writer in the middle."""
+"""Maximum number of retries of a reader that meets a half-written record."""
 AGAIN_S = 0.002
 
 
@@ -25,7 +25,7 @@ class Unreadable(Exception):
 
 
 def encoded(document: Mapping[str, Any]) -> bytes | None:
-    """A record: CRC-32, then the document as JSON, padded; None where the document is too long for one."""
+    """Encode a record: CRC-32, then the document as JSON, padded; None where the document is too long for one."""
     text = json.dumps(document, ensure_ascii=False)
     body = text.encode(errors="backslashreplace")  # half a character becomes its escape, as JSON has it
     if len(body) > RECORD_BYTES - 16:

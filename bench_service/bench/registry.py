@@ -1,4 +1,4 @@
-"""PORT of memory: benches by name, the units that each can test, and the software stops of each.
+"""PORT of memory: registered benches, the units that each can test, and their software stops.
 
 Every method is one transaction: it commits, or it raises and nothing of it remains.
 """
@@ -23,13 +23,13 @@ class BenchRegistry(Protocol):
         ...
 
     def bench(self, bench_id: str) -> BenchDescription:
-        """Raises `NotFound`."""
+        """Return the description of a bench. Raises `NotFound`."""
         ...
 
     def benches(self) -> tuple[BenchDescription, ...]: ...
 
     def stop_bench(self, stop: BenchStop) -> None:
-        """Note a stop beside those that stand. Repeated with the same id it changes nothing."""
+        """Add a stop to the bench. Repeated with the same id it changes nothing."""
         ...
 
     def stop_bench_once(self, stop: BenchStop) -> None:
@@ -41,7 +41,7 @@ class BenchRegistry(Protocol):
         ...
 
     def release_stop(self, bench_id: str, stop_id: str, at: datetime, by: str, remark: str) -> BenchStop:
-        """Release one stop; the bench works again once none stands. The same release repeated changes nothing.
+        """Release one stop; the bench works again once no stop stands. The same release repeated changes nothing.
 
         Raises `NotFound`, and `IllegalTransition` where it was released before by another person or with another
         remark.

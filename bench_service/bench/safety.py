@@ -1,4 +1,4 @@
-"""What is known of a bench's safety, and who sees to it: asked by HTTP, pages, and a service that starts."""
+"""Safety of a bench: its known state, and making it safe. Used by HTTP, pages, and a service that starts."""
 
 import logging
 from collections.abc import Callable
@@ -15,9 +15,9 @@ from bench_service.model.records import BenchStop
 from bench_service.wall_clock import monotonic_s, now, pause
 
 STOPPING_S = 1.0
-"""How long the answer to a stop waits for the devices to be safe [s, real time]."""
+"""Maximum time that the answer to a stop waits for the devices to be safe [s, real time]."""
 START_S = 3.0
-"""How long a service that starts waits for a supervisor that has the devices' link at this moment [s]."""
+"""Maximum time that a starting service waits for a supervisor that has the devices' link at this moment [s]."""
 LOOK_S = 0.02
 
 log = logging.getLogger(__name__)
@@ -25,12 +25,12 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Safety:
-    """What is known of a bench's safety at one moment."""
+    """The known safety of a bench at one moment."""
 
     safe: bool | None
-    """None: not known on this host, and nobody on the bench's own has said."""
+    """True or False where known; None: not known on this host, and not reported by the bench's own host."""
     explanation: str
-    """For a person, in whole sentences."""
+    """Explanation for a person, in whole sentences."""
     devices: DeviceState | None
     worker: ProcessIdentity | None
     """The process of this host that drives the bench, if one lives."""
@@ -48,7 +48,7 @@ class SafetyService:
         watch: Callable[[str], Watch],
         note: Callable[[str, str, datetime, dict[str, Any]], None],
     ) -> None:
-        """`devices` and `watch`: those of a bench, by its id. `note`: appends an event to a job (`JobStore.note`)."""
+        """Set up with `devices` and `watch` of a bench, by its id; `note` appends an event to a job."""
         self._benches = benches
         self._append = note
         self._devices = devices
@@ -56,7 +56,7 @@ class SafetyService:
         self._by = f"the service, {ProcessIdentity.own()}"
 
     def known(self, bench_id: str) -> Safety:
-        """What is known now. Raises `StorageFailure`."""
+        """The bench's safety as known now. Raises `StorageFailure`."""
         state = self._devices(bench_id).device_state()
         watch = self._watch(bench_id)
         driving = watch.driving()
@@ -69,9 +69,9 @@ class SafetyService:
         return Safety(safe, explanation, state, worker, supervisor)
 
     def stopping(self, bench_id: str, patient: bool = True) -> Safety:
-        """What is known of a bench on this host shortly after its stop was asked for; needs no database.
+        """The safety of a bench on this host shortly after its stop was requested; needs no database.
 
-        Where nobody else can, the devices are made safe here. Not `patient`: what is known now.
+        Where no other process can, this one makes the devices safe. Not `patient`: answer at once.
         """
         found = self.known(bench_id)
         if found.safe is False and found.worker is None and found.supervisor is None:
@@ -83,7 +83,7 @@ class SafetyService:
         return self._within(bench_id, found) if patient else found
 
     def stopping_elsewhere(self, bench_id: str) -> Safety:
-        """What the books know of another host's bench shortly after its stop was entered. Raises `StorageFailure`."""
+        """The safety of another host's bench, from the database, shortly after its stop. Raises `StorageFailure`."""
         return self._within(bench_id, self.known(bench_id))
 
     def _within(self, bench_id: str, found: Safety) -> Safety:
@@ -94,7 +94,7 @@ class SafetyService:
         return found
 
     def require(self, bench_id: str) -> None:
-        """Raises `NotSafe` with the reason where the devices are not known to be safe, after trying to make them so."""
+        """Try to make the devices safe. Raises `NotSafe` with the reason where they are not known to be safe then."""
         found = self.known(bench_id)
         obstacle = over_new_link(self._devices(bench_id), self._by) if found.safe is False else None
         if obstacle is not None:
@@ -103,10 +103,10 @@ class SafetyService:
             raise NotSafe(f"bench {bench_id!r} is not released: {found.explanation}")
 
     def at_start(self, bench_id: str, rescued: Rescue | None = None) -> None:
-        """Make safe whatever a dead process left, before anything else is done; the bench's lease must be held.
+        """Make safe the devices that a dead process left unsafe, first of all; the bench's lease must be held.
 
         Where that fails the bench is stopped: the service answers, but nothing moves until a person has looked.
-        `rescued`: what was found and done before the database was opened.
+        `rescued`: the state found, and the attempt made, before the database was opened.
         """
         devices = self._devices(bench_id)
         state = devices.device_state()
@@ -131,7 +131,7 @@ class SafetyService:
             self._note(left.job, text + str(obstacle))
 
     def stop_unsafe(self, bench_id: str, why: str) -> None:
-        """Nothing may run on a bench that could not be made safe, until a person releases it."""
+        """Stop a bench that could not be made safe: nothing may run on it until a person releases it."""
         log.error("bench %s: %s", bench_id, why)
         self._benches.stop_bench_once(BenchStop(bench_id, now(), why, by=self._by))
 
@@ -161,7 +161,7 @@ def _here(bench_id: str, state: DeviceState, worker: ProcessIdentity | None, sup
 
 
 def _elsewhere(bench_id: str, stops: tuple[BenchStop, ...]) -> tuple[bool | None, str]:
-    """Known safe where that was seen after the last stop: a bench that works in between may be anything."""
+    """Safe where the devices were seen safe after the last stop: a bench that works in between may be anything."""
     if stops and all(stop.safe_at is not None for stop in stops):
         stop, seen = stops[-1], max(stop.safe_at for stop in stops if stop.safe_at is not None)
         return True, f"Seen safe on the bench's host at {seen.isoformat()}, last commanded by {stop.safe_by}."

@@ -1,4 +1,4 @@
-"""A bench while a job drives it: one thread with its own event loop, and the way to safety out of everything."""
+"""A bench while a job drives it: one thread with its own event loop, and the way to safety from every state."""
 
 import asyncio
 import logging
@@ -29,21 +29,22 @@ T = TypeVar("T")
 log = logging.getLogger(__name__)
 
 PATIENCE = Patience()
-"""For how long a device may say nothing."""
+"""Time limits for the answers of devices."""
 UNWIND_S = 1.0
-"""How long a procedure may take to leave a verb that was cancelled [s, real time]."""
+"""Time that a procedure may take to leave a cancelled verb [s, real time]."""
 STOPPED = "stopped by an operator"
 STOP_CHECK_S = 0.2
-"""How long a move, a settle or a recording may go on before a stop that was asked for is seen [s, real time]."""
+"""Interval at which a move, a settle or a recording checks for a requested stop [s, real time]."""
 HANGS_S = 10.0
-"""How long the database may leave that question unanswered, before the station is given up: meanwhile no stop would be
-seen, and nothing stored [s]. One that refuses has answered."""
+"""Time without an answer from the database to the stop query, after which the station is given up: until then
+no stop would be seen, and nothing stored [s]. A refusal is an answer.
+"""
 ANSWER_S = 0.1
-"""How long a look waits for the answer whether a stop was asked for; a later one is seen by a later look [s]."""
+"""Time that one check waits for the answer to the stop query; a later answer is seen by a later check [s]."""
 
 
 class ShuttingDown(BaseException):
-    """The service is ending: the job is left as it is, to go on after the next start. Not an error of the job."""
+    """Raised when the service is ending; the job resumes after the next start. Not an error of the job."""
 
 
 class BenchSession:
@@ -73,13 +74,13 @@ class BenchSession:
         self._shutting_down = threading.Event()
         self._stopped = threading.Event()
         self._under_way: Future[Any] | None = None
-        """What the procedure is asked for now."""
+        """The procedure's step that is under way."""
         self._safety = threading.Lock()
-        """Held by who makes the bench safe, or ends the session: the job's own thread, or who stops it."""
+        """Held while the bench is made safe or the session ended, by the job's own thread or by a stopping one."""
         self._is_safe = False
         self._closed = False
         self._lost: str | None = None
-        """Why the thread that drives the bench does not come back, if it does not."""
+        """The reason why the bench's thread does not come back, if it does not."""
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._drive, name=f"bench {bench.description.id}", daemon=True)
         self._thread.start()
@@ -91,7 +92,7 @@ class BenchSession:
         """Record one station and store it. Raises `BenchError`, `ProcedureDefect`, `StorageFull`,
         `StorageFailure`, `ShuttingDown`.
 
-        A device that does not answer is `Disconnected`, whatever its driver does about it.
+        A device that does not answer is `Disconnected`, whatever its driver's own error handling does.
         """
         if self._stopped.is_set():
             raise Stopped(STOPPED)
@@ -104,7 +105,7 @@ class BenchSession:
             self._under_way = None
 
     def stop(self) -> None:
-        """Leave whatever is under way, with `Stopped` for who waits for it; nothing more is recorded. From any thread.
+        """Leave the step under way, with `Stopped` for its waiting caller; nothing more is recorded. From any thread.
 
         It waits for nothing but the procedure's leaving, for `UNWIND_S`: neither for a database nor for the job's own
         thread, which may hang in one.
@@ -115,7 +116,7 @@ class BenchSession:
             self._cancel(under_way, "a stop came while a device or the database did not answer")
 
     def shut_down(self) -> None:
-        """Ask whoever waits in `record` to leave with `ShuttingDown`; called from another thread."""
+        """Make the waiting `record` call leave with `ShuttingDown`; called from another thread."""
         self._shutting_down.set()
 
     def make_safe(self) -> None:
@@ -131,9 +132,9 @@ class BenchSession:
             self._is_safe = True
 
     def close(self) -> None:
-        """End the thread, and give the devices' links back: whatever is still asked of them after is refused.
+        """End the thread, and give the devices' links back: later requests to them are refused.
 
-        A thread that does not come back is left alone; it holds nothing that anybody needs. A second time does nothing.
+        A thread that does not come back is left alone; it holds no resource that is needed. A second call does nothing.
         """
         with self._safety:
             if not self._closed:
@@ -149,7 +150,7 @@ class BenchSession:
             self._thread.join()
 
     def _drive(self) -> None:
-        """The bench's thread, to its end: also of one that was lost and came back after all."""
+        """Run the bench's thread to its end, also when it was given up as lost and came back after all."""
         self._loop.run_forever()
         left = asyncio.all_tasks(self._loop)
         for task in left:
@@ -184,7 +185,7 @@ class BenchSession:
                 self._look_for_stop(future, min(passed_s, 2 * STOP_CHECK_S))
 
     def _look_for_stop(self, future: "Future[Any]", passed_s: float) -> None:
-        """Raises `Stopped`, and `StorageFailure` where nobody can say any more whether a stop was asked for."""
+        """Check for a requested stop. Raises `Stopped`, and `StorageFailure` where the query stays unanswered."""
         wanted = self._stop_wanted.ask(ANSWER_S)
         if wanted:
             self._cancel(future, "a stop came while a device did not answer")
@@ -260,7 +261,7 @@ class BenchSession:
         self._streams = None
 
     def _tell(self, tap: LiveTap) -> None:
-        """Say what the bench does, now and every `PUBLISH_S`: between two steps of the procedure, in their thread."""
+        """Publish the live state, now and every `PUBLISH_S`: between two steps of the procedure, in their thread."""
         if self._told is None or self._told.done():
             self._told = self._loop.create_task(tap.publish())
         self._telling = self._loop.call_later(PUBLISH_S, self._tell, tap)

@@ -1,4 +1,4 @@
-"""What a procedure's `acquire` must give: one stream for each station that it was given, in their order."""
+"""Checks of a procedure's `acquire`: it must give one stream for each given station, in order."""
 
 from collections.abc import AsyncIterator, Sequence
 
@@ -8,7 +8,7 @@ from procedures.core.recording import Station
 
 
 async def stream_of(streams: AsyncIterator[Stream], procedure: str, station: Station) -> Stream:
-    """The next stream, which must be of this station. Raises `ProcedureDefect`, and what the procedure raises."""
+    """The next stream, which must be of this station. Raises `ProcedureDefect`, and any error of the procedure."""
     stream = await anext(streams, None)
     if stream is None:
         raise ProcedureDefect(
@@ -24,7 +24,7 @@ async def stream_of(streams: AsyncIterator[Stream], procedure: str, station: Sta
 
 
 async def require_end(streams: AsyncIterator[Stream], procedure: str, stations: Sequence[Station]) -> None:
-    """After the last station the procedure must end. Raises `ProcedureDefect` where it gives one more stream."""
+    """Check that the procedure ends after the last station. Raises `ProcedureDefect` where it gives one more stream."""
     further = await anext(streams, None)
     if further is not None:
         raise ProcedureDefect(

@@ -1,11 +1,11 @@
 """The supervisor of a bench: a process that outlives the worker, and makes the bench safe where the worker cannot.
 
-It looks at four things: which process drives the bench and whether it lives, what the devices last said of themselves,
-whether somebody has stopped the bench, and whether the driving process gives its heartbeat. It starts nothing again.
+It looks at four things: which process drives the bench and whether it lives, the devices' last reported state,
+whether the bench is stopped, and whether the driving process gives its heartbeat. It restarts nothing.
 While the process that drives the bench lives, it ends one that does not answer a stop, or gives no heartbeat while the
 bench is not safe, and commands the devices only of a stopped bench whose link was given back.
 
-All that it needs to act are files of its host; a database that does not answer is told later.
+It acts on files of its host alone; a database that does not answer is updated later.
 """
 
 import logging
@@ -28,23 +28,23 @@ from bench_service.model.errors import BenchBusy, ServiceError
 from bench_service.wall_clock import monotonic_s
 
 LOOK_S = 0.1
-"""How often the bench is looked at [s]: a worker's death is noticed within this."""
+"""Interval between two looks at the bench [s]: a worker's death is noticed within this."""
 STOP_LOOK_S = 0.5
-"""How often the database is asked whether the bench is stopped [s]."""
+"""Interval at which the database is asked for stops of the bench [s]."""
 ANSWER_S = 0.1
-"""How long a look waits for the database's answer [s]; one that comes later is seen by a later look."""
+"""Time that a look waits for the database's answer [s]; a later answer is seen by a later look."""
 LEASE_S = 0.8
-"""How long the lease of a dead worker is waited for [s]: then the devices' own link, exclusive too, must do."""
+"""Time that it waits for the lease of a dead worker [s]: after it the devices' own link, exclusive too, must do."""
 AGAIN_S = 1.0
-"""How often devices that could not be made safe are tried again [s]."""
+"""Interval between two attempts to make devices safe that could not be made safe [s]."""
 LINGER_S = 60.0
-"""How long it stays after a crash, once the bench is safe [s]."""
+"""Time that it stays after a crash, once the bench is safe [s]."""
 
 log = logging.getLogger(__name__)
 
 
 class Supervisor:
-    """Watches one bench until it is told to end, or nothing is left to watch."""
+    """Watches one bench until it is ended, or nothing is left to watch."""
 
     def __init__(
         self,
@@ -76,12 +76,12 @@ class Supervisor:
         self._unsaid: list[tuple[str, str | None]] = []
         self._unsaid_stop: str | None = None
         self._stopped = False
-        """By the channel, or as the books said last."""
+        """True while the bench is stopped, by the channel or by the last answer of the database."""
         self._told_not_safe = False
         self._next_stop_look_s = 0.0
         self._next_try_s = 0.0
         self._first_try_s: float | None = None
-        """Of devices that could not be made safe so far."""
+        """Time of the first failed attempt to make the devices safe; None: none has failed."""
         self._left_since_s: float | None = None
         self._gone_since_s: float | None = None
         self._looked_s = monotonic_s()
@@ -98,7 +98,7 @@ class Supervisor:
             self._channel.close()
 
     def _look_once(self, listening: socket.socket | None, ending: Event, companion: bool) -> bool:
-        """Wait for a word or for `LOOK_S`, then look; whether there is something left to watch."""
+        """Wait for a message or for `LOOK_S`, then look; True while there is something left to watch."""
         if listening is None:
             ending.wait(LOOK_S)
         elif select.select((listening,), (), (), LOOK_S)[0]:
@@ -115,7 +115,7 @@ class Supervisor:
         now_s = monotonic_s()
         driving, state = self._watch.driving(), self._devices.device_state()
         alive = driving is not None and driving.alive
-        if state is not None and state.safe:  # whoever made it so
+        if state is not None and state.safe:  # whichever process made it safe
             self._told_not_safe, self._first_try_s = False, None
         self._look_for_stop(now_s)
         words = self._answer_stop(state)
@@ -135,7 +135,7 @@ class Supervisor:
         return not companion or alive or not self._may_leave(now_s, driving, state)
 
     def _may_leave(self, now_s: float, driving: Driving | None, state: DeviceState | None) -> bool:
-        """After an orderly end at once; after a crash when it has lasted; but never from a bench that is not safe."""
+        """Tell if it may end: at once after an orderly end, later after a crash, never while the bench is not safe."""
         if self._unsaid or self._unsaid_stop is not None or (state is not None and not state.safe):
             return False
         assert self._gone_since_s is not None
@@ -143,7 +143,7 @@ class Supervisor:
         return in_order or now_s - self._gone_since_s > self._linger_s
 
     def _look_for_stop(self, now_s: float) -> None:
-        """Ask the database, and tell it; the last answer holds while it says nothing."""
+        """Exchange stops and reports with the database; its last answer holds until the next one."""
         if now_s < self._next_stop_look_s and not self._unsaid:
             return
         self._next_stop_look_s = now_s + STOP_LOOK_S
@@ -153,7 +153,7 @@ class Supervisor:
             log.warning("the database does not answer the supervisor of bench %s: %s", self._bench_id, error)
 
     def _ask_books(self) -> None:
-        """In a thread of its own: all that goes to the database."""
+        """Make all exchanges with the database, in a thread of their own."""
         self._exchange.exchange()
         if self._listener is not None and (at := self._listener.listening()) is not None:
             self._books.say_listening(at)
@@ -168,7 +168,7 @@ class Supervisor:
             self._unsaid.pop(0)
 
     def _answer_stop(self, state: DeviceState | None) -> frozenset[str]:
-        """Say in the channel what became of its words; their ids."""
+        """Answer the stop requests in the channel; their ids."""
         ids = frozenset(word.id for word in self._channel.standing())
         if ids:
             safe = self._channel.answered(SUPERVISOR).safe & ids
@@ -187,7 +187,7 @@ class Supervisor:
             self._patience.reset(now_s)
 
     def _look_for_left(self, now_s: float, state: DeviceState | None) -> None:
-        """A worker that lives and has given the link of devices back that could not be made safe does nothing more."""
+        """Make devices safe that a living worker has left unsafe and given back: it does nothing more with them."""
         if not self._stopped or state is None or state.safe or state.linked:
             self._left_since_s = None
         elif self._left_since_s is None:
@@ -196,11 +196,11 @@ class Supervisor:
             self._try(now_s, "the bench is stopped", state)
 
     def _rescue(self, now_s: float, driving: Driving | None, state: DeviceState) -> None:
-        """Nobody drives the bench, and it is not safe."""
+        """Make an unsafe bench safe that no process drives."""
         lease = self._lease_within(LEASE_S)
         again = self._watch.driving()
         try:
-            if again is None or not again.alive:  # else somebody took the bench this moment, and makes it safe himself
+            if again is None or not again.alive:  # else a process took the bench this moment, and makes it safe itself
                 self._try(now_s, f"{driving.process} is gone" if driving else "nobody drives the bench", state)
         finally:
             if lease is not None:
@@ -208,7 +208,7 @@ class Supervisor:
         self._next_stop_look_s = 0.0
 
     def _try(self, now_s: float, why: str, state: DeviceState) -> None:
-        """Make the devices safe over their own link, and say so; where that fails, try again later."""
+        """Make the devices safe over their own link, and report it; where that fails, try again later."""
         obstacle = over_new_link(self._devices, self._by)
         if obstacle is not None:
             self._next_try_s = now_s + AGAIN_S
@@ -228,7 +228,7 @@ class Supervisor:
         self._told_not_safe, self._first_try_s = False, None
 
     def _not_safe(self, why: str, state: DeviceState) -> None:
-        """Nothing else may run on it until a person has looked. Said once, tried again and again."""
+        """Stop the bench until a person has looked. Reported once, though the attempts go on."""
         if self._told_not_safe:
             return
         self._unsaid_stop = why
@@ -236,8 +236,7 @@ class Supervisor:
         self._told_not_safe = True
 
     def _lease_within(self, seconds: float) -> Lease | None:
-        """The bench's lease; None where it does not come in time, because a server does not know of a death yet, or
-        does not answer at all."""
+        """Take the bench's lease; None where it does not come in time, as from a server that is silent."""
         found: list[Lease] = []
         deciding, given_up = Lock(), Event()
 

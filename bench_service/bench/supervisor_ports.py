@@ -1,4 +1,4 @@
-"""PORTS of the supervisor: the bench's lease, the books, and the listener for stops from other hosts."""
+"""PORTS of the supervisor: the bench's lease, its stops in the database, and the listener for other hosts' stops."""
 
 from typing import Protocol
 
@@ -7,28 +7,28 @@ from bench_service.bench.stop.messages import Listening
 
 
 class Lease(Protocol):
-    """The right to drive a bench."""
+    """The exclusive right to drive a bench."""
 
     def release(self) -> None: ...
 
 
 class Listener(Protocol):
-    """Takes stops from other hosts."""
+    """A listener that takes stops from other hosts."""
 
     def listening(self) -> Listening | None:
-        """Where it does so now."""
+        """The address at which it listens now."""
         ...
 
 
 class SafetyBooks(StopBooks, Protocol):
-    """What the supervisor reads and writes in the database. Every verb raises `ServiceError` if it does not answer."""
+    """The supervisor's records in the database. Every verb raises `ServiceError` if it does not answer."""
 
     def confirm_safe(self, by: str) -> None:
-        """A stopped bench is safe."""
+        """Record that a stopped bench is safe."""
         ...
 
     def say_listening(self, at: Listening) -> None:
-        """Remember where this supervisor takes stops from other hosts."""
+        """Record the address where this supervisor takes stops from other hosts."""
         ...
 
     def stop(self, reason: str, by: str) -> None:
@@ -36,5 +36,5 @@ class SafetyBooks(StopBooks, Protocol):
         ...
 
     def note(self, by: str, text: str, job: str | None) -> None:
-        """Say what was done: in the trail, and to the job that it concerns."""
+        """Record an action of the supervisor: in the audit trail, and at the job that it concerns."""
         ...

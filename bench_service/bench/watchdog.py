@@ -1,7 +1,7 @@
-"""The watchdog on a bench's device links: a device that says nothing for too long is taken as disconnected.
+"""The watchdog on a bench's device links: a device that is silent for too long counts as disconnected.
 
-It counts real time, in the looks of whoever waits, so neither a wall clock that jumps nor a machine that was suspended
-makes a device silent. Knows no device: only verbs as they begin and end (`bench_service.bench.observed`).
+It counts real time, in steps between the looks of its caller, so neither a wall clock that jumps nor a machine that was
+suspended makes a device silent. It knows no device: only verbs as they begin and end (`bench_service.bench.observed`).
 """
 
 from collections.abc import Mapping
@@ -13,30 +13,30 @@ from typing import Any
 from procedures.bench.clock import Clock
 
 MOTIONS = frozenset({"turntable.move_to", "turntable.settle", "turntable.make_safe"})
-"""Verbs that answer when a motion is over."""
+"""Verbs that answer at the end of a motion."""
 UNWATCHED = frozenset({"imu.stream", "operator.set_by_hand"})
-"""A recording's blocks are watched one by one; a person takes the time that it takes."""
+"""Verbs without a time limit: a recording's blocks are watched one by one, and a person may take any time."""
 
 
 @dataclass(frozen=True)
 class Patience:
-    """For how long a device may say nothing [s, real time].
+    """Time limits for the answers of devices [s, real time].
 
-    On a simulated bench every verb has `simulated_s`, and that its clock goes on is a sign of life: bench time may pass
+    On a simulated bench every verb has `simulated_s`, and a clock that goes on is a sign of life: bench time may pass
     slower than real time there.
     """
 
     verb_s: float = 5.0
-    """A verb without motion."""
+    """Limit for a verb without motion."""
     block_s: float = 2.0
-    """The next block of a recording."""
+    """Limit for the next block of a recording."""
     motion_s: float = 120.0
-    """A motion: longer than the longest, and the table's own limit comes first."""
+    """Limit for a motion: longer than the longest, and the table's own limit comes first."""
     simulated_s: float = 5.0
 
 
 class Watchdog:
-    """`bench_service.bench.observed.Observer`. Whoever waits for the bench calls `silence` again and again."""
+    """A `bench_service.bench.observed.Observer` that detects silent devices; its caller polls `silence`."""
 
     def __init__(self, clock: Clock, simulated: bool, patience: Patience) -> None:
         self._clock = clock
@@ -64,10 +64,10 @@ class Watchdog:
         self._answer(f"{device}.block")
 
     def silence(self, looked_s: float, longest_s: float) -> str | None:
-        """Which device has said nothing for too long, in a sentence; None: there is none.
+        """A sentence that names the device that was silent for too long; None: there is none.
 
-        `looked_s`: since the last look; no more than `longest_s` of it counts, because a process that was suspended
-        looks late at devices that it could not hear.
+        `looked_s`: the time since the last look; no more than `longest_s` of it counts, because a process that was
+        suspended looks late at devices that it could not hear.
         """
         with self._mutex:
             seen = (self._signs, self._clock.now_s() if self._simulated else 0.0)

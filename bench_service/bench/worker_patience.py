@@ -1,5 +1,5 @@
-"""How long a supervisor bears with a worker whose bench is not safe: one that leaves a stop unanswered, that gives no
-heartbeat, or that has seen a stop and does not get the bench safe.
+"""Time limits that a supervisor sets a worker whose bench is not safe: one that leaves a stop unanswered, gives no
+heartbeat, or has seen a stop and does not get the bench safe.
 
 Times are counted look by look on the supervisor's own clock, so neither a clock that jumps nor a supervisor that was
 held up itself makes a worker late.
@@ -12,15 +12,15 @@ from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.stop.channel import WORKER, StopChannel
 
 UNANSWERED_S = 3.0
-"""How long a worker may leave a stop unanswered, while its bench is not safe, before it is killed [s]."""
+"""Time that a worker may leave a stop unanswered, while its bench is not safe, before it is killed [s]."""
 HUNG_S = 10.0
-"""How long a worker that has seen a stop may take until the bench is safe, before it is killed [s]."""
+"""Time that a worker may take from seeing a stop until the bench is safe, before it is killed [s]."""
 COUNTED_S = 0.5
-"""Of the time between two looks so much counts against a worker [s]: this process may have been held up itself."""
+"""Maximum part of the time between two looks that counts [s]: this process may have been held up itself."""
 
 
 class WorkerPatience:
-    """With the worker of one bench."""
+    """Counts the worker's delays on one bench against their limits."""
 
     def __init__(
         self, channel: StopChannel, heartbeat: HeartbeatFile, unanswered_s: float, hung_s: float, silent_s: float
@@ -29,19 +29,19 @@ class WorkerPatience:
         self._heartbeat = heartbeat
         self._limits_s = {"unanswered": unanswered_s, "hung": hung_s, "silent": silent_s}
         self._held_s: dict[str, float | None] = dict.fromkeys(self._limits_s)
-        """For how long each has held so far, from the first look that found it so."""
+        """Duration of each delay so far, from the first look that found it."""
         self._looked_s = inf
         self._beat = 0
 
     def reset(self, now_s: float) -> None:
-        """There is nothing to bear with now."""
+        """Start all delays anew at zero."""
         self._held_s = dict.fromkeys(self._limits_s)
         self._looked_s = now_s
 
     def over(self, now_s: float, worker: ProcessIdentity, words: frozenset[str], stopped: bool) -> str | None:
-        """Why the worker, which has its devices' link and leaves them unsafe, must be killed; None: not yet.
+        """The reason to kill the worker, which has its devices' link and leaves them unsafe; None: not yet.
 
-        `words`: the stops in the channel; `stopped`: whether the bench is, by them or by the books.
+        `words`: the stops in the channel; `stopped`: True where the bench is, by them or by the database.
         """
         passed_s = min(max(now_s - self._looked_s, 0.0), COUNTED_S)
         self._looked_s = now_s

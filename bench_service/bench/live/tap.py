@@ -1,4 +1,4 @@
-"""Where a session says what it does: progress, devices, a few samples. Lives in the bench's own thread.
+"""Publishes a session's live state: progress, devices, a few samples. Lives in the bench's own thread.
 
 Everything here is bounded: at most one block in `LOOK_S` of real time is looked at, however fast the samples come, and
 only the last `STRETCHES` are kept. It reads devices, and asks nothing of them.
@@ -19,12 +19,12 @@ from procedures.core.arrays import Array
 from procedures.core.recording import Channel, NominalScale, RawArray, Station
 
 LOOK_S = 0.1
-"""A block is looked at not sooner than this after the one before [s, real time]."""
+"""Minimum interval between two blocks that are looked at [s, real time]."""
 STRETCHES = 10
 
 
 class LiveTap:
-    """What one job's session tells of itself."""
+    """Collects and publishes the live state of one job's session."""
 
     def __init__(self, job: Job, bench: Bench, board: LiveBoard) -> None:
         self._job = job
@@ -40,17 +40,17 @@ class LiveTap:
         self._stretches: deque[tuple[float, float, Array]] = deque(maxlen=STRETCHES)
 
     def station(self, index: int) -> None:
-        """The session begins with a station."""
+        """Note that the session begins with a station."""
         self._index = index
         self._station_begun_s = self._bench.clock.now_s()
 
     def stream(self, stream: Stream) -> None:
-        """A recording begins."""
+        """Note that a recording begins."""
         self._channels, self._rate_hz = stream.channels, stream.rate_hz
         self._stretches.clear()
 
     def block(self, start_s: float, block: RawArray) -> None:
-        """Some samples were stored, shape (n, channels); `start_s` is the bench time of the first one's beginning."""
+        """Take in stored samples, shape (n, channels); `start_s` is the bench time of the first one's beginning."""
         looked_at_s = monotonic_s()
         if looked_at_s - self._looked_at_s < LOOK_S or len(block) == 0:
             return
@@ -59,13 +59,13 @@ class LiveTap:
         self._stretches.append((start_s, start_s + len(block) / self._rate_hz, found))
 
     async def publish(self) -> None:
-        """Say it."""
+        """Publish the job's progress, the devices' state and the last samples."""
         self._board.publish(
             BenchLive(self._job.bench, now(), job=self._progress(), devices=await self._devices(), samples=self._said())
         )
 
     def end(self) -> None:
-        """The session is over: the bench does nothing."""
+        """Publish that the session is over and the bench idle."""
         self._board.publish(BenchLive(self._job.bench, now()))
 
     def _progress(self) -> LiveJob:
@@ -100,7 +100,7 @@ class LiveTap:
                 bench.supply.is_on(),
                 chamber,
             )
-        except BenchError:  # the procedure will say so where it matters
+        except BenchError:  # the procedure raises it where it matters
             return None
 
     def _said(self) -> LiveSamples | None:

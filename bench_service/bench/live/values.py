@@ -1,7 +1,7 @@
-"""What a bench is doing at this moment: said by who drives it, read by everybody, kept nowhere but in one row a bench.
+"""The live state of a bench: written by its driver, read by every process, kept in one row per bench.
 
-In the process that drives a bench the newest word is in memory; other processes read the row. It is at the same time
-the sign that the driver lives: an idle one says so every `BEAT_S`.
+In the process that drives a bench the newest state is in memory; other processes read the row. It is at the same time
+the driver's heartbeat: an idle driver writes it every `BEAT_S`.
 """
 
 import logging
@@ -19,11 +19,11 @@ from bench_service.wall_clock import now
 from procedures.bench.chamber import ChamberReading
 
 PUBLISH_S = 0.5
-"""A running job is told of at most so often [s, real time]."""
+"""Minimum interval between two published states of a running job [s, real time]."""
 BEAT_S = 5.0
-"""An idle driver says so often that it is there [s, real time]."""
+"""Interval between two heartbeats of an idle driver [s, real time]."""
 SEEN_S = 15.0
-"""Who has said nothing for so long is not there, or cannot write [s, real time]."""
+"""A driver whose last heartbeat is older than this is gone, or cannot write [s, real time]."""
 HOST = socket.gethostname()
 
 log = logging.getLogger(__name__)
@@ -31,16 +31,16 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class LiveDevices:
-    """What the devices say of themselves; angles are those of the encoders."""
+    """The state that the devices report; angles are those of the encoders."""
 
     outer_deg: float
     middle_deg: float
     inner_deg: float
     moving: bool
-    """Whether the table follows a demand, or settles after it."""
+    """True while the table follows a demand, or settles after it."""
     unit_on: bool
     chamber: ChamberReading | None = None
-    """None: the bench has none."""
+    """The chamber's reading; None: the bench has none."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class LiveChannel:
 
 @dataclass(frozen=True)
 class LiveSamples:
-    """A few of the last stretches of the recording: enough for an eye, never the data."""
+    """A few of the last stretches of the recording: enough for a live plot, never the data."""
 
     start_s: tuple[float, ...]
     """Bench time of each stretch's beginning."""
@@ -66,7 +66,7 @@ class LiveSamples:
 
 @dataclass(frozen=True)
 class LiveJob:
-    """How far the job is that drives the bench."""
+    """Progress of the job that drives the bench."""
 
     id: str
     station: int
@@ -74,7 +74,7 @@ class LiveJob:
     stations: int
     label: str
     bench_time_s: float
-    """The bench's clock."""
+    """Time of the bench's clock."""
     fraction: float
     """Part of the planned bench time that is over, 0 … 1."""
     eta_s: float
@@ -87,25 +87,28 @@ class LiveJob:
 
 @dataclass(frozen=True)
 class BenchLive:
-    """The last that a bench's driver said."""
+    """The newest live state of a bench, as its driver wrote it."""
 
     bench: str
     at: datetime
     host: str = HOST
     process: int = 0
     driving: bool = True
-    """False: the driver has ended in order."""
+    """False: the driver ended in an orderly way."""
     job: LiveJob | None = None
     devices: LiveDevices | None = None
-    """None: nobody has opened the bench, or its devices do not answer."""
+    """None: no process has opened the bench, or its devices do not answer."""
     samples: LiveSamples | None = None
 
     def seen_s(self, at: datetime) -> float:
-        """How long ago that was [s]."""
+        """Age of this state [s]."""
         return max(0.0, (at - self.at).total_seconds())
 
     def there(self, at: datetime) -> bool:
-        """Whether somebody drives the bench, as far as can be known from here.
+        """Tell if a driver is alive, judged by the age of its last heartbeat.
+
+        A heartbeat dated more than `SEEN_S` in the future comes from before the clock was set back, and counts as
+        stale: a living driver writes a new one.
 
         A word from later than `SEEN_S` from now is as old as the clock's being set back: who lives says it anew.
         """
@@ -113,24 +116,24 @@ class BenchLive:
 
 
 class LiveStore(Protocol):
-    """PORT of memory: one row a bench."""
+    """PORT of memory: one live state per bench."""
 
     def put(self, live: BenchLive) -> None:
-        """Replace what was said before. Raises `StorageFull`, `StorageFailure`."""
+        """Replace the bench's live state. Raises `StorageFull`, `StorageFailure`."""
         ...
 
     def get(self, bench_id: str) -> BenchLive | None: ...
 
     def all(self) -> tuple[BenchLive, ...]:
-        """Of every bench that ever had a driver, by name."""
+        """The live states of all benches that ever had a driver, by name."""
         ...
 
 
 class LiveBoard:
-    """The newest word of every bench: of the one that this process drives from memory, of others from their rows."""
+    """The newest live state of every bench: of this process's own bench from memory, of others from their rows."""
 
     def __init__(self, store: LiveStore, own: str | None = None, clock: Callable[[], datetime] = now) -> None:
-        """`own`: the bench that this process drives."""
+        """Set up for the bench that this process drives (`own`); None where it drives none."""
         self.own = own
         self._store = store
         self._clock = clock
@@ -138,28 +141,28 @@ class LiveBoard:
         self.news = Event()
 
     def publish(self, live: BenchLive) -> None:
-        """Say what the own bench does now; called by who drives it, never waits."""
+        """Publish the own bench's live state; called by its driver, never waits."""
         self._said = replace(live, process=os.getpid())
         self.news.set()
 
     def said(self) -> BenchLive | None:
-        """The last word of the own bench."""
+        """The newest live state of the own bench."""
         return self._said
 
     def of_bench(self, bench_id: str) -> BenchLive | None:
-        """The last word of a bench; None: nobody ever drove it. Raises `StorageFailure`."""
+        """The newest live state of a bench; None: it never had a driver. Raises `StorageFailure`."""
         if bench_id == self.own and self._said is not None:
             return self._said if self._said.job else replace(self._said, at=self._clock())
         return self._store.get(bench_id)
 
     def all(self) -> tuple[BenchLive, ...]:
-        """The last word of every bench."""
+        """The newest live states of all benches."""
         others = (live for live in self._store.all() if live.bench != self.own)
         mine = () if self.own is None else (self.of_bench(self.own),)
         return tuple(live for live in (*mine, *others) if live is not None)
 
     def of_job(self, job: Job) -> LiveJob | None:
-        """How far a running job is; None where it does not run, or its driver is silent. Raises `StorageFailure`."""
+        """Progress of a running job; None where it does not run, or its driver is silent. Raises `StorageFailure`."""
         if job.state is not JobState.RUNNING:
             return None
         live = self.of_bench(job.bench)
@@ -169,7 +172,7 @@ class LiveBoard:
 
 
 class Heartbeat:
-    """Writes the own bench's word into its row, in a thread of its own: a slow disk never holds the bench up."""
+    """Writes the own bench's live state into its row, in its own thread: a slow disk never holds the bench up."""
 
     def __init__(self, board: LiveBoard, store: LiveStore) -> None:
         self._board = board
@@ -179,11 +182,11 @@ class Heartbeat:
         self._thread = Thread(target=self._run, name="heartbeat", daemon=True)
 
     def begin(self) -> None:
-        """The bench's lease must be held."""
+        """Start the thread. The bench's lease must be held."""
         self._thread.start()
 
     def end(self) -> None:
-        """Say for the last time that nobody drives the bench any more."""
+        """Stop the thread, and write a last state: the bench has no driver."""
         self._ending.set()
         self._board.news.set()
         self._thread.join()

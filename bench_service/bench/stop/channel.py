@@ -1,11 +1,11 @@
-"""The stop of a bench outside every database: a word in the bench's device folder that worker and supervisor watch.
+"""The stop channel of a bench, outside every database: a file and sockets that worker and supervisor watch.
 
-A file of fixed length (`bench-<id>.stop`) holds the words of those who stop and what worker and supervisor answer; its
+A file of fixed length (`bench-<id>.stop`) holds the stop requests and the answers of worker and supervisor; its
 records are written in place. Each of the two also has a Unix datagram socket, which wakes it, and which carries the
-word where the file cannot be written. None of this needs a free byte, a free inode, a database or a network.
+request where the file cannot be written. None of this needs a free byte, a free inode, a database or a network.
 
-A word passes through three states: asked (it is in the channel), seen (by the process that drives the bench, or by the
-supervisor where none does), safe (the devices say so). Light on purpose: `bench stop` imports this and little else.
+A stop request (`StopWord`) passes through three states: asked (it is in the channel), seen (by the driving process, or
+by the supervisor), safe (the devices report it). Light on purpose: `bench stop` imports this and little else.
 """
 
 import fcntl
@@ -34,13 +34,13 @@ from bench_service.bench.stop.word import DAMAGED, StopAnswer, StopWord
 from bench_service.wall_clock import monotonic_s, pause
 
 WORDS = 16
-"""How many stops a bench can have at once; what comes after them changes nothing: the bench is stopped."""
+"""Maximum number of stops that a bench has at once; further ones change nothing: the bench is stopped."""
 WORKER, SUPERVISOR = 0, 1
-"""Who answers, and the number of the answer's record."""
+"""Roles of those who answer; each is also the number of its answer's record."""
 _FIRST = 2
-"""Record of the first word."""
+"""Record number of the first stop request."""
 LOCK_S = 0.2
-"""How long a writer waits for another one [s]; a stopped process may hold the lock for ever."""
+"""Maximum time that a writer waits for another one [s]; a suspended process may hold the lock for ever."""
 log = logging.getLogger(__name__)
 
 
@@ -54,14 +54,14 @@ class StopChannel:
         self._names = (f"bench-{bench_id}.stop-worker", f"bench-{bench_id}.stop-supervisor")
         self._file: int | None = None
         self._came: dict[str, StopWord] = {}
-        """Words that came by the socket and could not be written into the file."""
+        """Stop requests that came by the socket and could not be written into the file."""
         self._last: tuple[bytes, tuple[StopWord, ...]] = (b"", ())
         self._answers = [StopAnswer(), StopAnswer()]
         self._mutex = Lock()
 
     @property
     def exists(self) -> bool:
-        """Whether the bench has, or had, a process on this host."""
+        """True where the bench has, or had, a process on this host."""
         return self._path.exists() or (self._folder / f"bench-{self.bench_id}.devices").exists()
 
     def prepare(self) -> None:
@@ -74,7 +74,7 @@ class StopChannel:
             os.close(file)
 
     def ask(self, word: StopWord) -> bool:
-        """Stop the bench; whether the word is where worker or supervisor will see it. Raises nothing."""
+        """Enter a stop request; True where worker or supervisor will see it. Raises nothing."""
         written = False
         with suppress(OSError):
             written = self._write(word)
@@ -82,11 +82,11 @@ class StopChannel:
         return written or sent
 
     def wake(self) -> bool:
-        """Tell the bench's worker that there may be something to do; whether one listens."""
+        """Wake the bench's worker: there may be something to do. True where a worker listens."""
         return self._send({"wake": True}, (WORKER,))
 
     def standing(self) -> tuple[StopWord, ...]:
-        """The words that nobody has released, oldest first. Raises nothing: what cannot be read stops the bench."""
+        """The stop requests not yet released, oldest first. Raises nothing: an unreadable record stops the bench."""
         try:
             found = self._read()
         except FileNotFoundError:
@@ -99,15 +99,15 @@ class StopChannel:
         return tuple(sorted((*found, *came), key=lambda word: word.at))
 
     def mark_booked(self, ids: Iterable[str]) -> None:
-        """Note that the database has these words."""
+        """Note that these stop requests are in the database."""
         self._change(ids, lambda word: replace(word, booked=True))
 
     def clear(self, ids: Iterable[str]) -> None:
-        """Take words away that were released."""
+        """Remove stop requests that were released."""
         self._change(ids, lambda _: None)
 
     def answer(self, role: int, answer: StopAnswer) -> None:
-        """Say as worker or supervisor what became of the words; nothing is written where nothing has changed."""
+        """Publish the worker's or supervisor's answer to the stop requests; an unchanged answer is not written."""
         if answer == self._answers[role]:
             return
         record = encoded({"by": answer.by, "seen": sorted(answer.seen), "safe": sorted(answer.safe)})
@@ -120,7 +120,7 @@ class StopChannel:
         self._answers[role] = answer
 
     def answered(self, role: int) -> StopAnswer:
-        """What worker or supervisor said last. Raises nothing."""
+        """The last answer of worker or supervisor. Raises nothing."""
         try:
             found = read_record(self._open(), role)
         except (OSError, Unreadable):
@@ -130,14 +130,14 @@ class StopChannel:
         return StopAnswer(found["by"], frozenset(found["seen"]), frozenset(found["safe"]))
 
     def state(self, word_id: str) -> str:
-        """ "asked", "seen" or "safe"."""
+        """The state of a stop request: "asked", "seen" or "safe"."""
         answers = [self.answered(role) for role in (WORKER, SUPERVISOR)]
         if any(word_id in answer.safe for answer in answers):
             return "safe"
         return "seen" if any(word_id in answer.seen for answer in answers) else "asked"
 
     def listen(self, role: int) -> socket.socket | None:
-        """The own end of the channel, as worker or as supervisor; None where there can be none."""
+        """Open the receiving socket, as worker or as supervisor; None where there can be none."""
         try:
             return bound(self._folder, self._names[role])
         except OSError as error:
@@ -145,7 +145,7 @@ class StopChannel:
             return None
 
     def receive(self, listening: socket.socket) -> bool:
-        """Take all that came; whether somebody asked to be looked after. A word joins those of the file."""
+        """Take all messages that came, stop requests into the file; True where one was a wake-up call."""
         woken = False
         while True:
             try:
@@ -162,7 +162,7 @@ class StopChannel:
                 return woken
 
     def close(self) -> None:
-        """Close the file; the next verb opens it again."""
+        """Close the channel's file; the next verb opens it again."""
         if self._file is not None:
             os.close(self._file)
             self._file = None
@@ -195,7 +195,7 @@ class StopChannel:
                 self._mutex.release()
 
     def _read(self) -> tuple[StopWord, ...]:
-        """Parsed once for as long as nothing changes."""
+        """Read the stop requests; they are parsed again only after a change."""
         size = WORDS * RECORD_BYTES
         for _ in range(20):
             page = os.pread(self._open(), size, _FIRST * RECORD_BYTES)
@@ -210,7 +210,7 @@ class StopChannel:
         return (*(word for word in self._last[1] if word.id != DAMAGED.id), DAMAGED)
 
     def _write(self, word: StopWord) -> bool:
-        """Into the first free record; where none is free, nothing is lost but a reason: the bench is stopped."""
+        """Write into the first free record; where none is free only a reason is lost: the bench is stopped."""
         with self._locked() as file:
             free: int | None = None
             for number in range(_FIRST, _FIRST + WORDS):
@@ -251,7 +251,7 @@ class StopChannel:
 
 
 def _document(file: int, number: int) -> dict[str, Any] | None:
-    """What a record holds."""
+    """The document in a record; one that is unreadable counts as damaged."""
     try:
         return read_record(file, number)
     except Unreadable:

@@ -1,4 +1,4 @@
-"""The road of a stop to a bench of another host: over the listener of its supervisor, by an address kept in memory."""
+"""The way of a stop to a bench of another host: over the listener of its supervisor, by an address kept in memory."""
 
 import json
 import logging
@@ -25,15 +25,15 @@ from bench_service.wall_clock import monotonic_s
 
 CONNECT_S = 1.0
 ANSWER_S = 2.5
-"""How long the whole exchange may take [s]."""
+"""Time limit of the whole exchange [s]."""
 LEARN_S = 2.0
-"""How often the addresses are read while the database answers [s]."""
+"""Interval at which the addresses are read while the database answers [s]."""
 
 log = logging.getLogger(__name__)
 
 
 class ListenerRoad:
-    """`bench_service.bench.stop.road.StopRoad` over TCP."""
+    """A `bench_service.bench.stop.road.StopRoad` over TCP."""
 
     here = False
 
@@ -43,7 +43,7 @@ class ListenerRoad:
         self._secret = secret
 
     def ask(self, word: StopWord) -> Safety | None:
-        """What the bench's supervisor answers; None where it cannot be reached."""
+        """Send the stop request; the supervisor's answer, None where it cannot be reached."""
         try:
             found = self._exchange(word)
         except (BadMessage, OSError, ValueError, KeyError) as error:
@@ -69,10 +69,10 @@ class ListenerRoad:
 
 
 class StopAddresses:
-    """Where the supervisors of all benches listen, learned again and again while the database is well."""
+    """The addresses of all supervisors' listeners, read again and again while the database answers."""
 
     def __init__(self, read: Callable[[], Mapping[str, Listening]], secret_file: Path) -> None:
-        """`read`: asks the database; raises `ServiceError`."""
+        """Set up with `read`, which asks the database for the addresses and raises `ServiceError`."""
         self._read = read
         self._secret_file = secret_file
         self._known: dict[str, Listening] = {}
@@ -80,16 +80,16 @@ class StopAddresses:
         self._thread = Thread(target=self._run, name="stop addresses", daemon=True)
 
     def begin(self) -> None:
-        """Begin to learn."""
+        """Begin to read the addresses."""
         self._thread.start()
 
     def end(self) -> None:
-        """Learn no more; a thread that hangs in the database ends with the process."""
+        """Stop reading; a thread that hangs in the database ends with the process."""
         self._ending.set()
         self._thread.join(LEARN_S)
 
     def road(self, bench_id: str) -> ListenerRoad | None:
-        """The road to a bench; None where its address or the secret is not known here."""
+        """The way to a bench; None where its address or the secret is not known here."""
         at, secret = self._known.get(bench_id), read_secret(self._secret_file)
         return None if at is None or secret is None else ListenerRoad(bench_id, at, secret)
 
@@ -101,7 +101,7 @@ class StopAddresses:
     def _run(self) -> None:
         while True:
             try:
-                self._known |= self._read()  # one that says nothing now keeps the address that it had
+                self._known |= self._read()  # a supervisor without a row now keeps the address that it had
             except ServiceError:
                 pass
             except Exception:

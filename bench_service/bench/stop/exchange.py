@@ -1,8 +1,8 @@
-"""What stop channel and database tell one another: each stop ends up in both, and a release in both takes it away.
+"""Synchronizes stop channel and database: each stop is entered in both, and a release in both removes it.
 
-The channel comes first and needs nothing; the books follow when they can, and say when they were late. Called again and
+The channel comes first and needs nothing; the database follows, and records when it was late. Called again and
 again, in a thread that may hang in the database, by the supervisor and by the process that drives the bench: entering a
-stop twice, or taking it away twice, changes nothing.
+stop twice, or removing it twice, changes nothing.
 """
 
 from typing import Protocol
@@ -16,7 +16,7 @@ LATE_S = 2.0
 
 
 class StopBooks(Protocol):
-    """What is read and written in the database. Every verb raises `ServiceError` if it does not answer."""
+    """The part of the database that holds stops. Every verb raises `ServiceError` if it does not answer."""
 
     def standing(self) -> tuple[BenchStop, ...]:
         """The stops that keep the bench from working."""
@@ -28,7 +28,7 @@ class StopBooks(Protocol):
 
 
 class StopExchange:
-    """Between the channel of one bench and the books. For one thread."""
+    """Synchronizes the channel of one bench with the database. For one thread."""
 
     def __init__(self, channel: StopChannel, books: StopBooks) -> None:
         self._channel = channel
@@ -36,13 +36,13 @@ class StopExchange:
         self._last: frozenset[str] = frozenset()
         self._mirrored: set[str] = set()
         self.stopped = False
-        """Whether the books said so last."""
+        """True where the database last had a standing stop."""
 
     def exchange(self) -> None:
-        """Enter what the books lack, take away what was released, say what only the books knew. Raises `ServiceError`.
+        """Enter stops that the database lacks, remove released ones, copy others to the channel. Raises `ServiceError`.
 
-        A stop that is seen in the books alone is said in the channel at the second look: at the first one it may have
-        been released by now, and its word been taken away.
+        A stop that is in the database alone is copied to the channel at the second look: at the first one it may have
+        been released by now, and its request removed.
         """
         words = self._channel.standing()
         for word in words:

@@ -1,4 +1,4 @@
-"""Unix datagram sockets in a folder: they carry a few words between processes of one host, and need no free byte."""
+"""Unix datagram sockets in a folder: they carry short messages within one host, and need no free byte."""
 
 import os
 import socket
@@ -25,7 +25,7 @@ def bound(folder: Path, name: str) -> socket.socket:
 
 
 def send(folder: Path, name: str, body: bytes) -> bool:
-    """Send without waiting; whether somebody receives it."""
+    """Send without waiting; True where a process receives it."""
     with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as sender:
         sender.setblocking(False)
         with SocketAddress(folder, name) as address:

@@ -1,4 +1,4 @@
-"""The guard of a process that drives a bench: it watches the stop channel and gives the heartbeat.
+"""The guard of a process that drives a bench: it watches the stop channel and writes the heartbeat.
 
 A thread of its own that needs no database and no free disk. Whatever else the process waits for, a stop that came by
 the channel is seen here, and the bench made safe in yet another thread. Where not even this thread gets to run, the
@@ -18,7 +18,7 @@ from bench_service.bench.stop.word import StopAnswer
 from bench_service.wall_clock import monotonic_s
 
 LOOK_S = 0.1
-"""How often the channel's file is looked at [s]; its socket wakes the guard at once."""
+"""Interval between two looks at the channel's file [s]; its socket wakes the guard at once."""
 
 log = logging.getLogger(__name__)
 
@@ -34,8 +34,10 @@ class StopGuard:
         make_safe: Callable[[], object],
         wake: Callable[[], object],
     ) -> None:
-        """`is_safe`: what the devices say. `make_safe`: leaves the job and makes the bench safe; it may take a while,
-        and is called again as long as a stop stands and the bench is not safe. `wake`: there may be something to do.
+        """Set up with `is_safe`: the devices' reported state; and `make_safe`: leaves the job and makes the bench safe.
+
+        `make_safe` may take a while, and is called again while a stop stands and the bench is not safe. `wake`: called
+        when there may be something to do.
         """
         self._channel = channel
         self._heartbeat = heartbeat
@@ -51,16 +53,16 @@ class StopGuard:
         self._thread = Thread(target=self._run, name="stop guard", daemon=True)
 
     def begin(self) -> None:
-        """Begin to watch. The channel and the heartbeat must be prepared, the bench's lease held."""
+        """Begin to watch the channel. Channel and heartbeat must be prepared, the bench's lease held."""
         self._socket = self._channel.listen(WORKER)
         self._thread.start()
 
     def stopped(self) -> bool:
-        """Whether somebody has stopped the bench over the channel, and nobody has released it."""
+        """True while a stop over the channel stands."""
         return bool(self._channel.standing())
 
     def end(self) -> None:
-        """End; the bench must be safe by then."""
+        """End the guard's thread; the bench must be safe by then."""
         self._ending.set()
         self._thread.join()
         if self._socket is not None:
@@ -80,7 +82,7 @@ class StopGuard:
                 self._ending.wait(LOOK_S)
 
     def _wait(self) -> bool:
-        """For a message, `LOOK_S` at the most; whether one was a call to look for work."""
+        """Wait for a message, `LOOK_S` at the most; True where one was a call to look for work."""
         if self._socket is None:
             self._ending.wait(LOOK_S)
             return False

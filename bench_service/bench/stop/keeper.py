@@ -1,4 +1,4 @@
-"""Keeps the stop channel and the books of a driven bench in step, in a thread that may hang in the database."""
+"""Keeps the stop channel and the database in step for a driven bench, in a thread that may hang in the database."""
 
 import logging
 from threading import Event, Thread
@@ -8,13 +8,13 @@ from bench_service.bench.stop.exchange import StopBooks, StopExchange
 from bench_service.model.errors import ServiceError
 
 KEEP_S = 1.0
-"""How often channel and books are compared [s]."""
+"""Interval between two comparisons of channel and database [s]."""
 
 log = logging.getLogger(__name__)
 
 
 class StopKeeper:
-    """Of one bench, in the process that drives it: a bench without a supervisor has its stops in the books too."""
+    """Synchronizes the stops of one driven bench, so that without a supervisor too its stops reach the database."""
 
     def __init__(self, channel: StopChannel, books: StopBooks) -> None:
         self._bench_id = channel.bench_id
@@ -24,11 +24,11 @@ class StopKeeper:
         self._thread = Thread(target=self._run, name="stop keeper", daemon=True)
 
     def begin(self) -> None:
-        """Begin to compare."""
+        """Begin to compare channel and database."""
         self._thread.start()
 
     def end(self) -> None:
-        """Compare no more; a thread that hangs in the database ends with the process."""
+        """Stop comparing; a thread that hangs in the database ends with the process."""
         self._ending.set()
         self._thread.join(KEEP_S)
 

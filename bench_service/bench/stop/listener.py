@@ -1,4 +1,4 @@
-"""The supervisor's listener: takes a stop from an API on another host into the bench's stop channel.
+"""The supervisor's listener: it enters a stop from an API on another host into the bench's channel.
 
 It can do nothing else: it releases nothing and gives away nothing but whether the bench is safe. Connections are few
 and short; where more come than it has room for, the oldest goes.
@@ -26,13 +26,13 @@ from bench_service.bench.stop.word import StopWord
 from bench_service.wall_clock import monotonic_s, now, pause
 
 CONNECTIONS = 16
-"""At once; of one more the oldest is closed."""
+"""Maximum number of connections at once; one more closes the oldest."""
 MESSAGE_S = 2.0
-"""How long a connection may take to say what it wants [s]."""
+"""Time that a connection may take to send its message [s]."""
 SAFE_S = 1.0
-"""How long an answer waits for the bench to be safe [s]."""
+"""Time that an answer waits for the bench to be safe [s]."""
 AGAIN_S = 1.0
-"""How often an address that cannot be had is tried again [s]."""
+"""Interval between two attempts to bind an address that is not available [s]."""
 
 log = logging.getLogger(__name__)
 
@@ -41,7 +41,7 @@ class StopListener:
     """Listens for one bench, in threads of its own."""
 
     def __init__(self, address: str, secret: bytes, channel: StopChannel, is_safe: Callable[[], bool]) -> None:
-        """`address`: `host:port`, port 0 for any. Raises `ValueError` for what is none."""
+        """Set up to listen at `address`: `host:port`, port 0 for any. Raises `ValueError` for any other text."""
         self._wanted = split_address(address)
         self._secret = secret
         self._channel = channel
@@ -52,11 +52,11 @@ class StopListener:
         self._socket: socket.socket | None = None
 
     def begin(self) -> None:
-        """Begin to listen, as soon as the address can be had."""
+        """Begin to listen, as soon as the address can be bound."""
         Thread(target=self._run, name="stop listener", daemon=True).start()
 
     def listening(self) -> Listening | None:
-        """Where it listens now."""
+        """The address at which it listens now; None where it does not."""
         listening = self._socket
         if listening is None:
             return None
@@ -64,7 +64,7 @@ class StopListener:
         return Listening(f"{name}:{listening.getsockname()[1]}", HOST)
 
     def end(self) -> None:
-        """Listen no more."""
+        """Stop listening, and close all connections."""
         self._ending.set()
         with self._mutex:
             for each in (*self._open, *([] if self._socket is None else [self._socket])):
@@ -127,7 +127,7 @@ class StopListener:
 
 
 def _shut(connection: socket.socket) -> None:
-    """End a connection that another thread may wait for."""
+    """Close a connection that another thread may wait for."""
     try:
         connection.shutdown(socket.SHUT_RDWR)
     except OSError:

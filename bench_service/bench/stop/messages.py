@@ -1,8 +1,8 @@
-"""What a stop looks like on the wire between an API and the supervisor of a bench on another host.
+"""Messages of a stop on the wire, between an API and the supervisor of a bench on another host.
 
 Lines of JSON over TCP. The supervisor begins with a number that it never uses again; the API's stop and the
 supervisor's answer each carry an HMAC-SHA-256, under a secret that both have, over that number, one of the API's own,
-and the text. So a stop that was listened in to cannot be sent again, an answer cannot be made up, and neither side
+and the text. So an intercepted stop cannot be replayed, an answer cannot be forged, and neither side
 needs a clock that is right. The text itself is no secret, and is not hidden.
 """
 
@@ -24,15 +24,15 @@ SECRET_BYTES = 16
 
 
 class BadMessage(Exception):
-    """A line that is no message of ours, comes too late, or whose proof does not hold."""
+    """Raised for a line that is not a valid message, comes too late, or whose proof does not hold."""
 
 
 @dataclass(frozen=True)
 class Listening:
-    """Where a bench's supervisor listens, and on which host a person finds it."""
+    """The address of a supervisor's listener, and the host on which a person finds it."""
 
     address: str
-    """`host:port`."""
+    """The address as `host:port`."""
     host: str
 
 
@@ -46,7 +46,7 @@ def read_secret(file: Path) -> bytes | None:
 
 
 def made_secret(file: Path) -> bytes | None:
-    """The secret in a file, which is made with one of its own where it is absent. None where it cannot be."""
+    """The secret in a file; an absent file is made, with a new secret. None where it cannot be made."""
     try:
         made = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
     except OSError:  # it is there, or there is no room for it
@@ -81,12 +81,12 @@ def check(secret: bytes, what: str, numbers: tuple[str, str], message: dict[str,
 
 
 def send_line(connection: socket.socket, message: dict[str, Any]) -> None:
-    """Raises `OSError`."""
+    """Send a message as one line of JSON. Raises `OSError`."""
     connection.sendall(json.dumps(message).encode() + b"\n")
 
 
 def receive_line(connection: socket.socket, by_s: float) -> dict[str, Any]:
-    """One message, whole by a moment of the clock that is never set back. Raises `BadMessage`, `OSError`."""
+    """Receive one message, complete by a deadline of the monotonic clock. Raises `BadMessage`, `OSError`."""
     found = b""
     while not found.endswith(b"\n"):
         left_s = by_s - monotonic_s()

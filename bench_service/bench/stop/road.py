@@ -1,4 +1,4 @@
-"""The road of a stop to its bench: the stop channel of this host, or the listener of the supervisor on another one.
+"""The way of a stop to its bench: the stop channel of this host, or the listener of the supervisor on another one.
 
 Neither needs the database. Where a bench's supervisor listens is learned while the database is well, and kept in
 memory (`StopAddresses`).
@@ -16,19 +16,19 @@ from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.stop.word import StopWord
 
 BENCH_ID = re.compile(r"[a-z0-9][a-z0-9_-]{0,31}")
-"""What may become part of a file's name."""
+"""Bench names that may become part of a file's name."""
 
 
 class StopRoad(Protocol):
-    """One way to a bench."""
+    """One way of a stop to a bench."""
 
     @property
     def here(self) -> bool:
-        """Whether the bench's devices are on this host."""
+        """True where the bench's devices are on this host."""
         ...
 
     def ask(self, word: StopWord) -> Safety | None:
-        """Bring a word to the bench; what is known of its safety then, where the road itself says so."""
+        """Send a stop request to the bench; its safety then, where this way itself reports it."""
         ...
 
 
@@ -45,7 +45,7 @@ class ChannelRoad:
 
 
 class StopRoads:
-    """The roads to every bench that can be stopped from this process."""
+    """The ways to every bench that can be stopped from this process."""
 
     def __init__(
         self,
@@ -53,8 +53,9 @@ class StopRoads:
         elsewhere: Callable[[str], StopRoad | None] = lambda _: None,
         where: Callable[[str], str] = lambda _: "",
     ) -> None:
-        """`folder`: where this host's benches have their channels. `elsewhere`: the road to a bench of another host.
-        `where`: which host that is, as far as known.
+        """Set up with `folder`, the place of this host's stop channels, and `elsewhere`, which gives the way to others.
+
+        `where`: the name of that host, empty where it is not known.
         """
         self._folder = folder
         self._elsewhere = elsewhere
@@ -78,18 +79,18 @@ class StopRoads:
             return found
 
     def to(self, bench_id: str) -> StopRoad | None:
-        """The road to a bench; None where there is none but the database."""
+        """The way to a bench; None where there is none but the database."""
         channel = self.channel(bench_id)
         return self._elsewhere(bench_id) if channel is None else ChannelRoad(channel)
 
     def wake(self, bench_id: str) -> None:
-        """Tell the bench's worker, if it is on this host, that there may be something to do."""
+        """Wake the bench's worker, if it is on this host: there may be something to do."""
         channel = self.channel(bench_id)
         if channel is not None:
             channel.wake()
 
     def unreached(self, bench_id: str) -> str:
-        """What a person must know whose stop has reached nothing."""
+        """The message to a person whose stop has reached no process."""
         host = self._where(bench_id)
         at = f"host {host}" if host else "the bench's own host"
         return (

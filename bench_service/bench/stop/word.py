@@ -1,4 +1,4 @@
-"""A stop as the channel of a bench has it, and what worker and supervisor answer to it."""
+"""A stop request as the channel of a bench holds it, and the answer of worker and supervisor to it."""
 
 from dataclasses import asdict, dataclass, field
 from datetime import datetime
@@ -7,12 +7,12 @@ from typing import Any
 from bench_service.wall_clock import new_id, now
 
 REASON, BY = 500, 100
-"""Of a reason and of a name so much is kept in the channel [characters]."""
+"""Maximum lengths of a reason and of a name that the channel keeps [characters]."""
 
 
 @dataclass(frozen=True)
 class StopWord:
-    """One person's stop: why, who, when, and over which way it came."""
+    """One person's stop request: reason, person, time, and the way over which it came."""
 
     reason: str
     by: str
@@ -21,28 +21,28 @@ class StopWord:
     id: str = field(default_factory=new_id)
     at: datetime = field(default_factory=now)
     booked: bool = False
-    """Whether the database has it."""
+    """True once the database has it."""
 
     def document(self) -> dict[str, Any]:
-        """As JSON has it, the texts cut to what a record holds."""
+        """The request as a JSON object, its texts cut to the room of a record."""
         return {**asdict(self), "at": self.at.isoformat(), "reason": self.reason[:REASON], "by": self.by[:BY]}
 
     @classmethod
     def of(cls, document: dict[str, Any]) -> "StopWord":
-        """Raises `TypeError`, `ValueError`, `KeyError` for what is no word."""
+        """Read a request from a document. Raises `TypeError`, `ValueError`, `KeyError` for any other document."""
         given: dict[str, Any] = {**document, "at": datetime.fromisoformat(document["at"])}
         return cls(**given)
 
 
 DAMAGED = StopWord("a record of the stop channel cannot be read", "the stop channel", "books", "damaged", booked=True)
-"""Stands for a record that is there and cannot be read: until a person releases the bench it is a stop."""
+"""Stands for a record that cannot be read: it counts as a stop until a person releases the bench."""
 
 
 @dataclass(frozen=True)
 class StopAnswer:
-    """What worker or supervisor has made of the words so far."""
+    """The worker's or supervisor's progress with the stop requests so far."""
 
     by: str = ""
     seen: frozenset[str] = frozenset()
     safe: frozenset[str] = frozenset()
-    """Words after which the devices were seen safe."""
+    """Ids of the requests after which the devices were seen safe."""
