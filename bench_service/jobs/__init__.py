@@ -1,1 +1,1 @@
-"""Jobs: from request to end. Planning, the queue of a bench, dispatching, retries. Knows no HTTP and no SQL."""
+"""Jobs from request to end: planning, the queue of a bench, dispatching, retries. Knows no HTTP and no SQL."""

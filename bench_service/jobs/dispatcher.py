@@ -1,14 +1,14 @@
-"""The dispatcher of a bench: it takes the next admissible job from the bench's queue, has it run, and takes the next.
+"""The dispatcher of a bench: claims the next eligible job of its queue, runs it, and recovers orphaned jobs.
 
-The queue is our own jobs table. A job is claimed in one transaction (it is running from then on, and no bench has two
-running jobs), and its durable workflow begins at once. What a crash leaves behind is put right whenever the queue
-is looked at, so that no job stays running without anybody who runs it:
+The queue is the service's own jobs table. A job is claimed in one transaction (it is running from then on, and no
+bench has two running jobs), and its durable workflow begins at once. Jobs orphaned by a crash are recovered whenever the
+queue is looked at, so that no job stays running without a process that runs it:
 
 - claimed, and the process died before its workflow was written: back into its place in the queue;
 - its workflow is this engine's and unfinished: the engine goes on with it by itself, and is waited for;
 - its workflow is of another version, or the engine gave it up: the job is interrupted, with the reason.
 
-A job that this version does not understand is interrupted too, and holds up nobody.
+A job that this version does not understand is interrupted too, and blocks no other job.
 
 While the bench's lease is lost (the database was restarted) nothing is claimed, and the lease is asked for again.
 """
@@ -29,34 +29,34 @@ from bench_service.model.job import Failure, Job
 from bench_service.wall_clock import now
 
 RETRY_S = 0.5
-"""How long the dispatcher waits when the database or the engine does not answer [s]."""
+"""Time that the dispatcher waits after a failure of the database or the engine [s]."""
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Unfinished:
-    """What the engine knows of a running job's workflow. Neither field set: it never began."""
+    """The engine's state of a running job's workflow. Neither field set: it never began."""
 
     alive: bool = False
     """The engine goes on with it."""
     gone: Failure | None = None
-    """Why nobody will go on with it."""
+    """The reason why the workflow will not go on."""
 
 
 class JobEngine(Protocol):
-    """What is needed of `bench_service.jobs.engine.Engine`."""
+    """The part of `bench_service.jobs.engine.Engine` that the dispatcher uses."""
 
     def launch(self) -> None:
-        """Start working; unfinished jobs of a dead process go on. The bench's lease must be held."""
+        """Start working; unfinished jobs of a dead process resume. The bench's lease must be held."""
         ...
 
     def run(self, job: Job) -> None:
-        """Run a claimed job to its end. Raises `ShuttingDown`, and whatever keeps it from running."""
+        """Run a claimed job to its end. Raises `ShuttingDown`, and any failure that keeps it from running."""
         ...
 
     def unfinished(self, job: QueueEntry) -> Unfinished:
-        """What became of a running job's workflow."""
+        """The state of a running job's workflow."""
         ...
 
     def shut_down(self) -> None:
@@ -77,9 +77,9 @@ class Dispatcher:
         poll_s: float,
         stopped: Callable[[], bool] = lambda: False,
     ) -> None:
-        """`poll_s`: how often the queue is looked at for jobs that other processes put there.
+        """Set up to look at the queue every `poll_s` seconds for jobs that other processes put there.
 
-        `stopped`: whether the bench is stopped over its host's stop channel, of which the database may not know yet.
+        `stopped`: tells if the bench is stopped over its host's stop channel, of which the database may not know yet.
         """
         self._stopped = stopped
         self._bench_id = bench_id
@@ -94,19 +94,19 @@ class Dispatcher:
         self._thread = Thread(target=self._run, name=f"dispatcher {bench_id}", daemon=True)
 
     def begin(self) -> None:
-        """Begin to work. The engine must be launched."""
+        """Begin to dispatch jobs. The engine must be launched."""
         self._thread.start()
 
     def wake(self) -> None:
-        """Look at the queue now."""
+        """Look at the bench's queue now."""
         self._wake.set()
 
     def lease_held(self) -> bool:
-        """Whether this process has the right to drive the bench now."""
+        """Tell if this process holds the bench's lease now."""
         return self._lease.held()
 
     def shut_down(self) -> None:
-        """Claim nothing any more. The running job is the engine's to end."""
+        """Claim no more jobs. The engine ends the running job."""
         self._ending.set()
         self._wake.set()
 
@@ -139,7 +139,7 @@ class Dispatcher:
             return False
         try:
             job = self._runner.claim(entry)
-        except (NotUnderstood, NotFound) as error:  # its unit is not known, or its words are not
+        except (NotUnderstood, NotFound) as error:  # its unit or a part of its record is not known
             self._interrupt(entry.id, Failure(type(error).__name__, str(error)))
             return True
         if job is None:
@@ -164,7 +164,7 @@ class Dispatcher:
             self._interrupt(job.id, why)
 
     def _not_understood(self, job_id: str) -> Failure | None:
-        """Why nobody here could go on with a job, whatever became of its workflow."""
+        """The reason why this version could not resume a job, whatever its workflow's state; None: there is none."""
         try:
             self._stores.jobs.get(job_id)
         except NotUnderstood as error:

@@ -1,6 +1,6 @@
 """The job engine, DBOS, behind four verbs. The only file that knows it.
 
-Jobs wait in our own table (`bench_service.jobs.dispatcher`); here a job that was claimed is run, as a workflow that
+Jobs wait in the service's own table (`bench_service.jobs.dispatcher`); here a claimed job is run, as a workflow that
 survives the process: one step per station, steps that may be repeated. An operator's cancel is a flag of our own that
 the steps see (a cancelled DBOS workflow would free the bench while it still moves); the workflow then makes the bench
 safe and ends. The version is the procedures' contract, not a hash of the sources, so a new build goes on with the jobs
@@ -28,14 +28,14 @@ from bench_service.telemetry.defects import described
 PROCEDURE_ABI = "1"
 """Raise it when stored workflows can no longer be continued by this code."""
 SHUT_DOWN_S = 20.0
-"""How long the running job may take to leave the bench safe when the service ends [s]."""
+"""Time that the running job may take to leave the bench safe when the service ends [s]."""
 RETRY_S = 0.5
-"""How often a bad end that could not be written is tried again [s]."""
+"""Interval between two attempts to write a bad end that could not be written [s]."""
 MAX_RECOVERIES = 50
-"""How often a job may take the service down before it is given up."""
+"""Maximum number of times that a job may take the service down before it is given up."""
 
 ALIVE = frozenset({"PENDING", "ENQUEUED"})
-"""Of a workflow that DBOS runs, or will run after it recovered it."""
+"""States of a workflow that DBOS runs, or will run after it recovered it."""
 
 OUTCOME = TypeAdapter(StepOutcome)
 log = logging.getLogger(__name__)
@@ -60,12 +60,12 @@ class JsonSerializer(Serializer):
 
 
 class Engine:
-    """Runs jobs of one bench, in this process, durably. One engine is one application of DBOS, named after its bench.
+    """Runs jobs of one bench durably, in this process. One engine is one DBOS application, named after its bench.
 
     H1: an operator's cancel is a flag that the steps see, so the bench is never free before it is safe.
     H2: one process has the bench's lease, and `_one_at_a_time` lets one workflow in whatever DBOS recovers.
     H3: DBOS recovers over a queue that every worker of an application polls: so each bench is an application.
-    H4: a job whose workflow is of another version is said to be so (`unfinished`), and its workflow is ended.
+    H4: a job whose workflow is of another version is reported as such (`unfinished`), and its workflow is ended.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class Engine:
         runner: JobRunner,
         understood: Callable[[Exception], Exception],
     ) -> None:
-        """`understood`: an error of the engine's own books in our words, any other error as it is."""
+        """Set up with `understood`: translates errors of the engine's own database into the service's own classes."""
         self._understood = understood
         self._version = f"{bench_id}:{PROCEDURE_ABI}"
         self._runner = runner
@@ -105,9 +105,9 @@ class Engine:
         self._workflow = run_job
 
     def launch(self) -> None:
-        """Start working; jobs that a dead process left go on. The bench's lease must be held.
+        """Start working; jobs orphaned by a dead process resume. The bench's lease must be held.
 
-        Raises what kept it from starting, and leaves nothing running then.
+        Raises the error that kept it from starting; then nothing is left running.
         """
         try:
             DBOS.listen_queues([])
@@ -119,13 +119,13 @@ class Engine:
             raise self._understood(error) from error
 
     def run(self, job: Job) -> None:
-        """Run a claimed job to its end. Raises `ShuttingDown`, or what kept its workflow from being written."""
+        """Run a claimed job to its end. Raises `ShuttingDown`, or the error that kept its workflow unwritten."""
         with SetWorkflowID(_workflow_id(job), workflow_id_reuse_policy="reject"):
             handle = DBOS.start_workflow(self._workflow, job.id, job.attempt)
         handle.get_result()
 
     def unfinished(self, job: QueueEntry) -> Unfinished:
-        """What became of a running job's workflow."""
+        """The state of a running job's workflow."""
         status = DBOS.get_workflow_status(_workflow_id(job))
         if status is None:
             return Unfinished()
@@ -146,7 +146,7 @@ class Engine:
         DBOS.destroy(destroy_registry=True)
 
     def _never_wait_for_the_database(self) -> None:
-        """While the database is away DBOS would block a step until it is back, and the bench would stay as it is.
+        """Make DBOS fail at once without its database: otherwise it would block a step, and the bench stay as it is.
 
         Its `DBOSClient` has a setting for this; for an application only the field behind it can be set.
         """
@@ -180,7 +180,7 @@ class Engine:
             self._end(job_id, outcome)
 
     def _make_safe(self, job_id: str) -> None:
-        """Out of every other way: an open bench is made safe at once, whether or not the database answers."""
+        """Make an open bench safe at once after any other end of a job, whether or not the database answers."""
         while True:
             try:
                 self._runner.make_safe(job_id)
@@ -191,15 +191,15 @@ class Engine:
                 return
 
     def _end(self, job_id: str, outcome: StepOutcome) -> None:
-        """Note a bad end, as soon as it can be: while the disk is full the job waits, and the bench is safe already.
+        """Write a bad end as soon as possible: while the disk is full the job waits, and the bench is safe already.
 
-        What no waiting helps against is left to the dispatcher, which sees a job whose workflow has ended.
+        An end that can never be written is left to the dispatcher, which sees a job whose workflow has ended.
         """
         while True:
             try:
                 self._runner.end_early(job_id, outcome)
                 return
-            except (NotUnderstood, UnfitValue):  # no end of ours can be noted: the dispatcher interrupts it
+            except (NotUnderstood, UnfitValue):  # its end cannot be written: the dispatcher interrupts it
                 return
             except (StorageFull, StorageFailure) as error:
                 log.warning("the end of job %s cannot be noted yet: %s", job_id, error)
@@ -207,7 +207,7 @@ class Engine:
                 raise ShuttingDown
 
     def _checked(self, name: str, work: Callable[[], StepOutcome]) -> StepOutcome:
-        """A step with an outcome; the last one is remembered, should the engine's own books fail after it."""
+        """Run a step with an outcome; the last outcome is kept, should the engine's own database fail after it."""
 
         def run() -> Any:
             self._last = work()
@@ -223,7 +223,7 @@ class Engine:
         return StepOutcome()
 
     def _station(self, job_id: str, index: int) -> StepOutcome:
-        """Record one. After any but a good one the bench is safe before the engine notes it, which may take long."""
+        """Record one station. After a bad outcome make the bench safe before the engine notes it, which can be slow."""
         try:
             outcome = self._runner.acquire(job_id, index)
         except Exception as error:
@@ -233,7 +233,7 @@ class Engine:
         return outcome
 
     def _unexpected(self, job_id: str, raised: Exception) -> StepOutcome:
-        """A defect, or books that cannot be kept."""
+        """The outcome of an unexpected error: a defect, or a failure of the database."""
         error = self._understood(raised)
         refused = isinstance(error, ServiceError)
         said = str(error) if refused else described(error)
@@ -243,7 +243,7 @@ class Engine:
 
 @contextmanager
 def _failure_said_once() -> Generator[None]:
-    """DBOS logs the traceback of a failed launch and raises it too; who asked for the launch says it."""
+    """Drop the traceback that DBOS logs of a failed launch: it raises the error too, and the caller reports it."""
     logger = logging.getLogger("dbos")
 
     def dropped(record: logging.LogRecord) -> bool:
@@ -257,7 +257,7 @@ def _failure_said_once() -> Generator[None]:
 
 
 def _workflow_id(job: Job | QueueEntry) -> str:
-    """Each attempt of a job is a workflow of its own."""
+    """The id of a job's workflow: each attempt is a workflow of its own."""
     return f"{job.id}/{job.attempt}"
 
 

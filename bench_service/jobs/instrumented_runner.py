@@ -1,4 +1,4 @@
-"""The steps of a job with what the outside is told of them: lines of the log, and spans of the job's trace."""
+"""The steps of a job, instrumented: lines of the log, and spans of the job's trace."""
 
 import logging
 from collections.abc import Callable
@@ -19,7 +19,7 @@ log = logging.getLogger(__name__)
 
 
 class InstrumentedRunner(JobRunner):
-    """`JobRunner`, seen from outside."""
+    """A `JobRunner` that logs and traces its steps."""
 
     def __init__(
         self,
@@ -36,7 +36,7 @@ class InstrumentedRunner(JobRunner):
         super().__init__(stores, planner, driver, code_version, lease_held, live, retry_scale, stopped)
         self._traces = traces
         self._campaign: tuple[str, str | None] = ("", None)
-        """The job that was begun last, and the campaign run that it belongs to."""
+        """The job that began last, and the campaign run that it belongs to."""
 
     def claim(self, entry: QueueEntry) -> Job | None:
         job = super().claim(entry)
@@ -98,7 +98,7 @@ class InstrumentedRunner(JobRunner):
 
 
 def _tell(found: Found, outcome: StepOutcome, what: str, done: str) -> None:
-    """A line, and what the span has found."""
+    """Write a step's outcome to the log and to its span."""
     if outcome.failure is not None:
         found["error"] = f"{outcome.failure.kind}: {outcome.failure.message}"
         log.warning("%s: %s: %s", what, outcome.failure.kind, outcome.failure.message)

@@ -1,4 +1,4 @@
-"""From a request to a plan: parameters complete, stations laid out, worth predicted, before anything moves."""
+"""Turns a request into a plan: parameters complete, stations laid out, worth predicted, before anything moves."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,15 +14,15 @@ from procedures.core.unit import Unit
 from procedures.procedure import Context, Parameters, Prediction
 
 BYTES_PER_SAMPLE = 2
-"""What a stored sample is allowed to weigh (design.md, budgets); a preview says what a plan may need at most."""
+"""Bytes that a stored sample may take; a preview gives the room that a plan may need at most."""
 
 TEMPERATURE_CHANNELS = 7
-"""Five sensors of the unit and two readings of the chamber, beside the triads where a station wants temperatures."""
+"""Five sensors of the unit and two readings of the chamber, added to the triads where a station wants temperatures."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A procedure ready to run."""
+    """A procedure with all that its run needs."""
 
     procedure: AnyProcedure
     parameters: Parameters
@@ -34,7 +34,7 @@ class Plan:
 
 
 class Planner:
-    """Lays out jobs from the catalogue on the benches that there are."""
+    """Plans jobs from the catalogue of procedures on the known benches."""
 
     def __init__(self, units: UnitStore, benches: BenchDirectory, catalogue: Catalogue) -> None:
         self.benches = benches
@@ -42,7 +42,7 @@ class Planner:
         self._units = units
 
     def context(self, unit: str, bench: str | None = None) -> Context:
-        """What is known now. Raises `NotFound` for an unknown bench, `NotMounted` for a unit it does not have."""
+        """The present context. Raises `NotFound` for an unknown bench, `NotMounted` for a unit it does not have."""
         description = self.benches.description(self.benches.default() if bench is None else bench)
         return Context(self.unit(unit, description.id), description)
 
@@ -57,7 +57,7 @@ class Planner:
             return mounted[serial]
 
     def plan(self, name: str, unit: str, requested: dict[str, Any], bench: str | None = None) -> Plan:
-        """Raises pydantic's `ValidationError`, `DomainError`, `NotFound`, `NotMounted`. Nothing moves."""
+        """Plan a job; nothing moves. Raises pydantic's `ValidationError`, `DomainError`, `NotFound`, `NotMounted`."""
         procedure = self.catalogue.procedure(name)
         context = self.context(unit, bench)
         parameters = procedure.resolve(procedure.params.model_validate(requested), context)
@@ -91,14 +91,14 @@ def stations_of(procedure: AnyProcedure, parameters: Parameters) -> tuple[Statio
 
 
 def _violations(station: Station, bench: BenchDescription) -> tuple[str, ...]:
-    """Limits of the bench that a station passes."""
+    """The bench's limits that a station exceeds, as sentences."""
     if station.current_ma is not None:
         return bench.current_violations(station.current_ma, station.profile)
     return () if station.angles is None else bench.violations(station.angles, station.turn, station.profile)
 
 
 def _samples(station: Station, unit: Unit) -> int:
-    """Samples of all channels; of a profile as long as it is expected to take."""
+    """Number of samples of all channels; a profile counts for its expected time."""
     if station.current_ma is not None:  # a converter alone: three channels and its own sensor, after it has soaked
         return round(station.record_s * (station.sample_rate_hz or unit.sample_rate_hz)) * 4
     seconds = station.record_s if station.profile is None else station.profile.expected_s()

@@ -1,7 +1,7 @@
-"""The queue of a bench: who may start, who waits, and why. Pure: the same rules pick a job and explain its waiting.
+"""The queue of a bench: order, eligibility, reasons for waiting. Pure: one set of rules picks and explains.
 
 Order: priority (smaller first), then the moment of queueing, then the id. A job that may not start yet (its bench is
-stopped, its bench or unit is reserved by somebody else, its retry is not due) is passed over: it blocks nobody.
+stopped, its bench or unit is reserved by another holder, its retry is not due) is passed over: it blocks no other job.
 """
 
 from collections.abc import Iterator
@@ -14,8 +14,9 @@ from bench_service.model.job import Failure, Job
 from bench_service.model.records import BenchStop, reasons_of
 
 LONGEST_PAUSE_S = 300.0
-"""No retry is put off for longer [s]. One that is due later than that was put off by a clock that was set back since:
-it waits no more."""
+"""Longest pause before a retry [s]. A retry that is due later was scheduled before the clock was set back: it is due
+at once.
+"""
 
 
 @dataclass(frozen=True)
@@ -34,14 +35,14 @@ class QueueEntry:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a queued job stands."""
+    """A queued job's place in the queue."""
 
     position: int
-    """From 1, in the order of the queue."""
+    """Position in the queue, counted from 1."""
     ahead: int
-    """How many jobs go before it as things stand: the running one, and those before it that may start."""
+    """Number of jobs that go before it as things stand: the running one, and those before it that may start."""
     waiting: str
-    """Why it does not run yet, as a sentence."""
+    """The reason why it does not run yet, as a sentence."""
 
 
 @dataclass(frozen=True)
@@ -51,20 +52,20 @@ class BenchQueue:
     bench: str
     at: datetime
     entries: tuple[QueueEntry, ...]
-    """In order."""
+    """The queued jobs in order."""
     running: str | None = None
     """The job that drives the bench."""
     stops: tuple[BenchStop, ...] = ()
-    """Those that stand, oldest first."""
+    """The stops that stand, oldest first."""
     reservations: tuple[Reservation, ...] = ()
-    """Those that hold now, of the bench and of the units in the queue."""
+    """The reservations that hold now, of the bench and of the units in the queue."""
 
     def next(self) -> QueueEntry | None:
-        """The job that starts next, if any may."""
+        """The next eligible job; None where there is none."""
         return next((entry for entry in self.entries if self.hold(entry) is None), None)
 
     def hold(self, entry: QueueEntry) -> str | None:
-        """Why a job may not start whatever else the bench does; None where it may."""
+        """The reason why a job is not eligible, whatever else the bench does; None where it is."""
         if self.stops:
             return f"bench {self.bench} is stopped: {reasons_of(self.stops)}"
         for reservation in self._of_others(entry):
@@ -76,11 +77,11 @@ class BenchQueue:
         return None
 
     def place(self, job_id: str, driven: bool) -> Place | None:
-        """Where a job stands; None where it is not in the queue. `driven`: whether a worker drives the bench."""
+        """A job's place; None where it is not in the queue. `driven`: True where a worker drives the bench."""
         return self.places(driven).get(job_id)
 
     def places(self, driven: bool) -> dict[str, Place]:
-        """Where every job of the queue stands, by its id, in order: one walk for all of them."""
+        """The places of all queued jobs, by job id, in order: one walk for all of them."""
         places: dict[str, Place] = {}
         ahead, last = (0, "") if self.running is None else (1, self.running)
         for number, entry in enumerate(self.entries, start=1):
@@ -91,7 +92,7 @@ class BenchQueue:
         return places
 
     def _turn(self, ahead: int, last: str, driven: bool) -> str:
-        """Why a job that may start does not: `ahead` jobs go before it, and `last` is the last of them."""
+        """The reason why an eligible job does not start: `ahead` jobs go before it, and `last` is the last of them."""
         if not driven:
             return f"no worker drives bench {self.bench} now"
         if ahead == 0:
@@ -110,21 +111,21 @@ class BenchQueue:
 
 
 class QueueStore(Protocol):
-    """The queues of all benches, as they are kept. Every method is one transaction."""
+    """The stored queues of all benches. Every method is one transaction."""
 
     def look(self, bench: str, at: datetime) -> BenchQueue:
         """A bench's queue now."""
         ...
 
     def front(self, bench: str, at: datetime) -> BenchQueue:
-        """The same with its first entries only: so many that `next` answers as for the whole; none while a job runs."""
+        """The first entries of the queue: as many as `next` needs to answer as for the whole; none while a job runs."""
         ...
 
     def claim(self, entry: QueueEntry, context: dict[str, Any], at: datetime) -> Job | None:
-        """Begin a queued job, with what is known of its unit now: it is running from this moment.
+        """Claim a queued job, with its unit's current data: it is running from this moment.
 
-        None where that is not possible any more: it left the queue, was queued anew, may not start, or its bench has a
-        running job (so no two jobs of one bench are ever running, whoever asks).
+        None where that is not possible any more: it left the queue, was requeued, may not start, or its bench has a
+        running job (so no two jobs of one bench are ever running).
         """
         ...
 
@@ -133,16 +134,16 @@ class QueueStore(Protocol):
         ...
 
     def requeue(self, job_id: str, at: datetime, not_before: datetime | None, why: Failure, spend: bool) -> Job:
-        """Put a running job back into its place in the queue, as its next attempt, until `not_before`.
+        """Return a running job to its place in the queue, as its next attempt, not to start before `not_before`.
 
-        `spend`: it costs one of the job's retries. Raises `IllegalTransition` where it does not run.
+        `spend`: uses up one of the job's retries. Raises `IllegalTransition` where it does not run.
         """
         ...
 
     def set_priority(self, job_id: str, priority: int, at: datetime) -> Job:
-        """Raises `IllegalTransition` where it is not queued."""
+        """Change a queued job's priority. Raises `IllegalTransition` where it is not queued."""
         ...
 
     def lengths(self) -> dict[str, int]:
-        """How many jobs are queued for each bench that has any."""
+        """Number of queued jobs of each bench that has any."""
         ...

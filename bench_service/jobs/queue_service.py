@@ -1,4 +1,4 @@
-"""What a client asks of queues and reservations: where a job stands, and to keep a bench or a unit for a while."""
+"""Queues and reservations for clients: a job's place, and reserving a bench or a unit."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,25 +17,25 @@ from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter
 
 LONGEST = timedelta(days=90)
-"""How far ahead a reservation may end."""
+"""Longest time ahead at which a reservation may end."""
 
 
 @dataclass(frozen=True)
 class ReservationRequest:
-    """A reservation as a client asks for it."""
+    """A client's request for a reservation."""
 
     kind: Reserved
     name: str
     holder: str
     until: datetime | None
     minutes: float | None
-    """Where no moment is given: how long from now."""
+    """Duration from now, where no end is given [min]."""
     note: str = ""
 
 
 @dataclass(frozen=True)
 class Standing:
-    """Where a job stands: its place while it is queued, and why it does not run, as a sentence."""
+    """A job's place while it is queued, and the reason why it does not run, as a sentence."""
 
     place: Place | None = None
     waiting: str | None = None
@@ -45,7 +45,7 @@ class QueueService:
     """Reads the queues of all benches, and keeps reservations."""
 
     def __init__(self, stores: JobStores, benches: BenchDirectory, wake: Callable[[str], None]) -> None:
-        """`wake`: called for each bench on which a job may start that had to wait."""
+        """Set up with `wake`, called for each bench on which a waiting job may now start."""
         self._stores = stores
         self._wake = wake
         self._benches = benches
@@ -55,14 +55,14 @@ class QueueService:
         return self._stores.queue.look(self._benches.description(bench_id).id, now())
 
     def standing(self, jobs: Sequence[Job]) -> dict[str, Standing]:
-        """Where each of these jobs stands; a bench is looked at once for all of them."""
+        """The standing of each of these jobs; each bench is looked at once."""
         places: dict[str, Place] = {}
         for bench in {job.bench for job in jobs if job.state is JobState.QUEUED}:
             places |= self._stores.queue.look(bench, now()).places(self._benches.driven(bench))
         return {job.id: _standing(job, places.get(job.id)) for job in jobs}
 
     def reserve(self, request: ReservationRequest, idempotency_key: str | None = None) -> Reservation:
-        """Keep a bench or a unit. Raises `NotFound` for one that is unknown, `AlreadyReserved`, `BadParameter`."""
+        """Reserve a bench or a unit. Raises `NotFound` for one that is unknown, `AlreadyReserved`, `BadParameter`."""
         at = now()
         until = request.until or at + timedelta(minutes=request.minutes or 0.0)
         if not at < until <= at + LONGEST:

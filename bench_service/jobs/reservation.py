@@ -1,4 +1,4 @@
-"""A unit or a bench that somebody keeps for a while: jobs of others wait until the reservation ends."""
+"""Reservations of a unit or a bench: jobs of other holders wait until the reservation ends."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -9,7 +9,7 @@ from bench_service.model.records import Idempotency, Page
 
 
 class Reserved(StrEnum):
-    """What can be reserved."""
+    """The kinds of things that can be reserved."""
 
     BENCH = "bench"
     UNIT = "unit"
@@ -17,7 +17,7 @@ class Reserved(StrEnum):
 
 @dataclass(frozen=True)
 class Reservation:
-    """One reservation. It ends by itself at `until`, or before, when its holder gives it back."""
+    """A reservation of a unit or bench. It ends by itself at `until`, or earlier, when its holder gives it back."""
 
     id: str
     kind: Reserved
@@ -28,35 +28,35 @@ class Reservation:
     until: datetime
     note: str = ""
     ended_at: datetime | None = None
-    """When it was given back before its time."""
+    """Time when its holder gave it back early."""
 
     def active(self, at: datetime) -> bool:
-        """Whether it holds at a moment: the one place where a reservation's end is compared with a clock."""
+        """Tell if it holds at a moment: the one place where a reservation's end is compared with a clock."""
         return self.ended_at is None and at < self.until
 
     @property
     def over_at(self) -> datetime:
-        """When it ended, or will end by itself."""
+        """Time of its end, past or scheduled."""
         return self.until if self.ended_at is None else self.ended_at
 
 
 class ReservationStore(Protocol):
-    """Reservations, as they are kept. Every method is one transaction."""
+    """The stored reservations. Every method is one transaction."""
 
     def add(self, reservation: Reservation, idempotency: Idempotency | None = None) -> Reservation:
-        """Keep a reservation, at its `created_at`. Raises `AlreadyReserved`, `IdempotencyConflict`."""
+        """Add a reservation, at its `created_at`. Raises `AlreadyReserved`, `IdempotencyConflict`."""
         ...
 
     def get(self, reservation_id: str) -> Reservation:
-        """Raises `NotFound`."""
+        """Return one reservation. Raises `NotFound`."""
         ...
 
     def list(
         self, *, active_at: datetime | None = None, after: str | None = None, limit: int = 50
     ) -> Page[Reservation]:
-        """Newest first; with `active_at` only those that hold at that moment."""
+        """List reservations, newest first; with `active_at` only those that hold at that moment."""
         ...
 
     def end(self, reservation_id: str, at: datetime) -> Reservation:
-        """Give it back before its time; one that is over stays as it is. Raises `NotFound`."""
+        """End a reservation early; one that is over stays as it is. Raises `NotFound`."""
         ...

@@ -1,4 +1,4 @@
-"""Which failures are answered by trying again, and when. A job goes on with the station that failed."""
+"""Retry rules: the failures that are retried, and the pauses before it. A job resumes at the station that failed."""
 
 from datetime import timedelta
 
@@ -7,20 +7,20 @@ from bench_service.model.job import BENCH_FAULTS, Failure, Job
 from bench_service.wall_clock import now
 
 RETRY_PAUSES_S = (10.0, 30.0, 60.0, 120.0, LONGEST_PAUSE_S)
-"""How long a job waits before its first, second, … retry after a fault of the bench [s]."""
+"""Pause before a job's first, second, … retry after a fault of the bench [s]."""
 DATABASE_FAULTS = frozenset({"StorageFailure", "LeaseLost"})
 """Kinds of failure that a restart of the database leaves in a running job."""
 DATABASE_PAUSE_S = 1.0
-"""How long such a job waits before it goes on [s]."""
+"""Pause before such a job goes on [s]."""
 MOST_ATTEMPTS = 20
-"""A job that was queued this often is not queued again by itself for the database's sake."""
+"""Maximum attempts of a job: one that was queued this often is not requeued after a database fault."""
 
 
 def try_again(queue: QueueStore, job: Job, failure: Failure | None, scale: float) -> Job | None:
-    """Queue a running job again where its failure may be gone the next time; None where it ends.
+    """Requeue a running job whose failure may not recur; None where the job ends.
 
-    A fault of the bench costs one of the retries that were asked for. A database that was restarted costs none: like a
-    killed process, that is not the job's affair. `scale`: of the pauses before a retry.
+    A fault of the bench costs one of the requested retries. A database that was restarted costs none: like a
+    killed process, that is not the job's affair. `scale`: factor on the pauses before a retry.
     """
     if failure is None:
         return None

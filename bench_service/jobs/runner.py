@@ -1,4 +1,4 @@
-"""The steps of a job, each safe to repeat: what the engine calls, and what it must not know."""
+"""The steps of a job, each safe to repeat: the engine calls them, and knows nothing of their content."""
 
 import logging
 from collections.abc import Callable
@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class StepOutcome:
-    """What a step tells the workflow; small, because the engine stores it."""
+    """A step's outcome for the workflow; small, because the engine stores it."""
 
     failure: Failure | None = None
     cancelled: bool = False
@@ -59,11 +59,11 @@ class JobRunner:
         retry_scale: float = 1.0,
         stopped: Callable[[], bool] = lambda: False,
     ) -> None:
-        """`lease_held`: whether this process still has the right to drive the bench; asked before every station.
+        """Set up with `lease_held`: tells if this process still holds the bench's lease; asked before every station.
 
-        `live`: where it is said what the bench does; None: nowhere.
-        `retry_scale`: of the pauses before a retry; less than 1 where bench time is not real time.
-        `stopped`: whether the bench is stopped over its host's stop channel; asks no database.
+        `live`: the board for the bench's live state; None: it is not published.
+        `retry_scale`: factor on the pauses before a retry; less than 1 where bench time is not real time.
+        `stopped`: tells if the bench is stopped over its host's stop channel; asks no database.
         """
         self._stores = stores
         self._planner = planner
@@ -78,21 +78,21 @@ class JobRunner:
         self._ending = Event()
 
     def claim(self, entry: QueueEntry) -> Job | None:
-        """Begin a queued job, with what is known of its unit now; None where it cannot begin any more."""
+        """Claim a queued job, with its unit's current data; None where it cannot begin any more."""
         job = self._stores.jobs.get(entry.id)
         context = self._planner.refreshed(context_of(job))
         return self._stores.queue.claim(entry, CONTEXT.dump_python(context, mode="json"), now())
 
     def stations(self, job_id: str, attempt: int) -> int:
-        """How many stations a claimed job has; 0 stations, nothing moves.
+        """Number of a claimed job's stations; with 0 stations nothing moves.
 
-        -1 where there is nothing to do: the job has ended, is put aside, or was queued again since.
+        -1 where there is nothing to do: the job has ended, is paused, or was requeued since.
         """
         job = self._stores.jobs.get(job_id)
         return len(job.stations) if job.state is JobState.RUNNING and job.attempt == attempt else -1
 
     def acquire(self, job_id: str, index: int) -> StepOutcome:
-        """Record one station. Where its recording exists already, a crash came between storing and noting it.
+        """Record one station. An existing recording means that a crash came between storing and noting it.
 
         Raises `ShuttingDown` when the service is ending.
         """
@@ -116,7 +116,7 @@ class JobRunner:
             return StepOutcome(Failure("LeaseLost", "another process may drive this bench now", index))
         try:
             session = self._session_of(job)
-            if self._ending.is_set():  # since the bench was being opened, when there was nobody to tell
+            if self._ending.is_set():  # set while the bench was being opened, when there was no session to end
                 raise ShuttingDown
             info = session.record(index)
         except Stopped:
@@ -131,7 +131,7 @@ class JobRunner:
     def make_safe(self, job_id: str) -> StepOutcome:
         """Leave the bench safe; after a restart in which no session survived, without the procedure.
 
-        Where it cannot be made safe the job ends and the bench is stopped: nothing else runs on it until a person has
+        Where it cannot be made safe the job ends and the bench is stopped: no other job runs on it until a person has
         looked.
         """
         session = self._session
@@ -153,9 +153,9 @@ class JobRunner:
         return StepOutcome()
 
     def stop_now(self) -> None:
-        """Leave the running job's station and make the bench safe, whatever the job's own thread waits for.
+        """Leave the running job's station and make the bench safe, also while the job's own thread hangs.
 
-        Called by the stop guard. The job's end is noted by its own thread, as soon as that can.
+        Called by the stop guard. The job's end is noted by its own thread, as soon as possible.
         """
         session = self._session
         if session is None:
@@ -175,7 +175,7 @@ class JobRunner:
         return whole_road(session, self._driver, self._by, given_back)
 
     def conclude(self, job_id: str) -> StepOutcome:
-        """Analyse, store the result with what it found, and end the job with the verdict; may be repeated."""
+        """Analyse, store the result and its calibrations, and end the job with the verdict; may be repeated."""
         job = self._stores.jobs.get(job_id)
         if job.state is not JobState.RUNNING:  # a crash came after its end was noted, or it is another attempt's by now
             return StepOutcome()
@@ -196,7 +196,7 @@ class JobRunner:
         return StepOutcome()
 
     def end_early(self, job_id: str, outcome: StepOutcome) -> Job:
-        """End a job that was cancelled or failed, or put it aside; its complete recordings are kept."""
+        """End a job that was cancelled or failed, retry it, or pause it; its complete recordings are kept."""
         job = self._stores.jobs.get(job_id)
         if job.state is not JobState.RUNNING:  # its end was noted, though the answer to that was lost
             return job
@@ -211,7 +211,7 @@ class JobRunner:
         return self._stores.jobs.transition(job_id, to, at=now(), verdict=verdict, failure=outcome.failure)
 
     def shut_down(self) -> None:
-        """The service is ending: leave the running job to the next start, and the bench safe."""
+        """Leave the running job to the next start, and the bench safe: the service is ending."""
         self._ending.set()
         session = self._session
         if session is not None:
@@ -223,7 +223,7 @@ class JobRunner:
         return None if session is None else self._stores.jobs.get(session.job.id)
 
     def _remember(self, procedure: AnyProcedure, outcome: Outcome, stored: StoredResult) -> None:
-        """Put what a result found of its unit into the unit's record; said again after a crash, it changes nothing."""
+        """Put a result's findings on its unit into the unit's record; repeated after a crash, it changes nothing."""
         if stored.unit is None:
             return
         unit = self._stores.units.unit(stored.unit)
@@ -239,9 +239,9 @@ class JobRunner:
         return StepOutcome(Failure("NotSafe", text))
 
     def _stop_wanted(self, job_id: str) -> bool:
-        """Whether the job was cancelled or its bench stopped, whichever process was asked.
+        """Tell if the job was cancelled or its bench stopped, through any process.
 
-        A database that does not answer now, because it is restarted, has nothing to say: the recording goes on. A stop
+        A database that does not answer now, because it is restarted, counts as no stop: the recording goes on. A stop
         on the bench's own host does not depend on it.
         """
         if self._stopped():
@@ -257,7 +257,7 @@ class JobRunner:
             return self._session
         procedure = self._planner.catalogue.procedure(
             job.procedure
-        )  # before a link is taken that nobody would give back
+        )  # before a link is taken, which a failure here would leave open
         self._stores.recordings.interrupt_open(job.id)
         checkpoint = self._stores.recordings.checkpoint(job.id)
         bench = self._driver.open(job.unit, job.seed, checkpoint, BenchNeeds.of(job.stations), job.id)

@@ -1,4 +1,4 @@
-"""Jobs as clients ask for them: submit, cancel, pause, resume, change the priority, read what came out."""
+"""Jobs for clients: submit, cancel, pause, resume, change the priority, read results."""
 
 import logging
 from collections.abc import Callable
@@ -26,7 +26,7 @@ SEEDS = SystemRandom()
 
 
 class JobService:
-    """Every verb on a job; each is complete when it returns."""
+    """The verbs of clients on jobs; each is complete when it returns."""
 
     def __init__(
         self,
@@ -38,9 +38,7 @@ class JobService:
         code_version: str,
         wake: Callable[[str], None],
     ) -> None:
-        """`driver`, `worker`: those of this process's own bench, if it drives one. `wake`: has a bench's queue
-        looked at.
-        """
+        """Set up with `driver` and `worker` of this process's bench, if any; `wake` has a bench's queue looked at."""
         self._stores = stores
         self._planner = planner
         self._queues = queues
@@ -50,7 +48,7 @@ class JobService:
         self._wake = wake
 
     def submit(self, request: JobRequest, idempotency_key: str | None = None, requested_by: str = "") -> Job:
-        """Plan, store and queue a job. Raises what `Planner.plan` raises, `BadParameter` for an axis limit."""
+        """Plan, store and queue a job. Raises the errors of `Planner.plan`, and `BadParameter` for an axis limit."""
         key = None if idempotency_key is None else Idempotency(f"jobs:{idempotency_key}", fingerprint(request))
         known = self._stores.keys.made(key, "job")
         if known is not None:
@@ -88,11 +86,11 @@ class JobService:
         return self._stores.queue.set_priority(job_id, priority, now())
 
     def running_job(self, bench_id: str) -> QueueEntry | None:
-        """A bench's job that has begun and not ended."""
+        """The bench's running job: begun and not ended."""
         return self._stores.queue.running(bench_id)
 
     def driving_job(self, bench_id: str) -> str | None:
-        """The id of the job that drives a bench now; one that only waits for room to note its end drives it no more."""
+        """Id of the job that drives a bench now; a job whose end only waits to be written no longer drives it."""
         if self._worker is not None and self._driver is not None and self._driver.description.id == bench_id:
             driving = self._worker.running_job()
         else:
@@ -107,7 +105,7 @@ class JobService:
         return self._stores.results.get(job.result_id)
 
     def truth(self, job_id: str) -> tuple[TrueTriad, ...]:
-        """What a simulated unit really was in a job. Raises `NotFound` on a real bench."""
+        """The true values of a simulated unit in a job. Raises `NotFound` on a real bench."""
         job = self._stores.jobs.get(job_id)
         if not job.simulated or job.seed is None:
             raise NotFound("truth of job", job_id, "nobody knows it on a real bench")

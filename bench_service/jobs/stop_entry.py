@@ -1,4 +1,4 @@
-"""Entering a stop that came by a stop channel into the books: the stop, the running job, and that it was late."""
+"""Enters a stop that came by a stop channel into the database: the stop, the running job, and any delay."""
 
 import logging
 from contextlib import suppress
@@ -14,13 +14,13 @@ from bench_service.telemetry.audit import AuditEntry, AuditTrail
 from bench_service.wall_clock import now
 
 REQUESTS = frozenset({"http", "page"})
-"""Ways of a stop that has an entry of the audit trail as a request."""
+"""Ways of a stop for which the audit trail already has an entry, as a request."""
 
 log = logging.getLogger(__name__)
 
 
 class StopEntry:
-    """Enters stops. Repeated with the same word it changes nothing."""
+    """Enters stops into the database. Repeated for the same stop request it changes nothing."""
 
     def __init__(self, benches: BenchRegistry, queue: QueueStore, jobs: JobStore, trail: AuditTrail) -> None:
         self._benches = benches
@@ -29,12 +29,12 @@ class StopEntry:
         self._trail = trail
 
     def enter(self, bench_id: str, word: StopWord) -> str | None:
-        """The id of the job that was running, which is cancelled. Raises `StorageFull`, `StorageFailure`."""
+        """Enter a stop; the id of the running job, which is cancelled. Raises `StorageFull`, `StorageFailure`."""
         new = all(stop.id != word.id for stop in self._benches.standing_stops(bench_id))
         self._benches.stop_bench(BenchStop(bench_id, word.at, word.reason, by=word.by, id=word.id))
         running = self._queue.running(bench_id)
         if running is not None:
-            with suppress(IllegalTransition, NotUnderstood):  # it has ended this moment; or nobody here can read it
+            with suppress(IllegalTransition, NotUnderstood):  # it has ended this moment; or this version cannot read it
                 self._jobs.request_cancel(running.id, now())
         if new:
             self._tell(bench_id, word)
@@ -52,6 +52,6 @@ class StopEntry:
             word.id, now(), word.by, "stop", f"bench {bench_id}", "noted", {"text": text, "late_s": late_s, **detail}
         )
         try:
-            self._trail.add(entry)  # under the stop's own id: of several processes that enter it one tells
+            self._trail.add(entry)  # under the stop's own id: of several processes that enter it, one adds the entry
         except ServiceError as error:
             log.debug("the entry of the trail for stop %s: %s", word.id, error)

@@ -1,4 +1,4 @@
-"""The stops of one process on their way into the books, in a thread of its own that may hang in the database."""
+"""Enters the stops of one process into the database, in a thread of its own that may hang there."""
 
 import logging
 from collections.abc import Callable
@@ -12,9 +12,9 @@ from bench_service.model.errors import NotFound, ServiceError, StorageFailure
 from bench_service.wall_clock import pause
 
 WAITING = 200
-"""So many stops may wait for the database; the bench is stopped by the first of them."""
+"""Maximum number of stops that wait for the database; the first one stops the bench."""
 AGAIN_S = 0.5
-"""How long it waits before it tries a database again that failed [s]."""
+"""Time between two attempts at a database that failed [s]."""
 
 log = logging.getLogger(__name__)
 
@@ -27,19 +27,19 @@ class _Waiting:
 
 
 class StopLedger:
-    """Enters stops one after the other, again and again until each is in the books."""
+    """Enters stops one after the other, and retries each until the database has it."""
 
     def __init__(self, enter: Callable[[str, StopWord], str | None]) -> None:
-        """`enter`: enters a stop, and gives the job that it ended; raises `NotFound` for no bench, `ServiceError`."""
+        """Set up with `enter`: enters a stop, returns the job that it ended; raises `NotFound`, `ServiceError`."""
         self._enter = enter
         self._waiting: Queue[_Waiting] = Queue(WAITING)
         self._starting = Lock()
         self._thread: Thread | None = None
         self.failure = ""
-        """Why the books are behind, as last seen; empty: they are not."""
+        """The last reason why the database lacks a stop; empty: it lacks none."""
 
     def enter(self, bench_id: str, word: StopWord) -> "Future[str | None]":
-        """Begin to enter a stop; the future has the job that it ended once the books have it, or `NotFound`."""
+        """Begin to enter a stop; the future has the job that it ended once the database has it, or `NotFound`."""
         waiting = _Waiting(bench_id, word)
         with self._starting:
             if self._thread is None:
@@ -58,7 +58,7 @@ class StopLedger:
                 pause(AGAIN_S)
 
     def _entered(self, waiting: _Waiting) -> bool:
-        """Whether nothing more is to be done for it."""
+        """Enter one stop; True where no retry is needed."""
         try:
             waiting.entered.set_result(self._enter(waiting.bench_id, waiting.word))
         except NotFound as unknown:

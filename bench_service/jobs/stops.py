@@ -1,7 +1,7 @@
-"""The software stop of a bench, and its release: what a client asks for, wherever the bench's worker is.
+"""The software stop of a bench, and its release, for clients, on whichever host the bench's worker runs.
 
 A stop goes first to the bench itself, by the stop channel of its host or by its supervisor's listener, and then into
-the books. The former needs no database; the latter follows when it can.
+the database. The former needs no database; the latter follows when it can.
 """
 
 from collections.abc import Callable
@@ -21,24 +21,24 @@ from bench_service.telemetry.audit import AuditTrail
 from bench_service.wall_clock import monotonic_s, now
 
 BOOKS_S = 1.0
-"""How long the answer to a stop waits for the books, from the moment at which it was asked for [s]."""
+"""Time that the answer to a stop waits for the database, counted from the request [s]."""
 
 
 @dataclass(frozen=True)
 class Stopped:
-    """The outcome of a stop."""
+    """The outcome of a software stop."""
 
     stop: BenchStop
     job: str | None
-    """Id of the job that was running, which is being cancelled, as far as known."""
+    """Id of the running job, which is being cancelled; None where it is not known."""
     safety: Safety
-    """What is known of the bench's safety shortly after the stop."""
+    """The bench's known safety shortly after the stop."""
     books: str = ""
-    """Why the database does not have the stop yet; empty: it has."""
+    """The reason why the database does not have the stop yet; empty: it has."""
 
 
 class StopService:
-    """Stops benches and releases them."""
+    """Stops benches and releases them from their stops."""
 
     def __init__(
         self,
@@ -49,7 +49,7 @@ class StopService:
         roads: StopRoads,
         trail: AuditTrail,
     ) -> None:
-        """`wake`: has the dispatcher of a bench look at its queue, where it is within reach."""
+        """Set up with `wake`, which has the dispatcher of a bench look at its queue, where it is within reach."""
         self._stores = stores
         self._benches = benches
         self._safety = safety
@@ -59,11 +59,11 @@ class StopService:
         self._ledger = StopLedger(self._enter)
 
     def stop(self, bench_id: str, reason: str, by: str, via: str = "http", patient: bool = True) -> Stopped:
-        """Stop what the bench is doing, wherever its worker is, until this stop is released. Jobs in the queue wait.
+        """Stop all activity of the bench, on any host, until this stop is released. Jobs in the queue wait.
 
-        `by`: who stops it; `via`: over which way. It waits for the bench and for the books, for a second each at the
-        most, and neither waits for the other; where it is not `patient`, for neither. Raises `NotFound` for a bench
-        that nobody knows, and `StorageFailure` where the stop has reached neither bench nor books.
+        `by`: the person; `via`: the way over which it came. It waits for bench and database, for a second each at the
+        most, and neither waits for the other; where it is not `patient`, for neither. Raises `NotFound` for an unknown
+        bench, and `StorageFailure` where the stop has reached neither bench nor database.
         """
         books_by_s = monotonic_s() + (BOOKS_S if patient else 0.0)
         word = StopWord(reason, by, via)
@@ -90,7 +90,7 @@ class StopService:
         return job
 
     def _entered(self, entering: "Future[str | None]", within_s: float) -> tuple[str | None, str]:
-        """The job that a stop ended, and why the books do not have it yet. Raises `NotFound`."""
+        """The job that a stop ended, and the reason why the database does not have the stop yet. Raises `NotFound`."""
         try:
             return entering.result(max(within_s, 0.0)), ""
         except NotFound:
@@ -101,9 +101,9 @@ class StopService:
             return None, str(error)
 
     def release(self, bench_id: str, stop_id: str, by: str, remark: str) -> BenchStop:
-        """Release one stop. The bench works again, and the jobs in its queue go on, once no stop stands.
+        """Release one stop. Once no stop stands the bench works again, and the jobs in its queue go on.
 
-        `by`: who releases it. Raises `NotFound`, `NotSafe` while the devices are not known to be safe, and
+        `by`: the person who releases it. Raises `NotFound`, `NotSafe` while the devices are not known to be safe, and
         `IllegalTransition` where another person released it before.
         """
         self._benches.description(bench_id)

@@ -29,7 +29,7 @@ class JobStore(Protocol):
         ...
 
     def get(self, job_id: str) -> Job:
-        """Raises `NotFound`."""
+        """Return one job. Raises `NotFound`."""
         ...
 
     def list(
@@ -43,7 +43,7 @@ class JobStore(Protocol):
     ) -> Page[Job]: ...
 
     def counts(self) -> dict[JobState, int]:
-        """How many jobs there are in each state."""
+        """Number of jobs in each state."""
         ...
 
     def transition(
@@ -56,11 +56,11 @@ class JobStore(Protocol):
         failure: Failure | None = None,
         result_id: str | None = None,
     ) -> Job:
-        """Change state; to the state it is already in, it is a no-op. Raises `IllegalTransition`, `NotFound`."""
+        """Change a job's state; a change to its present state is a no-op. Raises `IllegalTransition`, `NotFound`."""
         ...
 
     def interrupt(self, job_id: str, at: datetime, failure: Failure) -> None:
-        """The service cannot go on with a job, and says why; one that was to be cancelled is.
+        """Interrupt a job that the service cannot resume, with the reason; one to be cancelled is cancelled.
 
         The job is not read, so it need not be understood.
         """
@@ -71,7 +71,7 @@ class JobStore(Protocol):
         ...
 
     def request_cancel(self, job_id: str, at: datetime) -> Job:
-        """A queued job is cancelled at once, a running one soon; `NotUnderstood` is raised after that.
+        """Cancel a queued job at once, a running one soon; `NotUnderstood` is raised after that.
 
         Raises `IllegalTransition` for one that has ended.
         """
@@ -87,18 +87,18 @@ class JobStore(Protocol):
         ...
 
     def put_aside(self, job_id: str, at: datetime) -> Job:
-        """A job whose bench was made safe for a pause becomes paused; queued again, where the wish was taken back."""
+        """Pause a job whose bench was made safe for a pause; it is requeued where the pause was withdrawn."""
         ...
 
     def resume(self, job_id: str, at: datetime) -> Job:
-        """Queue a paused or interrupted job again, as its next attempt; from a running one a wish to pause is taken.
+        """Requeue a paused or interrupted job as its next attempt; withdraw a running job's pause request.
 
         Raises `IllegalTransition` for a job in another state.
         """
         ...
 
     def note(self, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
-        """Append an event that changes no state."""
+        """Append an event that does not change the job's state."""
         ...
 
     def events(self, job_id: str, after: int = 0, limit: int = 1000) -> tuple[Event, ...]:
@@ -110,7 +110,7 @@ class JobStore(Protocol):
         ...
 
     def on_event(self, tell: Callable[[str], None]) -> None:
-        """From now on call `tell(job_id)` after each commit of this process that appended an event."""
+        """Register `tell(job_id)` to be called after each commit of this process that appended an event."""
         ...
 
 

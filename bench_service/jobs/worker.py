@@ -1,6 +1,6 @@
-"""The worker of a bench: the job engine, loaded and launched beside the service's first answers, and its dispatcher.
+"""The worker of a bench: its dispatcher, and the job engine, which is launched while the service already answers.
 
-The engine takes longer to load than everything else together. A service that is asked whether it lives can say so
+The engine takes longer to load than everything else together. The service answers liveness checks
 meanwhile; jobs that are submitted meanwhile wait in the queue.
 """
 
@@ -15,15 +15,15 @@ from bench_service.model.errors import NotDriving, ServiceError
 from bench_service.model.job import Job
 
 START_S = 60.0
-"""How long the engine may take to start [s]; loaded from a slow disk by a busy machine it takes ten."""
+"""Time that the engine may take to start [s]; loaded from a slow disk by a busy machine it takes ten."""
 LEAVE_S = 10.0
-"""How long a service that ends waits for an engine that is still starting [s]."""
+"""Time that a service that ends waits for an engine that is still starting [s]."""
 
 log = logging.getLogger(__name__)
 
 
 class JobDispatcher(Protocol):
-    """What the worker needs of `bench_service.jobs.dispatcher.Dispatcher`."""
+    """The part of `bench_service.jobs.dispatcher.Dispatcher` that the worker uses."""
 
     def begin(self) -> None: ...
 
@@ -55,11 +55,11 @@ class Worker:
         self._at_failure: Callable[[], object] = lambda: None
 
     def at_failed_start(self, then: Callable[[], object]) -> None:
-        """Have `then` called, in another thread, where the engine does not start. To be said before `begin`."""
+        """Have `then` called, in another thread, where the engine does not start. Call before `begin`."""
         self._at_failure = then
 
     def begin(self, then: Sequence[Callable[[], object]]) -> None:
-        """Load and launch the engine in a thread of its own, then do what can wait."""
+        """Load and launch the engine in a thread of its own, then run the work that can wait."""
         self._thread = Thread(target=self._begin, args=(then,), name="worker", daemon=True)
         self._thread.start()
         Thread(target=self._give_up, name="worker's patience", daemon=True).start()
@@ -72,11 +72,11 @@ class Worker:
         return self._engine
 
     def failed_start(self) -> NotDriving | None:
-        """Why the engine did not start; None where it runs, or may yet."""
+        """The reason why the engine did not start; None where it runs, or may yet."""
         return None if self._failure is None else NotDriving(self._failure)
 
     def troubles(self) -> list[str]:
-        """Why a job could not start on this bench now; waits for the engine after a start."""
+        """The reasons why a job could not start on this bench now; waits for the engine after a start."""
         try:
             self.require_engine()
         except NotDriving as reason:
@@ -86,7 +86,7 @@ class Worker:
         return []
 
     def wake(self) -> None:
-        """There may be something to do: a job was queued, a bench released."""
+        """Look at the queue now: a job was queued, or a bench released."""
         if self._dispatcher is not None:
             self._dispatcher.wake()
 
@@ -95,7 +95,7 @@ class Worker:
         return self._runner.running_job()
 
     def shut_down(self) -> None:
-        """Stop working. The running job is left for the next start; the bench is made safe first."""
+        """Stop the worker. The running job is left for the next start; the bench is made safe first."""
         if self._thread is None:
             return
         self._runner.shut_down()
@@ -111,7 +111,7 @@ class Worker:
             engine = self._make_engine(self._runner)
             engine.launch()
             dispatcher = self._make_dispatcher(self._runner, engine)
-        except Exception as failure:  # said to whoever asks, see `require_engine`
+        except Exception as failure:  # reported to callers of `require_engine`
             log.debug("the job engine did not start", exc_info=failure)
             self._fail(f"the job engine did not start: {_sentence(failure)}")
             return
@@ -141,6 +141,6 @@ class Worker:
 
 
 def _sentence(failure: Exception) -> str:
-    """A reason in one line. Our own errors say it; of another one its kind says more than its words."""
+    """A failure in one line: the message of a service error; of any other error its class and message."""
     words = " ".join(str(failure).split())
     return words if isinstance(failure, ServiceError) else f"{type(failure).__name__}: {words}"

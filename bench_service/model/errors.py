@@ -1,4 +1,4 @@
-"""What the machine room can refuse. No status codes here: `bench_service.api.http.errors` has the table.
+"""Refusals of the service layer. No status codes here: `bench_service.api.http.errors` has the table.
 
 ServiceError
 ├── NotFound             no such job, recording, result, unit, bench, procedure, method
@@ -13,11 +13,11 @@ ServiceError
 ├── SeveralStops         a release must name one of the stops that stand
 ├── AlreadyReserved      somebody keeps this bench or unit
 ├── Overloaded           too much is asked for at one time
-├── NotUnderstood        a job was stored by a version whose words this one does not know
+├── NotUnderstood        a job was stored by a version whose format this one does not know
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
-    ├── DamagedRecording  what is stored of a recording is not what was written
+    ├── DamagedRecording  the stored bytes of a recording are not those written
     └── UnfitValue        a value cannot be stored, now or later
 """
 
@@ -27,11 +27,11 @@ from pydantic import ValidationError
 
 
 class ServiceError(Exception):
-    """Base of all refusals of the machine room; the message is fit for a person."""
+    """Base of all refusals of the service layer; the message is fit for a person."""
 
 
 class NotFound(ServiceError):
-    """There is no such thing."""
+    """Raised where no object of that kind has that name."""
 
     def __init__(self, kind: str, name: str, why: str = "") -> None:
         super().__init__(f"there is no {kind} {name!r}{': ' if why else ''}{why}")
@@ -40,19 +40,19 @@ class NotFound(ServiceError):
 
 
 class IllegalTransition(ServiceError):
-    """The job's state does not allow it."""
+    """Raised where the job's state does not allow a request."""
 
 
 class IdempotencyConflict(ServiceError):
-    """The key was used before with another request."""
+    """Raised where the key was used before with another request."""
 
 
 class NameTaken(ServiceError):
-    """A campaign of that name is there already."""
+    """Raised where a campaign of that name exists already."""
 
 
 class BenchBusy(ServiceError):
-    """Another process drives this bench; `passing`: its supervisor, which gives it back in a moment."""
+    """Raised where another process drives this bench; `passing`: its supervisor, which gives it back in a moment."""
 
     def __init__(self, message: str, passing: bool = False) -> None:
         super().__init__(message)
@@ -60,19 +60,19 @@ class BenchBusy(ServiceError):
 
 
 class Overloaded(ServiceError):
-    """Too much is asked for at one time; the same request may be sent again later."""
+    """Raised where too much is requested at one time; the same request may be sent again later."""
 
 
 class Misconfigured(ServiceError):
-    """A file that the settings name cannot be used."""
+    """Raised where a file that the settings name cannot be used."""
 
 
 class NotDriving(ServiceError):
-    """This process drives no bench: it only reads."""
+    """Raised where this process drives no bench: it only reads."""
 
 
 class NotReady(ServiceError):
-    """A job could not start here now."""
+    """Raised where a job could not start on this bench now."""
 
     def __init__(self, reasons: Sequence[str]) -> None:
         super().__init__("; ".join(reasons))
@@ -80,14 +80,14 @@ class NotReady(ServiceError):
 
 
 class NotSafe(ServiceError):
-    """The bench's devices are not known to be safe."""
+    """Raised where the bench's devices are not known to be safe."""
 
 
 class SeveralStops(ServiceError):
-    """A release must name one of the stops that stand."""
+    """Raised where several stops stand and a release must name one."""
 
     def __init__(self, bench: str, stops: Sequence[tuple[str, str]]) -> None:
-        """`stops`: id and description of each."""
+        """Set up with `stops`: id and description of each."""
         super().__init__(
             f"{len(stops)} stops of bench {bench!r} stand: release each by its id, POST "
             f"/api/v1/benches/{bench}/stops/{{stop_id}}/release"
@@ -96,18 +96,18 @@ class SeveralStops(ServiceError):
 
 
 class AlreadyReserved(ServiceError):
-    """Somebody keeps this bench or unit."""
+    """Raised where another holder has reserved this bench or unit."""
 
 
 class NotMounted(ServiceError):
-    """This bench does not have that unit."""
+    """Raised where this bench does not have that unit."""
 
 
 class NotUnderstood(ServiceError):
-    """A job was stored by another version of the service, in words that this one does not know."""
+    """Raised for a job stored by another version of the service, in a format that this one does not know."""
 
     def __init__(self, job_id: str, version: str, why: Exception) -> None:
-        """`why`: what its reader said; of a document with many faults, the first is told."""
+        """Set up with `why`: its reader's error; of a document with many faults only the first is shown."""
         fault = str(why)
         if isinstance(why, ValidationError):
             first = why.errors(include_url=False, include_input=False)[0]
@@ -119,16 +119,16 @@ class NotUnderstood(ServiceError):
 
 
 class StorageFull(ServiceError):
-    """The database cannot grow: the disk is full."""
+    """Raised where the database cannot grow: the disk is full."""
 
 
 class StorageFailure(ServiceError):
-    """The database failed."""
+    """Raised where the database failed in any other way."""
 
 
 class DamagedRecording(StorageFailure):
-    """What is stored of a recording is not what was written."""
+    """Raised where the stored bytes of a recording are not those written."""
 
 
 class UnfitValue(StorageFailure):
-    """A value that the database cannot store, or not give back: to try again changes nothing."""
+    """Raised for a value that the database cannot store, or not give back: a retry changes nothing."""

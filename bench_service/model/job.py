@@ -1,4 +1,4 @@
-"""A job: one execution of a procedure on one unit on one bench, and the states it may pass through."""
+"""A job, one execution of a procedure on one unit on one bench, and its possible states."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -20,7 +20,7 @@ from procedures.core.recording import Station
 
 
 class JobState(StrEnum):
-    """Where a job is. `FINAL` says which states are the last; a paused or interrupted job may be queued again.
+    """The state of a job. `FINAL` lists the last states; a paused or interrupted job may be queued again.
 
     A paused job holds no bench: the bench is safe, and others may use it until the job is resumed.
     """
@@ -69,7 +69,7 @@ the service that began the job."""
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a job did not end well: a short kind ("NotSettled"), and a sentence for a person."""
+    """The reason why a job did not end well: a short kind ("NotSettled"), and a sentence for a person."""
 
     kind: str
     message: str
@@ -86,14 +86,14 @@ class Job(JobTerms):
     state: JobState
     created_at: datetime
     requested_parameters: dict[str, Any]
-    """As the client sent them."""
+    """Parameters as the client sent them."""
     parameters: dict[str, Any]
-    """Complete: every default filled, from the unit and the bench too."""
+    """Complete parameters: every default filled, from the unit and the bench too."""
     context: dict[str, Any]
-    """What is known of unit and bench (JSON of `procedures.procedure.Context`): at submission, then at the start."""
+    """Known data of unit and bench (JSON of `procedures.procedure.Context`): at submission, then at the start."""
     stations: tuple[Station, ...]
     duration_s: float
-    """Predicted bench time."""
+    """Predicted bench time [s]."""
     code_version: str
     simulated: bool
     verdict: Verdict | None = None
@@ -101,16 +101,16 @@ class Job(JobTerms):
     cancel_requested: bool = False
     pause_requested: bool = False
     attempt: int = 1
-    """How often it was queued: once, and again at each resume."""
+    """Number of times that it was queued: once, and again at each resume."""
     queued_at: datetime | None = None
-    """When it came into its bench's queue, the last time."""
+    """Time when it last entered its bench's queue."""
     not_before: datetime | None = None
-    """It waits in the queue until then: the pause before an automatic retry."""
+    """Earliest start from the queue: the pause before an automatic retry."""
     retries_left: int = 0
     requested_by: str = ""
-    """Who asked for it, as far as the client said."""
+    """Person who requested it, as given by the client; may be empty."""
     prompt: dict[str, Any] | None = None
-    """What a person at the bench is asked to do: {"text", "asked_at"}; None: nothing."""
+    """Open request to the person at the bench: {"text", "asked_at"}; None: there is none."""
     started_at: datetime | None = None
     finished_at: datetime | None = None
     result_id: str | None = None
@@ -118,7 +118,7 @@ class Job(JobTerms):
 
     @property
     def resumable(self) -> bool:
-        """Whether it can be queued again to go on where it ended."""
+        """Tell if it can be queued again to go on where it ended."""
         if self.state is JobState.FAILED:
             return self.failure is not None and self.failure.kind in RESUMABLE
         return self.state in (JobState.PAUSED, JobState.INTERRUPTED)
@@ -126,11 +126,11 @@ class Job(JobTerms):
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened to a job; `sequence` counts from 1 within the job."""
+    """An entry in a job's history; `sequence` counts from 1 within the job."""
 
     job_id: str
     sequence: int
     at: datetime
     kind: str
-    """"state", "station" or "note"."""
+    """Kind of event: "state", "station" or "note"."""
     data: dict[str, Any]

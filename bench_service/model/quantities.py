@@ -1,4 +1,4 @@
-"""A number out of a result's document by its name: what limits and trends are about."""
+"""Named numbers in a result's document: the subject of limits and trends."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from bench_service.model.errors import NotFound
 
 @dataclass(frozen=True)
 class Quantity:
-    """A value of a result; the unit is empty where the document does not say it (a JSON pointer)."""
+    """A value of a result; the unit is empty where the document does not give it (a JSON pointer)."""
 
     name: str
     value: float
@@ -35,7 +35,7 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
 
 
 def quantity(document: Mapping[str, Any], name: str) -> Quantity:
-    """One of them, or the number that a JSON pointer (RFC 6901) leads to. Raises `NotFound`, naming what there is."""
+    """A named quantity, or the number at a JSON pointer (RFC 6901). Raises `NotFound`, naming the known quantities."""
     if name.startswith("/"):
         return Quantity(name, _pointed(document, name), "")
     found = quantities(document)
@@ -45,7 +45,7 @@ def quantity(document: Mapping[str, Any], name: str) -> Quantity:
 
 
 def _entries(node: Any) -> Iterator[Mapping[str, Any]]:
-    """Named estimates; lists of plain numbers are long, and are not looked through."""
+    """Named estimates in a document; lists of plain numbers are long, and are not searched."""
     if isinstance(node, Mapping):
         if {"name", "unit", "estimate"} <= node.keys() and isinstance(node["estimate"], int | float):
             yield node

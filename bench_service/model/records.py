@@ -1,4 +1,4 @@
-"""What is remembered, as values: recordings, results, calibrations, and the pages and keys around them."""
+"""Stored records as values: recordings, results, calibrations, and the pages and keys around them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ class Page(Generic[T]):
 
 @dataclass(frozen=True)
 class Idempotency:
-    """A client's key and the fingerprint of what it asked."""
+    """A client's key and the fingerprint of its request."""
 
     key: str
     fingerprint: str
@@ -43,7 +43,7 @@ class RecordingState(StrEnum):
 
 @dataclass(frozen=True)
 class StoredRecording:
-    """A recording's row: what it is, where it came from, what it weighs."""
+    """A recording's row: its description, its origin, its size."""
 
     info: RecordingInfo
     state: RecordingState
@@ -53,14 +53,14 @@ class StoredRecording:
     stored_bytes: int = 0
     chunks: int = 0
     dtype: str = "int32"
-    """Of its samples: "int32" or "float64"."""
+    """Type of its samples: "int32" or "float64"."""
     source: dict[str, Any] = field(default_factory=dict[str, Any])
-    """Of an imported recording: file name, its SHA-256, reader, declared reference values."""
+    """Origin of an imported recording: file name, its SHA-256, reader, declared reference values."""
 
 
 @dataclass(frozen=True)
 class NewRecording:
-    """What must be known before the first sample."""
+    """The facts of a recording that must be known before its first sample."""
 
     unit: str
     channels: tuple[Channel, ...]
@@ -74,43 +74,43 @@ class NewRecording:
     source: dict[str, Any] = field(default_factory=dict[str, Any])
     launched_s: float | None = None
     gaps: bool = False
-    """Whether samples may be NaN, in the place of those that are missing."""
+    """True where samples may be NaN, in the place of missing ones."""
     idempotency: Idempotency | None = None
     """A client's key, remembered when the recording is sealed."""
 
 
 @dataclass(frozen=True)
 class BenchStop:
-    """A software stop of a bench: it stands until a person releases it. Several of a bench may stand at once."""
+    """A software stop of a bench: it stands until a person releases it. A bench may have several at once."""
 
     bench: str
     at: datetime
     reason: str
     safe_at: datetime | None = None
-    """When somebody on the bench's host saw the devices safe, since; None: nobody has confirmed it."""
+    """Time when a process on the bench's host last saw the devices safe; None: not confirmed since the stop."""
     safe_by: str = ""
-    """By whom they were last commanded then."""
+    """Process that had last commanded them then."""
     by: str = ""
-    """Who stopped the bench: a person, as far as known, or the process that could not make it safe."""
+    """Person who stopped the bench, if known, or the process that could not make it safe."""
     id: str = field(default_factory=new_id)
     released_at: datetime | None = None
-    """When it was released; None: it stands."""
+    """Time of its release; None: it stands."""
     released_by: str = ""
     remark: str = ""
     """Remark of the person who released it."""
 
     @property
     def stands(self) -> bool:
-        """Whether nobody has released it yet."""
+        """Tell if the stop is not yet released."""
         return self.released_at is None
 
 
 SHOWN_STOPS = 3
-"""So many reasons of stops are told in a sentence; the list of stops has all of them."""
+"""Maximum number of reasons shown in one sentence; the list of stops has all of them."""
 
 
 def reasons_of(stops: Sequence[BenchStop]) -> str:
-    """Why a bench is stopped, in a sentence, whoever stopped it."""
+    """The reasons why a bench is stopped, in one sentence."""
     reasons = list(dict.fromkeys(stop.reason for stop in stops))
     more = f" (and {len(reasons) - SHOWN_STOPS} more reasons)" if len(reasons) > SHOWN_STOPS else ""
     return "; ".join(reasons[:SHOWN_STOPS]) + more
@@ -118,11 +118,11 @@ def reasons_of(stops: Sequence[BenchStop]) -> str:
 
 @dataclass(frozen=True)
 class StoredResult:
-    """What an analysis said, and everything that made it."""
+    """The result of an analysis, and all its inputs."""
 
     id: str
     kind: str
-    """"procedure" or "method"."""
+    """Kind of result: "procedure" or "method"."""
     name: str
     version: str
     parameters: dict[str, Any]
@@ -146,7 +146,7 @@ class StoredResult:
 
 @dataclass(frozen=True)
 class ResultValue:
-    """What one result says of a quantity; None where it lacks it."""
+    """The value of a quantity in one result; None where the result lacks it."""
 
     result: str
     job: str | None

@@ -1,4 +1,4 @@
-"""A job as a client asks for it, and how a repeated request is recognised."""
+"""A client's request for a job, and the recognition of a repeated request."""
 
 import hashlib
 import json
@@ -12,33 +12,33 @@ CAMPAIGN_RUN = "campaign_run"
 
 @dataclass(frozen=True, kw_only=True)
 class JobTerms:
-    """What a client asks of a job and its record keeps under the same name. A job inherits these fields."""
+    """The terms of a job that a request and its record have in common. A job inherits these fields."""
 
     procedure: str
     unit: str
     priority: int = 10
-    """Smaller runs first."""
+    """Priority in the queue: smaller runs first."""
     labels: dict[str, str] = field(default_factory=dict[str, str])
     seed: int | None = None
-    """Of the simulated world; None on a real bench."""
+    """Seed of the simulated world; None on a real bench."""
     deadline_at: datetime | None = None
-    """No station begins later; the job then fails."""
+    """Latest time at which a station may begin; the job then fails."""
     retries: int = 0
-    """How often a fault of the bench may be answered by trying again from the station that failed."""
+    """Maximum number of retries after faults of the bench, each from the station that failed."""
     reservation: str | None = None
     """The reservation under which it runs; None: it waits while its bench or unit is reserved."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class JobRequest(JobTerms):
-    """A job as a client asks for it."""
+    """A client's request for a job."""
 
     bench: str | None = None
     parameters: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 def fingerprint(request: object) -> str:
-    """A digest of what a client asked, the same for the same request."""
+    """A digest of a client's request, the same for the same request."""
     return hashlib.sha256(json.dumps(request, sort_keys=True, default=_plain).encode()).hexdigest()
 
 

@@ -1,1 +1,1 @@
-"""The events of jobs, handed out to every listener of this process."""
+"""The events of jobs: fan-out to every listener of this process."""

@@ -1,9 +1,9 @@
-"""One reader of a job's events for everybody of this process who listens to it.
+"""Reads each job's events once per process and fans them out to its listeners.
 
 Lives on the server's event loop. While a job has a listener its events are read once, at once after a commit of this
-process and soon after one of another (`WATCH_S`, `OWN_WATCH_S`), and handed to each listener's own bounded queue. Who
-does not take what is his is dropped, and nobody else notices. What a listener has is in order, without gaps or doubles:
-sequences count from 1 within a job, history comes from memory or the database, and the queue goes on where it ends.
+process, and soon after a commit of another one (`WATCH_S`, `OWN_WATCH_S`), and handed to each listener's own bounded
+queue. A slow listener is dropped, without effect on the others. A listener gets events in order, without gaps or
+duplicates: sequences count from 1 within a job, history comes from memory or the database, and the queue continues it.
 """
 
 import asyncio
@@ -20,21 +20,21 @@ from bench_service.model.job import FINAL, Event, Job, JobState
 from bench_service.wall_clock import monotonic_s
 
 WATCH_S = 0.1
-"""How often a watched job is looked at for events that other processes made [s]."""
+"""Interval between two looks at a watched job for events of other processes [s]."""
 OWN_WATCH_S = 0.5
-"""The same for a job of the bench that this process drives: nearly all its events are made here."""
+"""Interval for a job of the bench that this process drives: nearly all its events are made here [s]."""
 AGAIN_S = 1.0
-"""How long to wait after the database failed [s]."""
+"""Time to wait after a failure of the database [s]."""
 HEARTBEAT_S = 15.0
-"""A comment at least this often, so that proxies keep the connection [s]."""
+"""Maximum time between two messages: comments keep the connection open through proxies [s]."""
 LAG = 256
-"""Events that a listener may be behind before it is dropped."""
+"""Maximum number of events that a listener may be behind before it is dropped."""
 RECENT = 256
-"""The last events of a watched job, which are kept: many who come at once do not each read the database."""
+"""Number of last events kept per watched job: many listeners that join at once do not each read the database."""
 PAGE = 1000
 LIVE_PER_S = 100.0
-"""Live words sent in a second, over all listeners of a job: the more they are, the less often each one hears, but for
-the words that an event takes along.
+"""Live states sent per second, over all listeners of a job: the more listeners, the less often each gets one,
+except for live states that are sent along with an event.
 """
 OVER = FINAL | {JobState.INTERRUPTED}
 
@@ -42,7 +42,7 @@ log = logging.getLogger(__name__)
 
 
 class _Watch:
-    """A job that somebody listens to."""
+    """A job that has listeners."""
 
     def __init__(self, job: Job, sequence: int, state: JobState, recent: deque[tuple[int, bytes]]) -> None:
         self.job_id, self.bench = job.id, job.bench
@@ -59,11 +59,11 @@ class _Watch:
 
 
 class EventHub:
-    """Everybody of this process who listens to a job."""
+    """All listeners to jobs in this process."""
 
     def __init__(self, jobs: JobStore, board: LiveBoard, frames: Frames, lag: int = LAG, recent: int = RECENT) -> None:
         self.dropped = 0
-        """How many listeners were dropped so far."""
+        """Number of listeners dropped so far."""
         self._jobs = jobs
         self._board = board
         self._frames = frames
@@ -76,7 +76,7 @@ class EventHub:
 
     @property
     def listeners(self) -> int:
-        """How many listen now."""
+        """Number of listeners now."""
         return sum(len(watch.listeners) for watch in tuple(self._watches.values()))
 
     def wake(self, job_id: str) -> None:
@@ -86,13 +86,13 @@ class EventHub:
             watch.loop.call_soon_threadsafe(watch.woken.set)
 
     async def require(self, job_id: str) -> None:
-        """Raises `NotFound` for a job that there is not, `StorageFailure`."""
+        """Check that a job exists. Raises `NotFound` for one that does not, `StorageFailure`."""
         await self._watch(job_id)
 
     async def follow(self, job_id: str, after: int) -> AsyncIterator[bytes]:
-        """Everything after an event's sequence until the job has ended, or the listener is dropped.
+        """Yield all events after a sequence number until the job has ended, or the listener is dropped.
 
-        It also ends where the database does not answer: who comes back with the last id he saw misses nothing.
+        It also ends where the database does not answer: a client that reconnects with its last id misses nothing.
         """
         try:
             watch = await self._watch(job_id)
@@ -116,14 +116,14 @@ class EventHub:
             watch.listeners.discard(listener)
 
     async def _watch(self, job_id: str) -> _Watch:
-        """The watch of a job; it waits `WATCH_S` for its first listener. Many who come at once share one look at the
+        """The watch of a job; it waits `WATCH_S` for its first listener. Concurrent listeners share one look at the
         database. Raises as `require`.
         """
         watch = self._watches.get(job_id)
         while watch is None or (watch.closed and watch.state not in OVER):
             if job_id not in self._opening:
                 self._opening[job_id] = asyncio.create_task(self._open(job_id), name=f"open the watch of {job_id}")
-            watch = await asyncio.shield(self._opening[job_id])  # one who goes away does not end it for the others
+            watch = await asyncio.shield(self._opening[job_id])  # one that leaves does not cancel it for the others
         return watch
 
     async def _open(self, job_id: str) -> _Watch:
@@ -143,7 +143,7 @@ class EventHub:
         return job, last, self._jobs.events(job_id, max(0, last[0] - self._recent), self._recent)
 
     async def _history(self, watch: _Watch, listener: Listener) -> AsyncIterator[bytes]:
-        """What had happened when the listener came: from what is kept, or from the database."""
+        """The events before the listener joined: from memory, or from the database."""
         kept = tuple(watch.recent)
         if kept and kept[0][0] <= listener.after + 1:
             for sequence, frame in kept:
@@ -158,7 +158,7 @@ class EventHub:
                     yield self._frames.event(event)
 
     async def _run(self, watch: _Watch) -> None:
-        """Read and hand out while somebody listens and the job goes on."""
+        """Read and fan out events while the job has listeners and goes on."""
         look_s = OWN_WATCH_S if watch.bench == self._board.own else WATCH_S
         wait_s = look_s
         try:
@@ -183,7 +183,7 @@ class EventHub:
                 listener.end()
 
     async def _read(self, watch: _Watch) -> bool:
-        """Hand out what is new, and whether anything is; afterwards `state` is that of the newest event."""
+        """Fan out new events; True where there were any. Afterwards `state` is that of the newest event."""
         before = watch.sequence
         newest, state = await asyncio.to_thread(self._jobs.last_event, watch.job_id)
         while watch.sequence < newest:
@@ -205,7 +205,7 @@ class EventHub:
                 log.info("a listener to job %s was %d events behind and is dropped", watch.job_id, self._lag)
 
     async def _tell_live(self, watch: _Watch, rest_s: float) -> None:
-        """Hand out what the bench does now, where it works on this job; `rest_s` at least after the last time."""
+        """Fan out the bench's live state while it works on this job; `rest_s` at least after the last time."""
         at_s = monotonic_s()
         if watch.state in OVER or at_s - watch.live_at_s < max(PUBLISH_S, rest_s):
             return
@@ -220,7 +220,7 @@ class EventHub:
             listener.put_word(frame)
 
     def _beat(self, watch: _Watch) -> None:
-        """Let nobody wait longer than `HEARTBEAT_S` for a word."""
+        """Send each listener a heartbeat at least every `HEARTBEAT_S`."""
         at_s = monotonic_s()
         if at_s - watch.beat_at_s < HEARTBEAT_S / 2:
             return
@@ -230,7 +230,7 @@ class EventHub:
 
 
 async def _comes(event: asyncio.Event, seconds: float) -> None:
-    """Wait for it, but only so long."""
+    """Wait for the event, but no longer than `seconds`."""
     with suppress(TimeoutError):
         async with asyncio.timeout(seconds):
             await event.wait()

@@ -1,4 +1,4 @@
-"""One who listens to a job's events, and how what he is told is written."""
+"""A listener to a job's events, and the format of the messages that it gets."""
 
 import asyncio
 from collections import deque
@@ -9,16 +9,16 @@ from bench_service.model.job import Event
 
 
 class Frames(Protocol):
-    """How what listeners are told is written."""
+    """The wire format of the messages to listeners."""
 
     @property
     def quiet(self) -> bytes:
-        """Nothing has happened for a while."""
+        """The heartbeat: nothing has happened for a while."""
         ...
 
     @property
     def dropped(self) -> bytes:
-        """The listener was too slow; this is the last it hears."""
+        """The last message to a listener that was too slow."""
         ...
 
     def event(self, event: Event) -> bytes: ...
@@ -27,10 +27,10 @@ class Frames(Protocol):
 
 
 class Listener:
-    """What waits for him, and whether it ends."""
+    """The queue of messages to one listener, and its state."""
 
     def __init__(self, after: int, joined_at: int, lag: int) -> None:
-        """`after`: sequence of the last event that he knows. `joined_at`: that of the last one when he came."""
+        """Set up for a client that has events up to `after`; `joined_at`: the newest sequence when it joined."""
         self.after = after
         self.joined_at = joined_at
         self.ended = False
@@ -42,7 +42,7 @@ class Listener:
         self._woken = asyncio.Event()
 
     def put(self, sequence: int, frame: bytes) -> bool:
-        """Queue an event. False where too many wait already: the listener is dropped, and its queue let go."""
+        """Queue an event. False where the queue is full: the listener is dropped, and its queue emptied."""
         if len(self._frames) >= self._lag:
             self.dropped = self.ended = True
             self._frames.clear()
@@ -52,23 +52,23 @@ class Listener:
         return not self.dropped
 
     def put_word(self, frame: bytes) -> None:
-        """What has no sequence: only the newest such word waits."""
+        """Queue a message without sequence: only the newest such message waits."""
         self._word = frame
         self._wake()
 
     def beat(self, quiet: bytes) -> None:
-        """Say that nothing has happened, where nothing was put since the last beat."""
+        """Queue a heartbeat, where nothing was queued since the last one."""
         if not self._told:
             self.put_word(quiet)
         self._told = False
 
     def end(self) -> None:
-        """Nothing more will come."""
+        """Mark the end: no more messages will come."""
         self.ended = True
         self._wake()
 
     async def next(self) -> bytes:
-        """All that waits, in one piece, as soon as anything does; empty: the end."""
+        """All waiting messages in one piece, as soon as there is any; empty: the end."""
         while True:
             frames = [frame for sequence, frame in self._frames if sequence > self.after]
             if self._frames:
