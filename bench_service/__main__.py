@@ -1,4 +1,4 @@
-"""``python -m bench_service`` and ``bench``: where the environment is read, once."""
+"""Entry point of ``python -m bench_service`` and ``bench``: the environment is read here, once."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""The composition root: the only place where stores, driver, engine and HTTP meet."""
+"""The composition root, the only place where stores, driver, engine and HTTP meet."""
 
 from collections.abc import AsyncGenerator, Callable
 from contextlib import ExitStack, asynccontextmanager
@@ -53,9 +53,9 @@ from bench_service.telemetry.code_version import code_version
 from bench_service.telemetry.tracing import traces_to
 
 IMPORT_THREADS = 4
-"""Imports that are stored or wait for a reader at one time; more wait without a thread."""
+"""Maximum number of imports that are stored or wait for a reader at one time; more wait without a thread."""
 DRAWINGS = 30
-"""So many figures may be drawn or wait at one time."""
+"""Maximum number of figures that are drawn or wait at one time."""
 ROUTERS = (
     procedures,
     jobs,
@@ -74,7 +74,7 @@ ROUTERS = (
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apart: bool = False) -> BenchService:
-    """A service that is ready to begin; `closing` undoes everything in reverse order.
+    """Open a service that is ready to begin; `closing` undoes everything in reverse order.
 
     With `drive` it holds the bench's lease and runs jobs; without, it plans, queues, reads and analyses for benches
     that other processes drive. With `apart` analyses and drawings are made in processes of their own.
@@ -82,7 +82,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     """
     files = BenchFiles(settings)
     rescued = files.rescue() if drive else None
-    threadpool_limits(1)  # our matrices have at most 72 rows: BLAS threads would only spin against the bench's own
+    threadpool_limits(1)  # the matrices have at most 72 rows: BLAS threads would only spin against the bench's own
     stores, database = open_stores(settings.database_url)
     closing.callback(database.dispose)
     driver = _driver(settings, partial(AskedOperator, stores.prompts)) if drive else None
@@ -136,12 +136,12 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
 
 
 def _devices(settings: Settings, bench_id: str) -> BenchDevices:
-    """What a bench's devices remember on this host, whoever drives them."""
+    """A bench's devices on this host, known by their register, without driving them."""
     return RegisteredDevices(DeviceRegister(settings.devices_in(), bench_id))
 
 
 def _driver(settings: Settings, asking: Asking) -> SimulatedDriver:
-    """The bench, with what its devices remember."""
+    """The simulated bench's driver, with the state that its devices have kept."""
     register = DeviceRegister(settings.devices_in(), settings.bench_id)
     faults = None if settings.device_faults is None else FaultPlan.parse(settings.device_faults)
     truths = settings.unit_truth, settings.bench_truth
@@ -150,7 +150,7 @@ def _driver(settings: Settings, asking: Asking) -> SimulatedDriver:
 
 
 def _engine(settings: Settings, runner: JobRunner) -> JobEngine:
-    """The job engine, which is imported here because it takes as long as the rest of the service."""
+    """Make the job engine, imported here because that takes as long as the rest of the service."""
     from bench_service.jobs.engine import Engine
 
     books = engine_database(settings.database_url, settings.bench_id)
@@ -166,7 +166,7 @@ def _dispatcher(
 def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[], None], rules: door.Door) -> FastAPI:
     """The application around a service that is open; `at_end` is called when the server shuts down.
 
-    `rules`: which requests are let in.
+    `rules`: decide which requests are let in.
     """
 
     @asynccontextmanager

@@ -1,4 +1,4 @@
-"""Work in threads of its own, which the process does not wait for at its end, as it would for an executor's."""
+"""Background threads that the process does not wait for at its end, as it would for an executor's."""
 
 from collections.abc import Callable
 from concurrent import futures
@@ -40,9 +40,9 @@ class NonBlockingQuery(Generic[T]):
         self._running: Future[T] | None = None
 
     def ask(self, within_s: float) -> T | None:
-        """Return the answer; None where it does not come within `within_s` [s], and the next call waits on for it.
+        """Return the answer; None where it takes longer than `within_s` [s], and the next call goes on waiting for it.
 
-        Raises what the query raises.
+        Raises the query's own errors.
         """
         if self._running is None:
             self._running = in_background(self._name, self._query)
@@ -60,14 +60,14 @@ class BackgroundTasks:
     """
 
     def __init__(self, on_done: Callable[[], None]) -> None:
-        """`on_done`: called, in any thread, when a task ends."""
+        """Set up with `on_done`, called in any thread when a task ends."""
         self._on_done = on_done
         self._tasks: dict[str, Future[str]] = {}
 
     def outcome(self, key: str, work: Callable[[], str]) -> str | None:
-        """Return the task's result once, None while it runs; start it where it does not. Raises what it raised.
+        """Return the task's result once, None while it runs; start it where it does not. Raises the task's error.
 
-        After the result was returned, the next call starts the task anew.
+        After the result was returned, the next call starts the task again.
         """
         task = self._tasks.get(key)
         if task is None:

@@ -1,4 +1,4 @@
-"""What a process that drives a bench has in the bench's device folder: stop channel, heartbeat, and who drives it.
+"""Files of a driving process in the bench's device folder: stop channel, heartbeat, and its identity.
 
 Composed here because devices, stop guard and books meet in it.
 """
@@ -34,11 +34,11 @@ class BenchFiles:
         self._devices = RegisteredDevices(DeviceRegister(folder, self._bench_id))
 
     def rescue(self) -> Rescue | None:
-        """Make safe what a dead process left, before a database is opened; see `before_anything_else`."""
+        """Make safe the devices that a dead process left, before a database is opened; see `before_anything_else`."""
         return before_anything_else(self._devices, f"the service, {ProcessIdentity.own()}")
 
     def begin_driving(self) -> None:
-        """Say that this process drives the bench; its lease must be held. Raises `StorageFull`."""
+        """Register this process as the bench's driver; its lease must be held. Raises `StorageFull`."""
         try:
             self._channel.prepare()
             self._heartbeat.prepare()
@@ -49,7 +49,7 @@ class BenchFiles:
             ) from error
 
     def stopped(self) -> bool:
-        """Whether somebody has stopped the bench over its channel."""
+        """Tell if a stop stands on the bench's channel."""
         return bool(self._channel.standing())
 
     def guard(self, make_safe: Callable[[], object], wake: Callable[[], object]) -> StopGuard:
@@ -57,7 +57,7 @@ class BenchFiles:
         return StopGuard(self._channel, self._heartbeat, self._is_safe, make_safe, wake)
 
     def keep_books(self, stores: Stores) -> StopKeeper:
-        """Begin to enter stops of the channel into the books, and to take released ones away."""
+        """Begin to enter stops of the channel into the database, and to remove released ones."""
         keeper = StopKeeper(self._channel, _Books(stores, self._bench_id))
         keeper.begin()
         return keeper
@@ -68,7 +68,7 @@ class BenchFiles:
 
 
 class _Books:
-    """`bench_service.bench.stop.exchange.StopBooks` over a service's stores."""
+    """A `bench_service.bench.stop.exchange.StopBooks` over a service's stores."""
 
     def __init__(self, stores: Stores, bench_id: str) -> None:
         self._stores = stores

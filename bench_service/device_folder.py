@@ -1,4 +1,4 @@
-"""Where a bench's devices keep their state, by the settings' words: known without loading the settings' model.
+"""The folder of a bench's device state, from the settings, without loading the settings' model.
 
 `bench stop` reads no more than this of its environment, so that it begins at once and no wrong setting keeps it out.
 """
@@ -11,7 +11,7 @@ BENCH_ID = "sim"
 
 
 def device_folder(database_url: str, given: Path | None) -> Path:
-    """The given folder, or the one beside an SQLite file, or one in .bench/ named by a Postgres database."""
+    """The given folder, or the folder of an SQLite file, or one in .bench/ named by a Postgres database."""
     if given is not None:
         return given
     address = urlsplit(database_url)

@@ -44,7 +44,7 @@ def field_names(shape: type) -> tuple[str, ...]:
 
 @cache
 def _fields(shape: Any) -> dict[str, bool]:
-    """Field -> whether it must have a value."""
+    """Map each field to True where it must have a value."""
     if hasattr(shape, "model_fields"):
         return {name: field.is_required() for name, field in shape.model_fields.items()}
     if hasattr(shape, "__mapper__"):

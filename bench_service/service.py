@@ -23,11 +23,11 @@ from bench_service.model.records import reasons_of
 from bench_service.telemetry.tracing import Traces
 
 LEAST_FREE_BYTES = 200_000_000
-"""With less room on the database's disk the service says that it is not ready: an hour of samples is about 17 MB."""
+"""Free bytes on the database's disk below which the service is not ready: an hour of samples is about 17 MB."""
 
 
 class BenchService:
-    """Everything that HTTP, pages and command line can ask, by noun."""
+    """Everything that HTTP, pages and command line can request, by noun."""
 
     def __init__(
         self,
@@ -44,11 +44,11 @@ class BenchService:
         rescued: Rescue | None = None,
         processes: WorkProcesses | None = None,
     ) -> None:
-        """`driver`: of this process's own bench; None: it plans and queues for benches that workers drive.
+        """Set up with `driver` of this process's own bench; None: it plans and queues for benches that workers drive.
 
-        `free_bytes`: room on the database's disk, where that is known. `roads`: how a stop reaches its bench; None:
-        through the database alone. `rescued`: what was made safe before the database was opened. `processes`: where
-        analyses are worked out; None: in the caller's thread.
+        `free_bytes`: room on the database's disk, where that is known. `roads`: the ways of a stop to its bench; None:
+        through the database alone. `rescued`: the result of making devices safe at start. `processes`: where
+        analyses are computed; None: in the caller's thread.
         """
         self.safety = safety
         self.traces = traces or Traces()
@@ -71,7 +71,7 @@ class BenchService:
         self._rescued = rescued
 
     def register(self) -> None:
-        """Remember the bench and its units, and forget what crashed imports left."""
+        """Register the bench and its units, and discard orphaned imports."""
         self.imports.discard_crashed()
         if self._driver is None:
             return
@@ -83,7 +83,7 @@ class BenchService:
             self.safety.at_start(self._driver.description.id, self._rescued)
 
     def begin(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
-        """Begin to work, beside the first answers. The bench's lease must be held.
+        """Begin to work while the service already answers. The bench's lease must be held.
 
         `warm_up` is called once the engine runs and the numerics are loaded.
         """
@@ -106,7 +106,7 @@ class BenchService:
             self._worker.require_engine()
 
     def ready(self) -> tuple[str, ...]:
-        """Return once a job could start, with what a person should know all the same.
+        """Return once a job could start, with notes for a person.
 
         A stopped bench is such a note: it refuses by a person's will, and the service works. Raises `NotReady` with
         every reason, `StorageFailure` where the database does not answer.
@@ -125,14 +125,14 @@ class BenchService:
         return (*stopped, *self.catalogue.notes())
 
     def stop(self) -> None:
-        """End the service: the running job is left for the next start, the bench made safe."""
+        """End the service: the running job is left for the next start, and the bench made safe."""
         self.campaigns.conductor.stop()
         if self._worker is not None:
             self._worker.shut_down()
         self.imports.close()
 
     def _wake(self, bench_id: str) -> None:
-        """There may be something to do for a bench: for this process's worker, or for one beside it on this host."""
+        """Wake the worker of a bench that may have work: this process's own, or another one on this host."""
         if self._driver is not None and self._driver.description.id == bench_id:
             if self._worker is not None:
                 self._worker.wake()

@@ -1,4 +1,4 @@
-"""Settings: one frozen model, read from the environment once, in `__main__`."""
+"""Settings of the service: one frozen model, read from the environment once, in `__main__`."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,15 +9,15 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from bench_service.device_folder import BENCH_ID, DATABASE_URL, device_folder
 
 LEAST_TOKEN = 20
-"""Characters of the shortest token that is taken."""
+"""Number of characters of the shortest valid token."""
 
 
 class BadSettings(Exception):
-    """A setting from the environment is not usable; the message names it."""
+    """Raised where a setting from the environment is not usable; the message names it."""
 
 
 def _listed(given: object) -> object:
-    """The parts of a list that is written with commas."""
+    """The parts of a comma-separated list."""
     return tuple(part for part in map(str.strip, given.split(",")) if part) if isinstance(given, str) else given
 
 
@@ -34,7 +34,7 @@ class Settings(BaseModel):
     host: str = "127.0.0.1"
     """An address other than a loopback one needs `token_file` or `published`."""
     hosts: Annotated[tuple[HostName, ...], BeforeValidator(_listed)] = ()
-    """Names beside the loopback ones that requests may speak to, separated by commas: those of a proxy, of a container.
+    """Names that requests may use, besides the loopback ones, comma-separated: those of a proxy, of a container.
 
     With a port (`bench.example:8443`) only that port."""
     token_file: Path | None = None
@@ -54,35 +54,35 @@ class Settings(BaseModel):
     real_time_factor: float | None = Field(None, gt=0)
     """Simulated seconds per real second; None: as fast as the machine allows."""
     device_folder: Path | None = None
-    """Where a simulated bench's devices keep their state; None: beside an SQLite file, in .bench/ for Postgres.
+    """Folder where a simulated bench's devices keep their state; None: with the SQLite file, in .bench/ for Postgres.
 
     A folder of the bench's own host, the same for every process of that bench."""
     stop_listen: str = Field("127.0.0.1:0", pattern=r"^(|\S+:\d{1,5})$")
-    """Where a bench's supervisor takes stops from an API on another host, `host:port`, port 0 for any; empty: nowhere.
+    """Address at which a bench's supervisor takes stops from other hosts, `host:port`, port 0 for any; empty: none.
 
-    The name is also what the API is told to connect to; over a network it is one that the API's host can resolve."""
+    The API connects to this name too; over a network it is one that the API's host can resolve."""
     stop_secret_file: Path | None = None
     """Secret that supervisors and APIs of a deployment share, 16 bytes or more; None: the device folder's own."""
     device_faults: str | None = None
-    """For exercises: faults put into a simulated bench's devices (see `bench_service.drivers.device_faults`)."""
+    """Faults put into a simulated bench's devices, for exercises (see `bench_service.drivers.device_faults`)."""
     ask_operator: bool = False
-    """For exercises: whether a person is asked for what the simulated bench's operator else does by himself."""
+    """True where a person is asked, for exercises, to do the work of the simulated bench's operator."""
     poll_s: float = Field(0.1, gt=0, le=10)
-    """How often a worker looks for jobs that other processes queued; its own it sees at once."""
+    """Interval at which a worker looks for jobs that other processes queued [s]; its own it sees at once."""
     drive: bool = True
-    """Whether `bench serve` drives its bench; false: an API alone, for benches that workers drive."""
+    """True where `bench serve` drives its bench; false: an API alone, for benches that workers drive."""
     retry_scale: float = Field(1.0, gt=0, le=1)
-    """Of the pauses before a retry after a fault of the bench (10 s, 30 s, 60 s, …)."""
+    """Factor on the pauses before a retry after a fault of the bench (10 s, 30 s, 60 s, …)."""
     log: Literal["text", "json"] = "text"
-    """How lines of the log look."""
+    """Format of the log's lines."""
     log_level: Literal["debug", "info", "warning", "error"] | None = None
-    """From which level on; None: info for a service, warning for a command that works in this process."""
+    """Lowest level that is logged; None: info for a service, warning for a command that works in this process."""
     log_access: bool = False
-    """Whether every request is a line of the log."""
+    """True where every request is a line of the log."""
     traces_url: str | None = Field(None, pattern=r"^https?://\S+$")
-    """Where traces go (OTLP over HTTP, protobuf); None: nowhere, unless OTEL_EXPORTER_OTLP_ENDPOINT names a place."""
+    """Address for traces (OTLP over HTTP, protobuf); None: none, unless OTEL_EXPORTER_OTLP_ENDPOINT gives one."""
     max_import_mb: float = Field(1024, gt=0)
-    """Largest recording file that may be imported."""
+    """Largest recording file that may be imported [MB]."""
 
     def stop_secret_in(self) -> Path:
         """The file of the secret under which a stop goes to another host."""

@@ -1,4 +1,4 @@
-"""Campaigns: procedures in order with limits and stop rules, done by themselves, now or at night.
+"""Campaigns: procedures in order with limits and stop rules, run automatically, now or at night.
 
-`campaign` is the data, `run` one execution of it, `conductor` what moves runs on; `service` is what clients may ask.
+`campaign` is the data, `run` one execution of it, `conductor` advances runs; `service` has the verbs for clients.
 """

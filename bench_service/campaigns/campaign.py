@@ -1,7 +1,7 @@
 """A campaign as data: procedures in order, with limits, stop rules, and a rule for the seeds of simulated benches.
 
-What is no campaign is refused here; what can never work, in `examination`, so that one that was stored once can always
-be read.
+A document that is no campaign is refused here; one that can never work, in `examination`, so that a stored one can
+always be read.
 """
 
 from typing import Annotated, Any, Literal, Self
@@ -51,12 +51,12 @@ class StepLimit(Document):
         return bounds(self.minimum, self.maximum, self.unit)
 
     def excludes(self, other: "StepLimit") -> bool:
-        """Whether all that passes the other limit of the same quantity is below this one's minimum."""
+        """Tell if every value that passes the other limit of the same quantity is below this one's minimum."""
         if other.quantity != self.quantity or self.minimum is None or other.maximum is None:
             return False
         try:
             return self.minimum > converted(other.maximum, other.unit, self.unit)
-        except ValueError:  # not of one kind: one of them is refused for its unit
+        except ValueError:  # units of different kinds: one of them is refused for its unit
             return False
 
 
@@ -155,6 +155,6 @@ class Campaign(Document):
 
 
 def _fault(where: tuple[str | int, ...], value: str, text: str) -> ValidationError:
-    """A refusal of one field by what is said elsewhere in the document."""
+    """Make a refusal of one field because of another part of the document."""
     error = PydanticCustomError("campaign", "{text}", {"text": text})
     return ValidationError.from_exception_data("Campaign", [InitErrorDetails(type=error, loc=where, input=value)])

@@ -1,9 +1,9 @@
-"""What moves campaign runs on: looks at the database, does the next thing, and remembers nothing itself.
+"""Advances campaign runs: reads the database, takes the next step of each open run, and keeps no state itself.
 
 Any number of processes may conduct: a decision is written before it is acted on, acting twice gives the same job (its
-key is the run, the step and the attempt), and a change is only stored by whoever read the run's last revision. So a
-process may be killed anywhere, and another one, or its next life, goes on. A method, which may take long, is worked out
-beside the looking, under such a key too.
+key is the run, the step and the attempt), and a change is only stored by a process that has read the run's last
+revision. So a process may be killed anywhere, and another one, or its next life, goes on. A method, which may take
+long, is computed in the background, under such a key too.
 """
 
 import logging
@@ -35,21 +35,21 @@ from bench_service.wall_clock import now
 from procedures.core.errors import DomainError
 
 BUSY_S = 0.2
-"""How often it looks while a run is open [s]."""
+"""Interval between two looks while a run is open [s]."""
 IDLE_S = 1.0
-"""How often it looks for runs of other processes, and for schedules that are due [s]."""
+"""Interval between two looks for runs of other processes, and for schedules that are due [s]."""
 LEAVE_S = 10.0
-"""How long the end of the service waits for what it is in the middle of [s]."""
+"""Time that the end of the service waits for the look that is under way [s]."""
 METHODS_LEAVE_S = 1.0
-"""How long it waits for methods that are worked out [s]: the next start begins them again."""
+"""Time that it waits for methods that are being computed [s]: the next start begins them again."""
 HOPELESS = ("BadParameter", "Undetermined", "MissingChannel", "NotMounted")
-"""Refusals that would be the same another time: no retry helps."""
+"""Refusals that would recur: no retry helps."""
 
 log = logging.getLogger(__name__)
 
 
 class Conductor:
-    """Moves every open run, and starts what schedules ask for, in a thread of its own from `begin` to `stop`."""
+    """Advances every open run, and starts due schedules, in a thread of its own from `begin` to `stop`."""
 
     def __init__(
         self,
@@ -70,12 +70,12 @@ class Conductor:
         self._methods = BackgroundTasks(self.nudge)
 
     def begin(self) -> None:
-        """Begin to look."""
+        """Begin to advance runs."""
         self._thread = Thread(target=self._work, name="conductor", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """End; runs stay as they are."""
+        """End the thread; runs stay as they are."""
         self._ending.set()
         self._wanted.set()
         if self._thread is not None:
@@ -83,11 +83,11 @@ class Conductor:
             self._methods.wait(METHODS_LEAVE_S)
 
     def nudge(self) -> None:
-        """Look now: something was asked for."""
+        """Look at once, after a new request."""
         self._wanted.set()
 
     def look(self) -> bool:
-        """Fire what is due and move every open run as far as it goes now; whether one is still open."""
+        """Fire due schedules and advance every open run as far as possible; True where one is still open."""
         self._fire_schedules()
         runs = self._stores.campaigns.open_runs()
         for run in runs:
@@ -100,7 +100,7 @@ class Conductor:
         return bool(runs)
 
     def advance(self, run_id: str) -> None:
-        """Move one run until it waits for something, or has ended."""
+        """Advance one run until it waits for something, or has ended."""
         campaigns = self._stores.campaigns
         while not self._ending.is_set():
             run = campaigns.run(run_id)
@@ -160,7 +160,7 @@ class Conductor:
             return transitions.failed(run, index, StepState.FAILED, f"{type(error).__name__}: {error}", at)
 
     def _begin(self, run: CampaignRun) -> CampaignRun | None:
-        """A bench does one campaign run at a time, in the order in which they were asked for."""
+        """Begin the run, unless another is open: a bench does one at a time, in the order of their requests."""
         for other in self._stores.campaigns.open_runs():
             rival = other.bench == run.bench and other.id != run.id
             if rival and (other.state is not JobState.QUEUED or other.id < run.id):
@@ -192,7 +192,7 @@ class Conductor:
         return self._submit(request, key_of(run, index))
 
     def _followed(self, run: CampaignRun, index: int, late: bool) -> CampaignRun | None:
-        """What a step's job says now."""
+        """The run after a look at its step's job."""
         job = self._stores.jobs.get(run.steps[index].job_id or "")
         if (run.cancel_requested or late) and job.state not in FINAL:
             return self._ended_job(run, index, job, late)
@@ -220,7 +220,7 @@ class Conductor:
         return transitions.waiting(run, why)
 
     def _broken(self, run: CampaignRun, index: int, job: Job) -> CampaignRun:
-        """A job ended without a verdict."""
+        """The run after its step's job ended without a verdict."""
         at = now()
         if run.cancel_requested:
             return transitions.cancelled(run, at)
@@ -240,7 +240,7 @@ class Conductor:
         return transitions.judged(run, index, judgement, result.id, now())
 
     def _method(self, run: CampaignRun, index: int, late: bool) -> CampaignRun | None:
-        """What a step's method says now. One of a run that ends meanwhile still gives its result, judged by nobody."""
+        """The run after a look at its step's method; an ended run ignores the result, which is stored all the same."""
         key = key_of(run, index)
         result_id = self._methods.outcome(key, lambda: self._work_out(run, index, key))
         if result_id is not None:
@@ -248,7 +248,7 @@ class Conductor:
         return transitions.out_of_time(run, now()) if late else transitions.observed(run, index, StepState.RUNNING, "")
 
     def _work_out(self, run: CampaignRun, index: int, key: str) -> str:
-        """The id of the result; of the first, where it was worked out before."""
+        """Compute the method's result and return its id; a repeated call returns the first result."""
         step = run.step_of(index)
         request = AnalysisRequest(
             step.does,
@@ -263,12 +263,12 @@ class Conductor:
         return tuple(r.info.id for job_id in jobs for r in self._stores.recordings.of_job(job_id))
 
     def _calibrations_of(self, run: CampaignRun, step: Step) -> tuple[str, ...]:
-        """Of the steps' results, in the order of the steps."""
+        """Calibrations that the steps' results gave, in the order of the steps."""
         results = [s.result_id for name in step.calibrations_of for s in run.steps if s.name == name and s.result_id]
         return self._stores.results.calibrations_of(results)
 
     def _abandoned(self, run: CampaignRun, changed: CampaignRun) -> None:
-        """Somebody else changed the run first. A job that was submitted for nothing is taken back."""
+        """Cancel a job that was submitted in vain: another process changed the run first."""
         index = run.current
         job_id = None if index is None else changed.steps[index].job_id
         if index is None or job_id is None or run.steps[index].job_id is not None:

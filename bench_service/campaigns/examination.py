@@ -1,4 +1,4 @@
-"""A campaign against catalogue, unit and bench, before anything moves: what it will do, and what is wrong with it."""
+"""Examines a campaign against catalogue, unit and bench, before anything moves: its plan, and its faults."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,17 +14,17 @@ from procedures.core.units import HOUR, converted
 from procedures.procedure import PredictedUncertainty, Procedure
 
 NO_CALIBRATIONS = Procedure.calibrations
-"""What a procedure or method has whose results are no calibration."""
+"""The `calibrations` of a procedure or method whose results are no calibration."""
 
 
 @dataclass(frozen=True)
 class StepPlan:
-    """What one step will do."""
+    """The plan of one step."""
 
     name: str
     does: str
     left_out: str = ""
-    """Why it will not be done."""
+    """The reason why it will not be done."""
     stations: int = 0
     duration_s: float = 0.0
     data_bytes: int = 0
@@ -33,7 +33,7 @@ class StepPlan:
 
 @dataclass(frozen=True)
 class Examination:
-    """What a campaign will do on a unit; `warnings` name the step that they are of."""
+    """The plan of a campaign on a unit; `warnings` name the step that they are of."""
 
     steps: tuple[StepPlan, ...]
     duration_s: float
@@ -43,24 +43,24 @@ class Examination:
 
 @dataclass
 class _Progress:
-    """What earlier steps leave for later ones."""
+    """The results that earlier steps leave for later ones."""
 
     calibrated: bool = False
-    """The unit's current calibration is of this campaign."""
+    """True once the unit's current calibration is of this campaign."""
     calibrating: set[str] = field(default_factory=set[str])
     """Steps whose results give calibrations."""
     left_out: set[str] = field(default_factory=set[str])
 
 
 class Examiner:
-    """Looks at campaigns; moves and stores nothing."""
+    """Examines campaigns; moves and stores nothing."""
 
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
         self._catalogue = planner.catalogue
 
     def examine(self, campaign: Campaign, unit: str, bench: str | None, strict: bool) -> Examination:
-        """Preview every step. Raises `BadParameter` naming the step's field, `NotFound` for a bench, `NotMounted`.
+        """Preview every step of a campaign. Raises `BadParameter` with the step's field, `NotFound`, `NotMounted`.
 
         With `strict` the unit is the one that the campaign is about to run on: a step that can only begin with a
         calibration is refused where there will be none; without, it is a warning.
@@ -139,7 +139,7 @@ class Examiner:
         strict: bool,
         error: DomainError,
     ) -> StepPlan:
-        """A step that needs the calibration which an earlier step is to give: laid out, but not predicted."""
+        """The plan of a step whose calibration an earlier step is to give: stations, without a prediction."""
         if strict and not progress.calibrated:
             raise BadParameter(where, step.does, str(error)) from error
         procedure, context = self._catalogue.procedure(step.does), self._planner.context(unit, bench)
@@ -152,7 +152,7 @@ class Examiner:
 
 
 def _warnings(plans: Sequence[StepPlan]) -> list[str]:
-    """What is to be known before the campaign begins; what several steps say is said once."""
+    """The warnings before a campaign begins; one that several steps share is given once."""
     said: dict[str, list[str]] = {}
     for plan in plans:
         for warning in (plan.left_out,) if plan.left_out else plan.warnings:
@@ -168,7 +168,7 @@ def _valid_parameters(validate: Any, parameters: dict[str, Any], where: str) -> 
 
 
 def _first(error: ValidationError, where: str) -> BadParameter:
-    """The first fault of some parameters, with the step that it is in."""
+    """The first fault of a step's parameters, with the step in its path."""
     first = error.errors(include_url=False)[0]
     path = ".".join(str(part) for part in (where, "parameters", *first["loc"]))
     return BadParameter(path, first.get("input"), first["msg"])
@@ -186,7 +186,7 @@ def _require_known(step: Step, where: str, names: tuple[str, ...] | None) -> Non
 
 
 def _require_possible(step: Step, where: str) -> None:
-    """Refuse what contradicts itself: nothing could pass, or nothing would ever be judged."""
+    """Refuse a step that contradicts itself: nothing could pass, or nothing would ever be judged."""
     for position, limit in enumerate(step.limits):
         for earlier in step.limits[:position]:
             if earlier.excludes(limit) or limit.excludes(earlier):
@@ -203,7 +203,7 @@ def _require_possible(step: Step, where: str) -> None:
 
 
 def _require_calibrations(step: Step, where: str, progress: _Progress) -> None:
-    """Refuse to work on calibrations of a step that gives none."""
+    """Refuse a method on calibrations of a step that gives none."""
     for position, name in enumerate(step.calibrations_of):
         if name not in progress.calibrating:
             allowed = (
@@ -213,7 +213,7 @@ def _require_calibrations(step: Step, where: str, progress: _Progress) -> None:
 
 
 def _unresolved(limit: StepLimit, where: str, predicted: tuple[PredictedUncertainty, ...]) -> list[str]:
-    """Warn of a limit that is narrower than what the plan will know the quantity to; refuse a unit of another kind."""
+    """Warn of a limit narrower than the predicted uncertainty of its quantity; refuse a unit of another kind."""
     found = next((p for p in predicted if p.about(limit.quantity)), None)
     if found is None:
         return []

@@ -1,4 +1,4 @@
-"""What a step's result says beside its own checks: the campaign's limits, and the unit's history."""
+"""Judges a step's result beyond its own checks: by the campaign's limits, and by the unit's history."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ CHECKS = TypeAdapter(tuple[Check, ...])
 
 @dataclass(frozen=True)
 class Judgement:
-    """A step's verdict, and everything that it rests on."""
+    """A step's verdict, and the checks, warnings and reason behind it."""
 
     verdict: Verdict
     checks: tuple[Check, ...]
@@ -30,7 +30,7 @@ class Judgement:
 
 
 def judge(step: Step, campaign: Campaign, result: StoredResult, stores: Stores) -> Judgement:
-    """The result's own verdict, worse where the campaign asks for more.
+    """The result's own verdict, made worse where the campaign's requirements are not met.
 
     A limit on something that the result does not have, or has in another kind of unit, is an error of the step.
     """
@@ -55,7 +55,7 @@ def judge(step: Step, campaign: Campaign, result: StoredResult, stores: Stores) 
 
 
 def checks_of(document: dict[str, Any]) -> tuple[Check, ...]:
-    """The procedure's own checks."""
+    """The procedure's own checks in a result's document."""
     return CHECKS.validate_python(document.get("checks", []))
 
 
@@ -77,7 +77,7 @@ def _limited(limit: StepLimit, campaign: Campaign, document: dict[str, Any]) -> 
 
 
 def _trend(rule: TrendRule, result: StoredResult, stores: Stores) -> tuple[list[Check], list[str]]:
-    """The newest value against limits from the results of the same plan before it."""
+    """Judge the newest value against control limits from earlier results of the same plan."""
     unit, now = result.unit or "", quantity(result.document, rule.quantity)
     earlier = stores.results.values(
         unit,

@@ -1,4 +1,4 @@
-"""A run as JUnit XML, for a CI system to read: the run is the document, a step a suite, a check a case.
+"""A campaign run as JUnit XML for a CI system: the run is the document, a step a suite, a check a case.
 
 A check that missed its limit is a failure, a step without a verdict an error, a step left out is skipped. A step that
 has no check of its own still has one case, so that nothing is lost between the lines; a run whose verdict is no step's
@@ -26,7 +26,7 @@ DECLARATION = b"<?xml version='1.0' encoding='utf-8'?>\n"
 
 
 def document(run: CampaignRun) -> bytes:
-    """UTF-8, with its declaration. Of a run that is still open the open steps are errors: they gave no verdict yet."""
+    """Write a run as UTF-8, with its declaration. Open steps of an open run are errors: they have no verdict yet."""
     from junitparser import JUnitXml
 
     whole = JUnitXml(_text(f"{run.campaign.name} {run.unit}"))
@@ -41,7 +41,7 @@ def document(run: CampaignRun) -> bytes:
 
 
 def _of_the_run(run: CampaignRun) -> "TestSuite":
-    """One error: the run itself, which gave no verdict, and no step that says so."""
+    """A suite with one error for the run itself: it has no verdict, and no step shows the reason."""
     from junitparser import Error, TestCase
 
     suite = _dated(run, RUN, run.started_at)
@@ -87,7 +87,7 @@ def _suite(run: CampaignRun, step: StepRun) -> "TestSuite":
 
 
 def _cases(run: CampaignRun, step: StepRun) -> list["TestCase"]:
-    """A case a check, and one for the step itself where no check says what became of it."""
+    """One case per check, and one for the step itself where no check shows its outcome."""
     from junitparser import Error, Failure, Skipped
 
     cases = [_checked(run, step, check) for check in step.checks]
@@ -129,7 +129,7 @@ def _case(run: CampaignRun, step: StepRun, name: str) -> "TestCase":
 
 
 def _sentence(check: Check) -> str:
-    """The value beside its limit, as a person reads it."""
+    """The value and its limit, as a sentence for a person."""
     limit = check.limit
     value = f"{check.value:.6g}" if isfinite(check.value) else "no finite number"
     uncertainty = "" if check.standard_uncertainty is None else f" ± {check.standard_uncertainty:.2g}"
@@ -137,7 +137,7 @@ def _sentence(check: Check) -> str:
 
 
 def _seconds(begun: datetime | None, ended: datetime | None) -> float:
-    """To the millisecond, by the wall clock; 0 where it was set back meanwhile: readers take no sign, no exponent."""
+    """Duration [s] to the millisecond, by the wall clock; 0 where the clock was set back: no sign, no exponent."""
     return 0.0 if begun is None or ended is None else max(0.0, round((ended - begun).total_seconds(), 3))
 
 

@@ -1,4 +1,4 @@
-"""What a run's numbers were made of: jobs, results, recordings with their hashes, versions, seeds."""
+"""Lineage of a run's numbers: jobs, results, recordings with their hashes, versions, seeds."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,15 +11,15 @@ from bench_service.model.records import StoredResult
 
 @dataclass(frozen=True)
 class StepLineage:
-    """One attempt of a step."""
+    """The lineage of one attempt of a step."""
 
     step: str
     does: str
     version: str
-    """Of the procedure or method."""
+    """Version of the procedure or method."""
     job: str | None
     state: str
-    """Of the job, or of the step of a method."""
+    """State of the job, or of the step of a method."""
     result: str | None
     recordings: tuple[tuple[str, str], ...]
     """(id, content hash) of each recording that the result rests on, or that the job made before it broke off."""
@@ -32,7 +32,7 @@ class StepLineage:
 
 
 def lineage_of(run: CampaignRun, stores: Stores) -> tuple[StepLineage, ...]:
-    """Of every attempt of every step, in order; steps that never began have none."""
+    """The lineage of every attempt of every step, in order; steps that never began have none."""
     found: list[StepLineage] = []
     for step in run.steps:
         for job_id in (*step.earlier_jobs, *((step.job_id,) if step.job_id else ())):

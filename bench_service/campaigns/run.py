@@ -1,4 +1,4 @@
-"""One execution of a campaign on one unit: a value that says how far it is, and why it is not further."""
+"""One execution of a campaign on one unit: a value with its progress, and the reason why it waits."""
 
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
@@ -11,7 +11,7 @@ from procedures.core.limits import Check, Verdict
 
 
 class StepState(StrEnum):
-    """Where a step is: its job's state, or skipped."""
+    """The state of a step: its job's state, or skipped."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -27,7 +27,7 @@ ENDED = frozenset({StepState.SUCCEEDED, StepState.FAILED, StepState.CANCELLED, S
 
 @dataclass(frozen=True)
 class RunRequest:
-    """A run as a client asks for it."""
+    """A client's request for a campaign run."""
 
     campaign: str
     unit: str
@@ -36,39 +36,39 @@ class RunRequest:
     """Base of the steps' seeds on a simulated bench; None: by the campaign's rule."""
     labels: dict[str, str] = field(default_factory=dict[str, str])
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict[str, dict[str, Any]])
-    """Step -> parameters of its procedure that are other than the campaign's."""
+    """Step -> parameters of its procedure that override the campaign's."""
 
 
 @dataclass(frozen=True)
 class StepRun:
-    """One step of a run."""
+    """The progress of one step of a run."""
 
     name: str
     does: str
-    """Its procedure or method."""
+    """Name of its procedure or method."""
     state: StepState = StepState.QUEUED
     attempt: int = 0
-    """0 before the first."""
+    """Number of the present attempt; 0 before the first."""
     decided: bool = False
     """The present attempt is decided on, so its job may be there even where `job_id` does not know it yet."""
     job_id: str | None = None
     result_id: str | None = None
     earlier_jobs: tuple[str, ...] = ()
-    """Of attempts that ended in error."""
+    """Jobs of attempts that ended in error."""
     seed: int | None = None
     verdict: Verdict | None = None
     checks: tuple[Check, ...] = ()
-    """The procedure's own, then the campaign's limits, then its trends."""
+    """The procedure's own checks, then the campaign's limits, then its trends."""
     warnings: tuple[str, ...] = ()
     reason: str = ""
-    """Why it failed, was cancelled or skipped."""
+    """The reason why it failed, was cancelled or skipped."""
     started_at: datetime | None = None
     finished_at: datetime | None = None
 
 
 @dataclass(frozen=True)
 class CampaignRun:
-    """One execution, with the campaign as it was when it was asked for."""
+    """One execution, with the campaign as it was at the time of the request."""
 
     id: str
     campaign: Campaign
@@ -78,23 +78,23 @@ class CampaignRun:
     created_at: datetime
     steps: tuple[StepRun, ...]
     revision: int = 1
-    """Counts its changes: who saves says which one was read."""
+    """Number of its changes; a save names the revision that was read."""
     simulated: bool = False
     seed: int | None = None
     labels: dict[str, str] = field(default_factory=dict[str, str])
     verdict: Verdict | None = None
     cancel_requested: bool = False
     waiting: str = ""
-    """What it waits for, where that is not its own job's work."""
+    """The reason for waiting, other than its own job's work."""
     reason: str = ""
-    """Why it ended as it did, where no step says it."""
+    """The reason for its end, where no step gives it."""
     warnings: tuple[str, ...] = ()
-    """What was known before it began: steps left out, limits out of reach."""
+    """Warnings known before it began: steps left out, limits out of reach."""
     duration_s: float = 0.0
-    """Predicted bench time."""
+    """Predicted bench time [s]."""
     schedule_id: str | None = None
     planned_at: datetime | None = None
-    """Of a scheduled run: when it should have begun."""
+    """Planned start of a scheduled run."""
     started_at: datetime | None = None
     finished_at: datetime | None = None
 
@@ -104,22 +104,22 @@ class CampaignRun:
 
     @property
     def deadline_at(self) -> datetime | None:
-        """When its window closes; None before it began."""
+        """Time when its window closes; None before it began."""
         window = self.campaign.window_h
         return None if window is None or self.started_at is None else self.started_at + timedelta(hours=window)
 
     @property
     def current(self) -> int | None:
-        """Index of the step that is to be worked on; None where all have ended."""
+        """Index of the first step that has not ended; None where all have."""
         return next((i for i, step in enumerate(self.steps) if step.state not in ENDED), None)
 
     def step_of(self, index: int) -> Step:
-        """What the campaign says of a step."""
+        """The campaign's definition of a step."""
         return self.campaign.steps[index]
 
 
 def verdict_of(run: CampaignRun) -> Verdict:
-    """Error where a step gave none or nothing was judged, fail where one failed, else pass."""
+    """The run's verdict: error where a step gave none or nothing was judged, fail where one failed, else pass."""
     verdicts = [step.verdict for step in run.steps if step.state is not StepState.SKIPPED]
     if not verdicts or any(v is None or v is Verdict.ERROR for v in verdicts):
         return Verdict.ERROR

@@ -1,4 +1,4 @@
-"""What the log says of campaign runs: what became of each step and of the run, and what a run waits for."""
+"""Log lines of campaign runs: the outcome of each step and of the run, and the reasons for waiting."""
 
 import logging
 
@@ -8,7 +8,7 @@ log = logging.getLogger(__name__)
 
 
 def tell(before: CampaignRun, after: CampaignRun) -> None:
-    """A line for each thing that changed; what went wrong is a warning."""
+    """Write a line for each change; a failure is a warning."""
     for old, new in zip(before.steps, after.steps, strict=True):
         _tell_step(old, new)
     if after.waiting and after.waiting != before.waiting:

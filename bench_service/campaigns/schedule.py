@@ -1,4 +1,4 @@
-"""When a campaign starts by itself: a cron expression in a time zone, and the rules for starts that were missed.
+"""Schedules of campaigns: a cron expression in a time zone, and the rules for missed starts.
 
 Where clocks are set forward, a start in the hour that is left out is made up at its end; a day that a zone leaves out
 has none. Where clocks are set back, a start at a fixed hour happens once, in the first of the two hours, and one of
@@ -14,22 +14,22 @@ from zoneinfo import ZoneInfo
 from procedures.core.errors import BadParameter
 
 FIELDS = 5
-"""Minute, hour, day of month, month, day of week."""
+"""Number of fields: minute, hour, day of month, month, day of week."""
 LOOK_BACK = timedelta(days=2)
-"""Of many missed starts the latest counts: it is looked for so far back first."""
+"""Time back over which the latest missed start is searched first: of many missed starts the latest counts."""
 
 
 class Missed(StrEnum):
-    """What becomes of a start that could not happen in time, because nothing was running to see it."""
+    """The rule for a start that was missed because no service was running."""
 
     RUN_ONCE = "run_once"
-    """One run makes up for all that were missed."""
+    """One run makes up for all missed starts."""
     SKIP = "skip"
-    """The next one is waited for."""
+    """The schedule waits for its next start."""
 
 
 class Overlap(StrEnum):
-    """What becomes of a start while the schedule's previous run is open."""
+    """The rule for a start while the schedule's previous run is open."""
 
     SKIP = "skip"
     QUEUE = "queue"
@@ -38,12 +38,12 @@ class Overlap(StrEnum):
 
 @dataclass(frozen=True)
 class Schedule:
-    """A campaign on a unit, again and again."""
+    """A campaign that is run on a unit repeatedly."""
 
     id: str
     cron: str
     time_zone: str
-    """IANA name, such as Europe/Kyiv."""
+    """IANA name of the time zone, such as Europe/Kyiv."""
     campaign: str
     unit: str
     created_at: datetime
@@ -51,20 +51,20 @@ class Schedule:
     enabled: bool = True
     missed: Missed = Missed.RUN_ONCE
     start_within_s: float = 300.0
-    """A start that is later than this was missed."""
+    """Delay beyond which a start counts as missed [s]."""
     overlap: Overlap = Overlap.SKIP
     labels: dict[str, str] = field(default_factory=dict[str, str])
     next_at: datetime | None = None
-    """UTC; None while disabled."""
+    """Next planned start (UTC); None while disabled."""
     last_at: datetime | None = None
-    """The last planned time that was seen, whatever became of it."""
+    """The last planned start that was handled, with whatever outcome."""
     last_run: str | None = None
     last_outcome: str = ""
-    """What became of it, in words."""
+    """Outcome of that start, as text."""
 
 
 def zone_of(name: str) -> ZoneInfo:
-    """Raises `BadParameter` for a name that is no time zone."""
+    """Return the time zone of a name. Raises `BadParameter` for a name that is no time zone."""
     try:
         return ZoneInfo(name)
     except (KeyError, ValueError, OSError):  # OSError: the name of a folder of zones
@@ -72,7 +72,7 @@ def zone_of(name: str) -> ZoneInfo:
 
 
 def starts_after(cron: str, time_zone: str, moment: datetime) -> Iterator[datetime]:
-    """Every start after a moment, in UTC. Raises `BadParameter` for an expression or a zone that is none."""
+    """Every start after a moment, in UTC. Raises `BadParameter` for an invalid expression or zone."""
     from cronsim import CronSim, CronSimError
 
     zone = zone_of(time_zone)
@@ -88,7 +88,7 @@ def starts_after(cron: str, time_zone: str, moment: datetime) -> Iterator[dateti
 
 
 def _at_fixed_times(cron: str) -> bool:
-    """Whether an expression means times on the wall clock, not every so many minutes or hours."""
+    """Tell if an expression means times on the wall clock, not every so many minutes or hours."""
     return not any(part.startswith("*") for part in cron.split()[:2])
 
 
@@ -111,7 +111,7 @@ def _exists(local: datetime, zone: ZoneInfo) -> bool:
 
 
 def _rising(moments: Iterator[datetime | None], after: datetime) -> Iterator[datetime]:
-    """Those later than a moment and than each other: the second of two equal hours repeats nothing."""
+    """The moments that are later than `after` and than each other: the second of two equal hours repeats nothing."""
     for moment in moments:
         if moment is not None and moment > after:
             after = moment

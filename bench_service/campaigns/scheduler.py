@@ -1,8 +1,8 @@
-"""Schedules: what may be asked of them, and the starts that are due.
+"""Schedules: the verbs for clients, and the starts that are due.
 
 At most one run starts however many starts were due, for the latest of them. It is on time until `start_within_s` after
-it was planned; later than that it was missed, and the schedule says whether one run makes up for it. While the
-schedule's previous run is open, it says whether the new one waits or is left out. The next start moves on in the
+it was planned; later than that it was missed, and the schedule's rule decides if one run makes up for it. While the
+schedule's previous run is open, its rule decides if the new one waits or is left out. The next start moves on in the
 transaction that stores the run, so of several processes one starts it. A clock that is set back repeats nothing: a
 start that was seen is in the schedule's past.
 """
@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class ScheduleRequest:
-    """A schedule as a client asks for it."""
+    """A client's request for a schedule."""
 
     cron: str
     time_zone: str
@@ -57,7 +57,7 @@ class Scheduler:
         self._prepared = prepared
 
     def add(self, request: ScheduleRequest, key: str | None = None) -> Schedule:
-        """Raises `BadParameter` for a time that never comes, and what the run itself would be refused for.
+        """Add a schedule. Raises `BadParameter` for a time that never comes, and the errors of preparing its run.
 
         A key of a schedule that was removed since is used up: `IdempotencyConflict`.
         """
@@ -97,19 +97,19 @@ class Scheduler:
                 return changed
 
     def get(self, schedule_id: str) -> Schedule:
-        """Raises `NotFound`."""
+        """Return one schedule. Raises `NotFound`."""
         return self._stores.campaigns.schedule(schedule_id)
 
     def list(self, after: str | None = None, limit: int = 50) -> Page[Schedule]:
-        """Newest first."""
+        """List schedules, newest first."""
         return self._stores.campaigns.schedules(after, limit)
 
     def remove(self, schedule_id: str) -> None:
-        """Its runs stay. Raises `NotFound`."""
+        """Remove a schedule; its runs stay. Raises `NotFound`."""
         self._stores.campaigns.remove_schedule(schedule_id)
 
     def fire_due(self) -> None:
-        """Start what is due now. One schedule that cannot be read does not keep the others from starting."""
+        """Start all due schedules. One that cannot be read does not keep the others from starting."""
         at = now()
         for schedule in self._stores.campaigns.due_schedules(at):
             try:
@@ -118,7 +118,7 @@ class Scheduler:
                 log.error("schedule %s cannot be kept: %s", schedule.id, error)
 
     def fire(self, schedule: Schedule, at: datetime) -> bool:
-        """Do what a due schedule's rules say; False where another process was faster. Raises `StorageFailure`."""
+        """Apply a due schedule's rules; False where another process was faster. Raises `StorageFailure`."""
         planned = latest_due(schedule, at)
         run, outcome = self._started(schedule, planned, at)
         changed = replace(
@@ -132,7 +132,7 @@ class Scheduler:
         return self._stores.campaigns.save_schedule(changed, schedule.next_at, run)
 
     def _started(self, schedule: Schedule, planned: datetime, at: datetime) -> tuple[CampaignRun | None, str]:
-        """The run that begins, if one does, and what became of the start in words."""
+        """The run that begins, if any, and the outcome of the start as text."""
         missed = at - planned > timedelta(seconds=schedule.start_within_s)
         late = f"missed by {at - planned}" if missed else ""
         if missed and schedule.missed is Missed.SKIP:

@@ -1,4 +1,4 @@
-"""What can be asked about campaigns. Every verb is complete when it returns."""
+"""Campaigns, runs, schedules and trends for clients. Every verb is complete when it returns."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -49,11 +49,11 @@ class CampaignService:
         return Examiner(self._planner)
 
     def campaign(self, name: str) -> Campaign:
-        """A stored or a shipped one. Raises `NotFound`."""
+        """Return a stored or a shipped campaign. Raises `NotFound`."""
         return shipped()[name] if name in shipped() else self._stores.campaigns.get(name)
 
     def campaigns(self, after: str | None = None, limit: int = 50) -> Page[Campaign]:
-        """By name."""
+        """List stored and shipped campaigns by name."""
         found = {c.name: c for c in self._stores.campaigns.list(after, limit + 1)}
         found |= {name: c for name, c in shipped().items() if after is None or name > after}
         names = sorted(found)
@@ -80,7 +80,7 @@ class CampaignService:
         return campaign
 
     def examine(self, campaign: Campaign, unit: str | None = None, bench: str | None = None) -> Examination:
-        """What it would do on a unit, or on the first that is mounted on some bench; see `Examiner.examine`."""
+        """Examine a campaign on a unit, or on the first that is mounted on some bench; see `Examiner.examine`."""
         if unit is not None:
             return self._examiner.examine(campaign, unit, bench, strict=True)
         at = self._planner.benches.one() if bench is None else bench
@@ -88,7 +88,7 @@ class CampaignService:
         return self._examiner.examine(campaign, first, at, strict=False)
 
     def start(self, request: RunRequest, key: str | None = None) -> CampaignRun:
-        """Queue a run. Raises `NotFound`, `NotMounted`, `BadParameter`, `IdempotencyConflict`; then nothing moves."""
+        """Queue a campaign run. Raises `NotFound`, `NotMounted`, `BadParameter`, `IdempotencyConflict`."""
         idempotency = None if key is None else Idempotency(f"campaign_runs:{key}", fingerprint(request))
         known = self._stores.keys.made(idempotency, "campaign_run")
         if known is not None:
@@ -129,7 +129,7 @@ class CampaignService:
         )
 
     def cancel_run(self, run_id: str) -> CampaignRun:
-        """End a run: its job as soon as the bench is safe, the steps that did not begin not at all.
+        """End a run: its job as soon as the bench is safe; steps that did not begin are skipped.
 
         Raises `NotFound`, `IllegalTransition` where it has ended.
         """
@@ -146,7 +146,7 @@ class CampaignService:
     def trend(
         self, unit: str, procedure: str, name: str, simulated: bool | None, last: int, same_parameters: bool = False
     ) -> Trend:
-        """A quantity over the unit's results by a procedure, of the newest one's parameters alone where that is wanted.
+        """The trend of a quantity over a unit's results by a procedure, if wanted of the newest one's parameters alone.
 
         Raises `NotFound`.
         """
@@ -159,12 +159,12 @@ class CampaignService:
         found = self._stores.results.values(unit, procedure, name, simulated=simulated, limit=last, parameters=plan)
         trend = trend_of(found[::-1], unit, procedure, name)
         if newest is not None and not trend.points:
-            quantity(newest.document, name)  # raises: it names what there is
+            quantity(newest.document, name)  # raises: it names the known quantities
         return trend
 
 
 def overridden(campaign: Campaign, parameters: Mapping[str, Mapping[str, Any]]) -> Campaign:
-    """The campaign with other parameters for some steps. Raises `BadParameter` for a step that is none."""
+    """The campaign with other parameters for some steps. Raises `BadParameter` for an unknown step."""
     steps = list(campaign.steps)
     for name, changed in parameters.items():
         try:
@@ -177,7 +177,7 @@ def overridden(campaign: Campaign, parameters: Mapping[str, Mapping[str, Any]]) 
 
 
 def _as_asked(error: BadParameter, campaign: Campaign, changed: Mapping[str, Mapping[str, Any]]) -> BadParameter:
-    """The refusal of a parameter under the name by which it was asked for: with the run, or in the campaign."""
+    """Rename a parameter's refusal to the place where the client gave it: with the run, or in the campaign."""
     for index, step in enumerate(campaign.steps):
         inner = error.field.removeprefix(f"steps.{index}.parameters.")
         if inner != error.field and inner.split(".")[0] in changed.get(step.name, {}):

@@ -11,6 +11,6 @@ FOLDER = Path(__file__).parent
 
 @cache
 def shipped() -> Mapping[str, Campaign]:
-    """By name."""
+    """The shipped campaigns by name."""
     found = (Campaign.model_validate_json(file.read_bytes()) for file in sorted(FOLDER.glob("*.json")))
     return {campaign.name: campaign for campaign in found}

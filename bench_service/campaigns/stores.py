@@ -15,22 +15,22 @@ from bench_service.model.records import Idempotency, Page
 
 
 class CampaignStore(Protocol):
-    """Campaigns, runs, schedules."""
+    """The stored campaigns, runs and schedules."""
 
     def add(self, campaign: Campaign, at: datetime, idempotency: Idempotency | None = None) -> Campaign:
         """Store a new campaign. Raises `NameTaken`, `IdempotencyConflict`."""
         ...
 
     def replace(self, campaign: Campaign, at: datetime) -> None:
-        """Change a campaign; runs keep the one that they began with. Raises `NotFound`."""
+        """Change a campaign; runs keep the version that they began with. Raises `NotFound`."""
         ...
 
     def get(self, name: str) -> Campaign:
-        """Raises `NotFound`."""
+        """Return one campaign. Raises `NotFound`."""
         ...
 
     def list(self, after: str | None = None, limit: int = 50) -> tuple[Campaign, ...]:
-        """Campaigns by name, from behind a name on."""
+        """List campaigns by name, beginning after a given name."""
         ...
 
     def add_run(self, run: CampaignRun, idempotency: Idempotency | None = None) -> CampaignRun:
@@ -38,11 +38,11 @@ class CampaignStore(Protocol):
         ...
 
     def run(self, run_id: str) -> CampaignRun:
-        """Raises `NotFound`."""
+        """Return one campaign run. Raises `NotFound`."""
         ...
 
     def save_run(self, run: CampaignRun, revision: int) -> bool:
-        """Replace a run, unless it was changed since that revision was read. Whether it was replaced."""
+        """Replace a run, unless it was changed since that revision was read; True where it was replaced."""
         ...
 
     def runs(
@@ -56,7 +56,7 @@ class CampaignStore(Protocol):
     ) -> Page[CampaignRun]: ...
 
     def counts(self) -> dict[tuple[str, str, str], int]:
-        """How many runs there are, by campaign, state and verdict ("" where there is none)."""
+        """Number of runs by campaign, state and verdict ("" where there is none)."""
         ...
 
     def open_runs(self) -> tuple[CampaignRun, ...]:
@@ -68,11 +68,11 @@ class CampaignStore(Protocol):
         ...
 
     def add_schedule(self, schedule: Schedule, idempotency: Idempotency | None = None) -> Schedule:
-        """Raises `IdempotencyConflict`."""
+        """Add a schedule. Raises `IdempotencyConflict`."""
         ...
 
     def schedule(self, schedule_id: str) -> Schedule:
-        """Raises `NotFound`."""
+        """Return one schedule. Raises `NotFound`."""
         ...
 
     def schedules(self, after: str | None = None, limit: int = 50) -> Page[Schedule]: ...
@@ -84,17 +84,18 @@ class CampaignStore(Protocol):
     def save_schedule(self, schedule: Schedule, expected_next_at: datetime | None, run: CampaignRun | None) -> bool:
         """Replace a schedule and add the run that it starts, in one transaction.
 
-        False, and nothing changed, where its next start is another than expected, or it is gone: somebody was faster.
+        False, and nothing changed, where its next start is not the expected one, or it is gone: another process was
+        faster.
         """
         ...
 
     def remove_schedule(self, schedule_id: str) -> None:
-        """Its runs stay. Raises `NotFound`."""
+        """Remove a schedule; its runs stay. Raises `NotFound`."""
         ...
 
 
 @dataclass(frozen=True)
 class Stores(JobStores):
-    """All memory of one service."""
+    """All stores of one service."""
 
     campaigns: CampaignStore

@@ -1,6 +1,6 @@
-"""How a run changes, as values: nothing here reads a clock, a store or a bench.
+"""State changes of a run, as values: nothing here reads a clock, a store or a bench.
 
-Each function gives the run as it then is, one revision on.
+Each function returns the changed run, one revision on.
 """
 
 from dataclasses import replace
@@ -13,11 +13,11 @@ from bench_service.model.job import JobState
 from procedures.core.limits import Verdict
 
 RETRY_SEED = 1000
-"""A retry on a simulated bench is another launch: its seed is so much further on."""
+"""Seed increment of a retry: on a simulated bench a retry is another launch."""
 
 
 def not_begun(run_id: str, request: RunRequest, campaign: Campaign, bench: str, why: str, at: datetime) -> CampaignRun:
-    """A run that could not begin, so that a night without one is seen: failed, with the reason."""
+    """A run that could not begin, kept so that the missing night is seen: failed, with the reason."""
     steps = tuple(StepRun(s.name, s.does, StepState.SKIPPED, reason="the run could not begin") for s in campaign.steps)
     return CampaignRun(
         id=run_id,
@@ -35,17 +35,17 @@ def not_begun(run_id: str, request: RunRequest, campaign: Campaign, bench: str, 
 
 
 def begun(run: CampaignRun, at: datetime) -> CampaignRun:
-    """The run's turn has come."""
+    """The run once its turn has come: it is running."""
     return _next(run, state=JobState.RUNNING, started_at=at, waiting="")
 
 
 def waiting(run: CampaignRun, why: str) -> CampaignRun | None:
-    """The run with what it waits for; None where that is known already."""
+    """The run with its reason for waiting; None where that is known already."""
     return None if run.waiting == why else _next(run, waiting=why)
 
 
 def attempted(run: CampaignRun, index: int, at: datetime) -> CampaignRun:
-    """A step's next attempt is decided; its job is asked for next, under a key that only this attempt has."""
+    """The run with its step's next attempt decided; the job is submitted next, under a key of this attempt alone."""
     step = run.steps[index]
     attempt = step.attempt + 1
     seeded = run.seed is not None and run.step_of(index).procedure is not None
@@ -55,12 +55,12 @@ def attempted(run: CampaignRun, index: int, at: datetime) -> CampaignRun:
 
 
 def submitted(run: CampaignRun, index: int, job_id: str) -> CampaignRun:
-    """The job of a step's attempt is there."""
+    """The run with its step's job submitted."""
     return _next(_with(run, index, replace(run.steps[index], job_id=job_id)), waiting="")
 
 
 def observed(run: CampaignRun, index: int, state: StepState, why: str) -> CampaignRun | None:
-    """A step's job is in a state, and the run with it; None where nothing is new."""
+    """The run with its step's job in a state; None where nothing has changed."""
     step = run.steps[index]
     of_run = JobState.PAUSED if state is StepState.PAUSED else JobState.RUNNING
     if (step.state, run.state, run.waiting) == (state, of_run, why):
@@ -69,7 +69,7 @@ def observed(run: CampaignRun, index: int, state: StepState, why: str) -> Campai
 
 
 def judged(run: CampaignRun, index: int, judgement: Judgement, result_id: str, at: datetime) -> CampaignRun:
-    """A step has its verdict; the stop rules say whether the next one begins."""
+    """The run with a step judged; the stop rules decide if the next one begins."""
     step = run.steps[index]
     state = StepState.FAILED if judgement.verdict is Verdict.ERROR else StepState.SUCCEEDED
     ended = replace(
@@ -88,9 +88,9 @@ def judged(run: CampaignRun, index: int, judgement: Judgement, result_id: str, a
 def failed(
     run: CampaignRun, index: int, state: StepState, reason: str, at: datetime, final: bool = False
 ) -> CampaignRun:
-    """A step's attempt gave no verdict: it is tried again where that is allowed, unless it is `final`.
+    """The run after an attempt without a verdict: it is retried where that is allowed, unless it is `final`.
 
-    That is a refusal that would be the same again, and a person's will. Else the step has ended in error.
+    Final are a refusal that would recur, and a person's decision. Without a retry the step has ended in error.
     """
     step = run.steps[index]
     if step.attempt <= run.step_of(index).retries and not run.cancel_requested and not final:
@@ -108,19 +108,19 @@ def failed(
 
 
 def cancelled(run: CampaignRun, at: datetime) -> CampaignRun:
-    """The run ends because somebody asked for it; its steps that did not end are skipped."""
+    """The run ended by a client's request; its steps that did not end are skipped."""
     skipped = _skipped(run, "the run was cancelled")
     return _next(skipped, state=JobState.CANCELLED, finished_at=at, waiting="", reason="cancelled")
 
 
 def out_of_time(run: CampaignRun, at: datetime) -> CampaignRun:
-    """The run's window has closed: what has not ended is skipped, and the verdict is error."""
+    """The run ended because its window has closed: unfinished steps are skipped, and the verdict is error."""
     why = f"the window of {run.campaign.window_h:g} h has closed"
     return ended(_skipped(run, why), at, why)
 
 
 def ended(run: CampaignRun, at: datetime, reason: str = "") -> CampaignRun:
-    """All steps have ended, or the run was stopped for a reason that alone makes it an error."""
+    """The run with all steps ended, or stopped for a reason that alone makes it an error."""
     verdict = Verdict.ERROR if reason else verdict_of(run)
     if verdict is Verdict.ERROR and not reason:
         without = [s.name for s in run.steps if s.verdict in (None, Verdict.ERROR) and s.state is not StepState.SKIPPED]
@@ -150,7 +150,7 @@ def _after(run: CampaignRun, index: int, at: datetime) -> CampaignRun:
 
 
 def _skipped(run: CampaignRun, why: str) -> CampaignRun:
-    """The run with every step that has not ended marked as skipped; one that began says so."""
+    """The run with every unfinished step marked as skipped, or as cancelled where it had a job."""
     steps = tuple(
         s if s.state in ENDED else replace(s, state=StepState.CANCELLED if s.job_id else StepState.SKIPPED, reason=why)
         for s in run.steps

@@ -1,1 +1,1 @@
-"""Evidence: recordings, and the results, calibrations and corrections that analyses make of them. Needs no bench."""
+"""Evidence without a bench: recordings, and the results, calibrations and corrections that analyses make of them."""

@@ -24,7 +24,7 @@ from procedures.procedure import DatedCalibration, Evidence
 
 @dataclass(frozen=True)
 class AnalysisRequest:
-    """A method and what it is to work on."""
+    """A method and its inputs."""
 
     method: str
     recordings: tuple[str, ...] = ()
@@ -43,8 +43,9 @@ class AnalysisService:
         code_version: str,
         processes: WorkProcesses | None = None,
     ) -> None:
-        """`read_job`: gives a job by its id, and raises `NotFound`. `processes`: where analyses are worked out; None:
-        here, in the caller's thread.
+        """Set up with `read_job`: gives a job by its id, and raises `NotFound`.
+
+        `processes`: where analyses are computed; None: here, in the caller's thread.
         """
         self._processes = processes
         self._stores = stores
@@ -108,7 +109,7 @@ class AnalysisService:
         return self._stores.results.add(stored, gives[0], False, idempotency, gives[1])
 
     def _complete(self, ids: Sequence[str]) -> tuple[Recording, ...]:
-        """Recordings by id. Raises `NotFound`, and `UnfitRecording` for one that was interrupted."""
+        """Recordings by their ids. Raises `NotFound`, and `UnfitRecording` for one that was interrupted."""
         for recording_id in ids:
             stored = self._stores.recordings.get(recording_id)
             if stored.state is not RecordingState.COMPLETE:
@@ -117,7 +118,7 @@ class AnalysisService:
 
 
 def _require_each_once(field: str, ids: Sequence[str]) -> None:
-    """The same evidence given twice would count as two. Raises `BadParameter`."""
+    """Refuse evidence that is given twice, which would count as two. Raises `BadParameter`."""
     for position, known in enumerate(ids):
         if known in ids[:position]:
             raise BadParameter(f"{field}.{position}", known, "each is given once")

@@ -27,28 +27,28 @@ class Catalogue:
 
     @cached_property
     def procedures(self) -> Mapping[str, AnyProcedure]:
-        """Every procedure by name."""
+        """Every procedure by name, read when it is first wanted."""
         return self._read("procedure", "procedures/catalog", catalog.find())
 
     @cached_property
     def methods(self) -> Mapping[str, AnyMethod]:
-        """Every method by name."""
+        """Every method by name, read when it is first wanted."""
         return self._read("method", "procedures/methods", methods.find())
 
     def procedure(self, name: str) -> AnyProcedure:
-        """Return a procedure. Raises `NotFound`, which says so where its file is broken."""
+        """Return a procedure by name. Raises `NotFound`, with the reason where its file is broken."""
         if name not in self.procedures:
             raise NotFound("procedure", name, self._left_out.get(("procedure", name), ""))
         return self.procedures[name]
 
     def method(self, name: str) -> AnyMethod:
-        """Return a method. Raises `NotFound`, which says so where its file is broken."""
+        """Return a method by name. Raises `NotFound`, with the reason where its file is broken."""
         if name not in self.methods:
             raise NotFound("method", name, self._left_out.get(("method", name), ""))
         return self.methods[name]
 
     def notes(self) -> tuple[str, ...]:
-        """A sentence for each file that was left out, of what has been read so far."""
+        """A sentence for each file that was left out so far."""
         return tuple(self._left_out.values())
 
     def report(self, result: StoredResult) -> Report:

@@ -1,4 +1,4 @@
-"""PORT of memory: the correction sets of units. Stored with the result that gives them (`store.ResultStore.add`)."""
+"""PORT of memory for the correction sets of units, stored with the result that gives them (`store.ResultStore.add`)."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -22,7 +22,7 @@ class StoredCorrection:
 
 
 class CorrectionStore(Protocol):
-    """History and choice. Every method is one transaction."""
+    """History and choice of correction sets. Every method is one transaction."""
 
     def list(
         self, unit: str, *, kind: CorrectionKind | None = None, after: str | None = None, limit: int = 50
@@ -31,7 +31,7 @@ class CorrectionStore(Protocol):
         ...
 
     def get(self, unit: str, correction_id: str) -> StoredCorrection:
-        """Raises `NotFound`, also for a correction of another unit."""
+        """Return one correction. Raises `NotFound`, also for a correction of another unit."""
         ...
 
     def current(self, unit: str, kind: CorrectionKind) -> StoredCorrection | None: ...
@@ -41,7 +41,7 @@ class CorrectionStore(Protocol):
         ...
 
     def make_current(self, unit: str, correction_id: str, idempotency: Idempotency | None = None) -> StoredCorrection:
-        """Choose the correction that new jobs use; the one of its kind that was current no longer is.
+        """Choose the correction that new jobs use; it supersedes the current one of its kind.
 
         A known key with the same fingerprint changes nothing. Raises `NotFound`, `IdempotencyConflict`.
         """

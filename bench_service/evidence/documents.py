@@ -1,4 +1,4 @@
-"""What an analysis gives, as JSON that can be stored; a value that cannot be is refused here, by its field."""
+"""Results of analyses as JSON that can be stored; a value that cannot be stored is refused here, by its field."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -20,13 +20,13 @@ def document_of(outcome: Outcome) -> dict[str, Any]:
 
 
 def require_storable(calibrations: Sequence[TriadCalibration], corrections: Sequence[UnitCorrection]) -> None:
-    """Raises `UnfitResult` for a calibration or correction with a value that cannot be stored, by its field."""
+    """Check calibrations and corrections. Raises `UnfitResult` for a value that cannot be stored, by its field."""
     given = {"calibrations": calibrations, "corrections": corrections}
     require_fit(to_jsonable_python(given, inf_nan_mode="constants"), "a calibration or correction")
 
 
 def require_fit(document: dict[str, Any], what: str) -> None:
-    """Raises `UnfitResult` naming the first value of a document that JSON and the databases cannot hold."""
+    """Check a document. Raises `UnfitResult` naming the first value that JSON and the databases cannot hold."""
     fault = next(faults(document), None)
     if fault is None:
         return

@@ -1,4 +1,4 @@
-"""Imports: recorded files that come in as recordings of a unit."""
+"""Import of recorded files as recordings of a unit."""
 
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
@@ -47,7 +47,7 @@ class ImportService:
 
     @contextmanager
     def _reading(self, files: Sequence[ImportFile], description: ImportDescription) -> Generator[Imported]:
-        """Files that are read in a process of their own."""
+        """Read the files in a process of their own."""
         try:
             with self._reader.reading(files, description) as imported:
                 yield imported

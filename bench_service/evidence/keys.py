@@ -1,4 +1,4 @@
-"""PORT of memory: idempotency keys of clients, with the object that each key made."""
+"""PORT of memory for clients' idempotency keys, with the object that each key made."""
 
 from typing import Protocol
 
@@ -6,12 +6,13 @@ from bench_service.model.records import Idempotency
 
 
 class KeyStore(Protocol):
-    """What clients' keys made."""
+    """The objects that clients' idempotency keys made."""
 
     def made(self, idempotency: Idempotency | None, kind: str) -> str | None:
         """Id of the "job", "recording", "result", "campaign", "campaign_run" or "schedule" that a key made.
 
-        None for a key that is new, and without one. Asked before anything is examined: what was made stays made, also
-        where the same request would be refused now. Raises `IdempotencyConflict` for a key of another request.
+        None for a key that is new, and without one. Called before a request is examined: an object once made is
+        returned, also where the same request would be refused now. Raises `IdempotencyConflict` for a key of another
+        request.
         """
         ...

@@ -1,4 +1,4 @@
-"""PORT of memory: recordings, raw samples and all, while they are made and afterwards.
+"""PORT of memory for recordings and their raw samples, while they are made and afterwards.
 
 Every method is one transaction: it commits, or it raises and nothing of it remains.
 """
@@ -22,22 +22,24 @@ class RecordingWriter(Protocol):
         ...
 
     def seal(self, checkpoint: dict[str, Any] | None = None) -> RecordingInfo:
-        """Write the rest, the count and the content hash; with the world's checkpoint. Raises `StorageFull`."""
+        """Write the rest, the count and the content hash, with the world's checkpoint. Raises `StorageFull`."""
         ...
 
     def abandon(self) -> None:
-        """End without sealing; never raises. Whole chunks of a job's recording are kept as interrupted; an import, or
-        a recording without a committed chunk, leaves nothing."""
+        """End without sealing; never raises. Whole chunks of a job's recording are kept as interrupted.
+
+        An import, or a recording without a committed chunk, leaves nothing.
+        """
         ...
 
 
 class RecordingStore(Protocol):
-    """Raw samples."""
+    """The stored recordings and their samples."""
 
     def open(self, new: NewRecording) -> RecordingWriter: ...
 
     def get(self, recording_id: str) -> StoredRecording:
-        """Raises `NotFound`."""
+        """Return one recording's row. Raises `NotFound`."""
         ...
 
     def list(
@@ -59,13 +61,13 @@ class RecordingStore(Protocol):
         ...
 
     def checkpoint(self, job_id: str) -> dict[str, Any] | None:
-        """What the world was after the job's last complete recording."""
+        """State of the simulated world after the job's last complete recording."""
         ...
 
     def discard_open_imports(self, before: datetime) -> int:
-        """After a crash: remove imports that were begun before a moment and never sealed. How many there were."""
+        """Remove orphaned imports, begun before a moment and never sealed. Returns their number."""
         ...
 
     def interrupt_open(self, job_id: str) -> int:
-        """After a crash: close the job's open recordings (see `RecordingWriter.abandon`). How many there were."""
+        """Close a job's open recordings after a crash (see `RecordingWriter.abandon`). Returns their number."""
         ...

@@ -1,4 +1,4 @@
-"""PORT of memory: results, the calibrations and corrections that come with them, and lineage.
+"""PORT of memory for results, the calibrations and corrections that come with them, and lineage.
 
 Every method is one transaction, as in `store`.
 """
@@ -12,7 +12,7 @@ from procedures.core.unit_correction import UnitCorrection
 
 
 class ResultStore(Protocol):
-    """What analyses said."""
+    """The stored results of analyses."""
 
     def add(
         self,
@@ -30,7 +30,7 @@ class ResultStore(Protocol):
         ...
 
     def get(self, result_id: str) -> StoredResult:
-        """Raises `NotFound`."""
+        """Return one result. Raises `NotFound`."""
         ...
 
     def list(
@@ -38,7 +38,7 @@ class ResultStore(Protocol):
     ) -> Page[StoredResult]: ...
 
     def newest_verdict(self, unit: str, procedure: str, *, simulated: bool) -> StoredResult | None:
-        """The newest of the procedure's results that gave a job of the unit its verdict; no second analysis."""
+        """The newest result of the procedure that gave a job of the unit its verdict; no second analysis."""
         ...
 
     def values(
@@ -52,7 +52,7 @@ class ResultStore(Protocol):
         before: str | None = None,
         parameters: dict[str, Any] | None = None,
     ) -> tuple[ResultValue, ...]:
-        """What the newest `limit` of such results say of a quantity, newest first.
+        """The values of a quantity in the newest `limit` results of this kind, newest first.
 
         Only results older than `before`, an id, and of a job with just these parameters, count, where these are given.
         """
@@ -71,5 +71,5 @@ class ResultStore(Protocol):
         ...
 
     def calibration(self, calibration_id: str) -> StoredCalibration:
-        """Raises `NotFound`."""
+        """Return one calibration. Raises `NotFound`."""
         ...

@@ -1,4 +1,4 @@
-"""How a quantity of a unit went over its results, and whether it is still what it was."""
+"""The trend of a quantity over a unit's results, judged on a control chart."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from procedures.analysis.control_chart import LEAST_POINTS, ControlLimits, Signa
 
 @dataclass(frozen=True)
 class TrendPoint:
-    """One result's value."""
+    """The value of one result."""
 
     result: str
     job: str | None
@@ -31,19 +31,19 @@ class Trend:
     procedure: str
     quantity: str
     unit: str
-    """Of the values; empty where the result does not say."""
+    """Unit of the values; empty where the result does not give it."""
     points: tuple[TrendPoint, ...]
     limits: ControlLimits | None
-    """None with fewer than two points."""
+    """The control limits; None with fewer than two points."""
     signals: tuple[Signal, ...]
     without: int
-    """Results of that procedure that lack the quantity."""
+    """Number of results of that procedure that lack the quantity."""
 
 
 def trend_of(values: Sequence[ResultValue], unit: str, procedure: str, name: str, judged: int = 0) -> Trend:
-    """A chart of results, oldest first; its limits rest on all points but the last `judged`.
+    """Make a chart of results, oldest first; its limits rest on all points but the last `judged`.
 
-    Points are of the newest one's unit: where another version of a procedure gave another, it began anew.
+    Points have the newest one's unit: where a version of the procedure changed the unit, the chart starts there.
     """
     found = [(value, value.quantity) for value in values if value.quantity is not None]
     unit_of = found[-1][1].unit if found else ""
@@ -56,7 +56,7 @@ def trend_of(values: Sequence[ResultValue], unit: str, procedure: str, name: str
 
 
 def value_of(result: StoredResult, name: str) -> ResultValue:
-    """A quantity of one result. Raises `NotFound`, naming what there is."""
+    """Take a quantity from one result. Raises `NotFound`, naming the known quantities."""
     found = quantity(result.document, name)
     about = {"result": result.id, "job": result.job_id, "at": result.created_at}
     return copied(ResultValue, result, **about, quantity=found)

@@ -1,4 +1,4 @@
-"""PORT of memory: units under test, as they are declared."""
+"""PORT of memory for units under test, as they are declared."""
 
 from typing import Protocol
 
@@ -10,18 +10,18 @@ class UnitStore(Protocol):
     """Units under test by serial: the declared record of each."""
 
     def put_unit(self, unit: Unit) -> None:
-        """Create or replace; calibrations and corrections of the record are not stored here: `ResultStore` has them."""
+        """Create or replace a unit. Its calibrations and corrections are not stored here: `ResultStore` has them."""
         ...
 
     def unit(self, serial: str) -> Unit:
-        """With its current calibration and corrections. Raises `NotFound`."""
+        """Return a unit with its current calibration and corrections. Raises `NotFound`."""
         ...
 
     def units(self) -> tuple[Unit, ...]: ...
 
 
 def register(units: UnitStore, unit: Unit) -> None:
-    """Remember a unit that is met for the first time."""
+    """Store a unit that is new; a known one stays as it is."""
     try:
         units.unit(unit.serial)
     except NotFound:

@@ -1,7 +1,7 @@
-"""Analyses and drawings in processes of their own, beside the one that drives a bench and answers a stop.
+"""Analyses and drawings in separate processes, so that the one that drives a bench and answers a stop stays free.
 
-A few processes at a low priority. What the work refuses is the same error here; work that is cut off, because its
-process died, may be asked for again.
+A few processes at a low priority. A refusal by the work is raised here as the same error; work that is cut off, because
+its process died, may be asked for again.
 """
 
 import contextlib
@@ -20,15 +20,15 @@ from bench_service.model.errors import Overloaded, ServiceError, StorageFailure
 from procedures.core.errors import DomainError
 
 AT_ONCE = 2
-"""Processes, and so pieces of work that are done at one time."""
+"""Number of processes, and so of pieces of work at one time."""
 NICENESS = 10
-"""By so much they give way to whoever drives a bench or answers."""
+"""Niceness of these processes: they give way to driving a bench and to answering requests."""
 
 WAITING = 16
-"""So many pieces of work may be done or wait at one time; each holds a thread of the service."""
+"""Maximum number of pieces of work under way or waiting; each holds a thread of the service."""
 
 Run = Callable[[str, tuple[Any, ...]], str]
-"""Does a piece of work by its name and arguments, and gives a text: the id of a stored result, or a drawing."""
+"""Runs a piece of work by its name and arguments, and returns a text: the id of a stored result, or a drawing."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,11 @@ class Refusal:
 
     @classmethod
     def of(cls, error: Exception) -> "Refusal":
-        """Everything that an error is made of."""
+        """Take an error apart into picklable fields."""
         return cls(type(error), error.args, dict(vars(error)))
 
     def error(self) -> Exception:
-        """The error that it was."""
+        """Rebuild the original error."""
         made = self.kind.__new__(self.kind)
         made.args = self.arguments
         vars(made).update(self.fields)
@@ -53,12 +53,12 @@ class Refusal:
 
 
 class WorkProcesses:
-    """Some processes of one service, begun with the first piece of work. For any thread."""
+    """Worker processes of one service, begun with the first piece of work. For any thread."""
 
     def __init__(
         self, open_run: Callable[..., Run], *arguments: Any, at_once: int = AT_ONCE, waiting: int = WAITING
     ) -> None:
-        """`open_run`: called with `arguments` in each new process, a function of a module that both can import."""
+        """Set up with `open_run`, called with `arguments` in each new process: an importable module's function."""
         self._at_once = at_once
         self._waiting = waiting
         self._open_run = open_run
@@ -68,8 +68,8 @@ class WorkProcesses:
         self._pool: ProcessPoolExecutor | None = None
 
     def result(self, name: str, *arguments: Any) -> str:
-        """Do a piece of work. Raises what the work raises, `StorageFailure` where it is cut off, and `Overloaded` where
-        too much is waited for already.
+        """Run a piece of work. Raises its errors, `StorageFailure` where it is cut off, and `Overloaded` where
+        too much work is waiting already.
         """
         if not self._places.acquire(blocking=False):
             raise Overloaded(f"{self._waiting} such requests are worked on or wait already: ask again later")
@@ -108,11 +108,11 @@ _run: list[Run] = []
 
 
 def _begin(open_run: Callable[..., Run], arguments: tuple[Any, ...]) -> None:
-    """In a new process: leave interrupts to the service, open what the work needs, then give way to others."""
+    """Set up a new process: leave interrupts to the service, open what the work needs, then lower the priority."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_the_service, name="end with the service", daemon=True).start()
     _run.append(open_run(*arguments))
-    with contextlib.suppress(OSError):  # only now: somebody waits for the first piece of work
+    with contextlib.suppress(OSError):  # only now: a client waits for the first piece of work
         os.nice(NICENESS)
 
 
@@ -126,7 +126,7 @@ def _work(name: str, arguments: tuple[Any, ...]) -> str | Refusal:
 
 
 def _end_with_the_service() -> None:
-    """A service that was killed ends nothing: its processes must notice."""
+    """End this process with the service: one that was killed does not end its processes itself."""
     service = multiprocessing.parent_process()
     if service is not None:
         service.join()

@@ -1,7 +1,7 @@
 """The dispatcher of a bench: claims the next eligible job of its queue, runs it, and recovers orphaned jobs.
 
-The queue is the service's own jobs table. A job is claimed in one transaction (it is running from then on, and no
-bench has two running jobs), and its durable workflow begins at once. Jobs orphaned by a crash are recovered whenever the
+The queue is the service's own jobs table. A job is claimed in one transaction (it is running from then on, and no bench
+has two running jobs), and its durable workflow begins at once. Jobs orphaned by a crash are recovered whenever the
 queue is looked at, so that no job stays running without a process that runs it:
 
 - claimed, and the process died before its workflow was written: back into its place in the queue;

@@ -1,1 +1,1 @@
-"""What the service records of itself: log context, traces, counts, audit trail."""
+"""Records of the service's own work: log context, traces, counts, audit trail."""

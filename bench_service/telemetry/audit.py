@@ -1,7 +1,7 @@
-"""Who asked what, and what became of it. Entries are added, and never changed or removed.
+"""The audit trail: requests, their authors and outcomes. Entries are added, and never changed or removed.
 
-An entry is written when the outcome is known and before it is told, so what was acknowledged is in the trail. Where it
-cannot be written (a full disk) the outcome is told all the same, and the entry goes to the log.
+An entry is written after the outcome is known and before the answer, so every acknowledged act is in the trail. Where
+it cannot be written (a full disk) the answer is sent all the same, and the entry goes to the log.
 """
 
 import logging
@@ -18,37 +18,37 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class AuditEntry:
-    """One act."""
+    """One act in the audit trail."""
 
     id: str
     at: datetime
     who: str
-    """As far as it is known: what the client said of itself, or where it asked from."""
+    """The name that the client gave, or the address from which it asked."""
     action: str
-    """Name of the operation, as the API's document has it: "submit", "stop"."""
+    """Name of the operation, as in the API's document: "submit", "stop"."""
     target: str
-    """Path of what it was done to, or of what it made."""
+    """Path of the object that the act changed or made."""
     outcome: str
-    """Of a request its status code; else a word."""
+    """Status code of a request; of any other act a keyword."""
     detail: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 class AuditTrail(Protocol):
-    """PORT of memory."""
+    """PORT of memory: the audit trail."""
 
     def add(self, entry: AuditEntry) -> None:
-        """Raises `StorageFull`, `StorageFailure`."""
+        """Add an entry. Raises `StorageFull`, `StorageFailure`."""
         ...
 
     def list(
         self, *, who: str | None = None, target: str | None = None, after: str | None = None, limit: int = 50
     ) -> Page[AuditEntry]:
-        """Newest first; `target` is a path or one of its parts, such as an id."""
+        """List entries, newest first; `target` is a path or one of its parts, such as an id."""
         ...
 
 
 def record(trail: AuditTrail, who: str, action: str, target: str, outcome: str, **detail: Any) -> None:
-    """Add an entry. Never raises for a database that fails: the act was done, whatever becomes of its record."""
+    """Add an entry. Never raises for a database that fails: the act was done, with or without its record."""
     entry = AuditEntry(new_id(), now(), who, action, target, outcome, detail)
     try:
         trail.add(entry)

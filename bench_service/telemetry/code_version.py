@@ -1,4 +1,4 @@
-"""Which code made a number: the version, and a digest of the sources that are really running."""
+"""Identity of the code that made a number: the version, and a digest of the sources that are running."""
 
 import hashlib
 from importlib.metadata import version
@@ -8,7 +8,7 @@ PACKAGES = ("bench_service", "procedures", "simulators")
 
 
 def code_version() -> str:
-    """For example ``0.1.0+3f9a0c1b2d4e``: the first twelve digits of SHA-256 over all Python sources, by path."""
+    """The running code's version, as ``0.1.0+3f9a0c1b2d4e``: 12 digits of SHA-256 over all Python sources, by path."""
     root = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
     for package in PACKAGES:

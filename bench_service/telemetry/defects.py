@@ -1,4 +1,4 @@
-"""An error that nobody foresaw, as a sentence that names the file and the line to look at."""
+"""Describes an unexpected error in a sentence that names the file and the line to look at."""
 
 import sys
 import traceback
@@ -6,7 +6,7 @@ from pathlib import Path
 
 PACKAGES = ("procedures", "simulators", "bench_service")
 CATALOGUES = ("procedures/catalog/", "procedures/methods/")
-"""Where a procedure's author works."""
+"""Folders in which a procedure's author works."""
 ROOT = Path(__file__).resolve().parents[2]
 
 

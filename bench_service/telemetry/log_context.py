@@ -1,4 +1,4 @@
-"""What a line of the log is about: bench, job, step, request. Set where it is known, read by whoever writes lines."""
+"""The subject of log lines: bench, job, step, request. Set where it is known, read when a line is written."""
 
 import logging
 from collections.abc import Generator
@@ -10,9 +10,9 @@ _ABOUT: ContextVar[dict[str, str] | None] = ContextVar("about", default=None)
 
 @contextmanager
 def about(**subjects: str | None) -> Generator[None]:
-    """Lines written inside are about these: `bench`, `job` and its `step`, `campaign` and `campaign_step`, `request`.
+    """Set the subjects of the lines logged inside: `bench`, `job`, its `step`, `campaign`, `campaign_step`, `request`.
 
-    None adds nothing.
+    A subject that is None adds nothing.
     """
     known = {name: value for name, value in subjects.items() if value is not None}
     token = _ABOUT.set({**(_ABOUT.get() or {}), **known})
@@ -23,20 +23,20 @@ def about(**subjects: str | None) -> Generator[None]:
 
 
 def subjects() -> dict[str, str]:
-    """What lines are about here and now."""
+    """The subjects of lines logged here and now."""
     return dict(_ABOUT.get() or {})
 
 
 def request_id() -> str:
-    """The request that is being answered, or nothing."""
+    """Id of the request that is being answered; empty where there is none."""
     return (_ABOUT.get() or {}).get("request", "")
 
 
 class AddSubjects(logging.Filter):
-    """Puts what a line is about into its record, as `subjects`; what the line says itself comes first."""
+    """Adds the subjects to a log record, as `subjects`; the line's own fields come first."""
 
     def __init__(self, **always: str) -> None:
-        """`always`: what every line of this process is about."""
+        """Set up with `always`: the subjects of every line of this process."""
         super().__init__()
         self._always = always
 

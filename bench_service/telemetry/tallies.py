@@ -1,4 +1,4 @@
-"""What a monitor counts of jobs: read from the database, because workers without HTTP make most of it.
+"""A monitor's counts of jobs, from the database, because workers without HTTP make most of them.
 
 Every API process gives the same numbers, also after a restart, so scrape one of them or take the maximum. A scrape
 reads only jobs that have ended since the one before: those of the last `OVERLAP` again, because a commit on another
@@ -18,14 +18,14 @@ from bench_service.wall_clock import monotonic_s, now
 OVERLAP = timedelta(seconds=60)
 PAGE = 5000
 RECORDINGS_S = 30.0
-"""How old the sum over all recordings may be [s]: it walks an index."""
+"""Maximum age of the sum over all recordings [s]: it walks an index."""
 DURATION_S = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5)
 """Upper ends of the buckets of durations and waits [s]; a last one has no end."""
 
 
 @dataclass(frozen=True)
 class Ending:
-    """A job that has ended."""
+    """A job that has ended, as a row of the tally."""
 
     id: str
     procedure: str
@@ -38,14 +38,14 @@ class Ending:
 
 
 class TallyStore(Protocol):
-    """PORT of memory: what is counted."""
+    """PORT of memory: the rows that are counted."""
 
     def endings(self, since: datetime | None, after: str, limit: int) -> tuple[Ending, ...]:
         """Jobs that ended at `since` with a greater id than `after`, or later; in that order."""
         ...
 
     def stations_of_open_jobs(self) -> int:
-        """Stations done of jobs that have not ended."""
+        """Number of stations done of jobs that have not ended."""
         ...
 
     def recorded_bytes(self) -> int:
@@ -53,19 +53,19 @@ class TallyStore(Protocol):
         ...
 
     def free_bytes(self) -> int | None:
-        """Room on the disk of the database's file; None where it is another machine's."""
+        """Free bytes on the disk of the database's file; None for a database of another machine."""
         ...
 
 
 @dataclass
 class Spread:
-    """How often something took how long."""
+    """A histogram of durations."""
 
     counts: list[int] = field(default_factory=lambda: [0] * (len(DURATION_S) + 1))
     sum_s: float = 0.0
 
     def add(self, seconds: float) -> None:
-        """One more."""
+        """Add one duration [s]."""
         self.counts[bisect_left(DURATION_S, seconds)] += 1
         self.sum_s += seconds
 
@@ -82,23 +82,23 @@ class Tallies:
         self._begin_anew()
 
     def _begin_anew(self) -> None:
-        """Nothing is counted yet."""
+        """Start with nothing counted."""
         self.finished: Counter[tuple[str, str, str]] = Counter()
-        """(procedure, state, verdict) -> jobs."""
+        """(procedure, state, verdict) -> number of jobs."""
         self.durations: dict[str, Spread] = {}
-        """Procedure -> from start to end."""
+        """Procedure -> durations from start to end."""
         self.waits = Spread()
-        """From submission to start."""
+        """Durations from submission to start."""
         self._ended_stations = 0
         self._recent: dict[tuple[str, datetime], None] = {}
         self._newest: datetime | None = None
 
     def update(self) -> None:
-        """Count what is new. Raises `StorageFailure`."""
+        """Count the jobs that ended since. Raises `StorageFailure`."""
         with self._lock:
             at = now()
             if self._newest is not None and at < self._newest - OVERLAP:
-                self._begin_anew()  # the clock was set back: what ends now seems to end before what is counted
+                self._begin_anew()  # the clock was set back: jobs that end now seem to end before those counted
             since, after = None if self._newest is None else self._newest - OVERLAP, ""
             while page := self.store.endings(since, after, PAGE):
                 for ending in page:

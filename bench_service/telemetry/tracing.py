@@ -1,4 +1,4 @@
-"""Traces of jobs: job → station → analysis, sent to an OpenTelemetry collector where one is configured.
+"""Traces of jobs (job → station → analysis), sent to an OpenTelemetry collector where one is configured.
 
 All spans of a job, whichever process makes them, belong to one trace whose id is the job's: a job that outlives its
 worker is still one trace. The span of the job itself is written at its end, under an id that its parts know beforehand.
@@ -16,31 +16,31 @@ from uuid import UUID
 from bench_service.model.job import Job
 
 TIMEOUT_S = 2.0
-"""How long a collector may take for an answer, also at the end of the service [s]."""
+"""Maximum time for a collector's answer, also at the end of the service [s]."""
 Found = dict[str, str | int | float | bool]
-"""What a span has come to know when it ends; "error" is a sentence."""
+"""Attributes that a span gets at its end; "error" is a sentence."""
 
 
 class Traces:
-    """No traces: what a service has unless a collector is configured."""
+    """Traces that go nowhere: a service's default unless a collector is configured."""
 
     @contextmanager
     def part(self, job_id: str, name: str, **known: str | int | float | bool) -> Generator[Found]:
-        """A part of a job, while it is done; put into the dictionary what is found."""
+        """Trace a part of a job while it runs; put its findings into the dictionary."""
         yield {}
 
     def ended(self, job: Job) -> None:
-        """A job has ended, or was put aside."""
+        """Write the span of a job that has ended, or was paused."""
 
     def instrument(self, app: Any) -> None:
-        """Every request to this application becomes a span."""
+        """Make every request to this application a span."""
 
     def close(self) -> None:
-        """Send what waits; at most `TIMEOUT_S`."""
+        """Send the waiting spans; takes at most `TIMEOUT_S`."""
 
 
 class CollectedTraces(Traces):
-    """Spans to a collector, OTLP over HTTP."""
+    """Traces sent to a collector, OTLP over HTTP."""
 
     def __init__(self, url: str, bench_id: str, code_version: str) -> None:
         from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
@@ -130,7 +130,7 @@ def _of_job(job_id: str) -> tuple[int, int]:
 
 
 def _attributes(job: Job) -> dict[str, str | int | bool]:
-    """What is known of a job at its end."""
+    """The attributes of a job's span, at its end."""
     known: dict[str, str | int | bool | None] = {
         "bench.job": job.id,
         "bench.id": job.bench,
