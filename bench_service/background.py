@@ -20,7 +20,7 @@ def in_background(name: str, work: Callable[[], T]) -> "Future[T]":
     def run() -> None:
         try:
             outcome.set_result(work())
-        except BaseException as failure:  # raised again where the outcome is asked for
+        except BaseException as failure:  # raised again where the outcome is read
             outcome.set_exception(failure)
 
     Thread(target=copy_context().run, args=(run,), name=name, daemon=True).start()
@@ -28,7 +28,7 @@ def in_background(name: str, work: Callable[[], T]) -> "Future[T]":
 
 
 class NonBlockingQuery(Generic[T]):
-    """A query that may hang, repeated in a background thread so that the caller goes on meanwhile.
+    """A query that may hang, repeated in a background thread so that the caller is not blocked.
 
     For a database that hangs: it neither answers nor refuses, and no time limit of its driver helps while the server's
     kernel still takes what is sent. A query is not started again before the one before has returned. For one thread.
@@ -40,7 +40,7 @@ class NonBlockingQuery(Generic[T]):
         self._running: Future[T] | None = None
 
     def ask(self, within_s: float) -> T | None:
-        """Return the answer; None where it takes longer than `within_s` [s], and the next call goes on waiting for it.
+        """Return the query's answer; None where it takes longer than `within_s` [s]: the next call waits for it again.
 
         Raises the query's own errors.
         """

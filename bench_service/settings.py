@@ -25,7 +25,7 @@ HostName = Annotated[str, Field(pattern=r"^(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(
 
 
 class Settings(BaseModel):
-    """Where the data are and how the service listens. Environment: `BENCH_` + the field's name in capitals, once."""
+    """Settings of data and server. Environment: `BENCH_` + the field's name in capitals, once."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

@@ -1,4 +1,4 @@
-"""The benches that there are: the one that this process drives, and all that workers have registered."""
+"""The known benches: the one that this process drives, and all that workers have registered."""
 
 from collections.abc import Callable
 
@@ -58,13 +58,13 @@ class BenchDirectory:
     def one(self) -> str:
         """A bench to look at where none is named and nothing will move: the default, or else the first registered one.
 
-        Raises `NotFound` where there is none at all.
+        Raises `NotFound` where no bench is registered.
         """
         default, ids = self.default(), self.ids()
         return default if default in ids or not ids else ids[0]
 
     def mounted(self, bench_id: str, serial: str | None = None) -> tuple[Unit, ...]:
-        """The units that a bench can test, as declared; a simulated bench has drawn ones when they are asked for.
+        """The units that a bench can test, as declared; a simulated bench draws one for a requested serial.
 
         Raises `NotFound` for an unknown bench.
         """

@@ -26,7 +26,7 @@ class Lease(Protocol):
         ...
 
     def regain(self) -> bool:
-        """Take it again after it was lost; False where somebody else has it, or the database does not answer."""
+        """Take a lost lease again; False where another process has it, or the database does not answer."""
         ...
 
     def release(self) -> None:
@@ -41,7 +41,7 @@ class BenchDriver(BenchDevices, Protocol):
     def description(self) -> BenchDescription: ...
 
     def mounted(self, serial: str | None = None) -> tuple[Unit, ...]:
-        """The units that this bench can test, as declared; a simulated bench mounts some when they are asked for."""
+        """The units that this bench can test, as declared; a simulated bench mounts some by their serial."""
         ...
 
     def open(
@@ -52,7 +52,7 @@ class BenchDriver(BenchDevices, Protocol):
         needs: BenchNeeds,
         job: str | None = None,
     ) -> Bench:
-        """The bench with a unit on it, for a job; from a checkpoint, a simulated world goes on where it was.
+        """The bench with a unit on it, for a job; from a checkpoint, a simulated world continues where it was.
 
         It has the devices' links until `Bench.close`. Raises `NotMounted`, `DeviceBusy`, `BenchError`.
         """

@@ -14,7 +14,7 @@ from bench_service.bench.records_in_place import Unreadable, encoded, preallocat
 BEAT_S = 0.5
 """Interval between two heartbeats of a process that drives a bench [s, real time]."""
 SILENT_S = 10.0
-"""A driving process without a heartbeat for so long, on a bench that is not safe, is killed [s]."""
+"""Silence after which a driving process is killed, while its bench is not safe [s]."""
 
 
 class HeartbeatFile:

@@ -51,7 +51,7 @@ class ProcessIdentity:
 
 @dataclass(frozen=True)
 class Driving:
-    """Which process drives, or last drove, a bench from this host."""
+    """The process that drives, or last drove, a bench from this host."""
 
     process: ProcessIdentity
     ended: bool = False
@@ -66,7 +66,7 @@ class Watch(Protocol):
     """The processes of one host that drive or supervise a bench, as they register themselves."""
 
     def driving(self) -> Driving | None:
-        """Which process drives the bench; None where none of this host ever did."""
+        """The process that drives the bench; None where no process of this host ever did."""
         ...
 
     def supervisor(self) -> ProcessIdentity | None:

@@ -28,7 +28,7 @@ class PromptStore(Protocol):
     """One open request per job. Request and answer are events of the job too."""
 
     def ask(self, job_id: str, text: str, at: datetime) -> None:
-        """Store a request; it replaces an earlier request of the job."""
+        """Store a person's request; it replaces an earlier request of the job."""
         ...
 
     def answer(self, job_id: str, answer: Answer, at: datetime) -> Job:

@@ -41,7 +41,7 @@ class BenchRegistry(Protocol):
         ...
 
     def release_stop(self, bench_id: str, stop_id: str, at: datetime, by: str, remark: str) -> BenchStop:
-        """Release one stop; the bench works again once no stop stands. The same release repeated changes nothing.
+        """Release one standing stop; the bench works again once none stands. The same release repeated changes nothing.
 
         Raises `NotFound`, and `IllegalTransition` where it was released before by another person or with another
         remark.

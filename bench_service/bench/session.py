@@ -50,7 +50,7 @@ class ShuttingDown(BaseException):
 class BenchSession:
     """Drives one job's stations in order. `record` may begin at any of them: the procedure is opened there.
 
-    `stop_wanted` is asked every `STOP_CHECK_S` of real time; True raises `Stopped` in whatever the procedure is doing.
+    `stop_wanted` is called every `STOP_CHECK_S` of real time; True raises `Stopped` in the procedure's step under way.
     """
 
     def __init__(

@@ -30,7 +30,7 @@ from bench_service.wall_clock import monotonic_s
 LOOK_S = 0.1
 """Interval between two looks at the bench [s]: a worker's death is noticed within this."""
 STOP_LOOK_S = 0.5
-"""Interval at which the database is asked for stops of the bench [s]."""
+"""Interval between two queries of the database for stops of the bench [s]."""
 ANSWER_S = 0.1
 """Time that a look waits for the database's answer [s]; a later answer is seen by a later look."""
 LEASE_S = 0.8

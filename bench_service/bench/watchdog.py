@@ -22,7 +22,7 @@ UNWATCHED = frozenset({"imu.stream", "operator.set_by_hand"})
 class Patience:
     """Time limits for the answers of devices [s, real time].
 
-    On a simulated bench every verb has `simulated_s`, and a clock that goes on is a sign of life: bench time may pass
+    On a simulated bench every verb has `simulated_s`, and an advancing clock is a sign of life: bench time may pass
     slower than real time there.
     """
 
@@ -64,7 +64,7 @@ class Watchdog:
         self._answer(f"{device}.block")
 
     def silence(self, looked_s: float, longest_s: float) -> str | None:
-        """A sentence that names the device that was silent for too long; None: there is none.
+        """A sentence that names the device that was silent for too long; None: no device was.
 
         `looked_s`: the time since the last look; no more than `longest_s` of it counts, because a process that was
         suspended looks late at devices that it could not hear.

@@ -34,7 +34,7 @@ class WorkerPatience:
         self._beat = 0
 
     def reset(self, now_s: float) -> None:
-        """Start all delays anew at zero."""
+        """Reset all delays to zero."""
         self._held_s = dict.fromkeys(self._limits_s)
         self._looked_s = now_s
 

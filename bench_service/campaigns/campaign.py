@@ -106,8 +106,8 @@ class Step(Document):
 class Seeds(Document):
     """Seed of a step on a simulated bench: the run's base + the step's number (from 0) + 1000 for every retry.
 
-    The run's base is what the run was asked for; else, by `rule`, always `base` (every night is the same night), or
-    drawn anew for every run.
+    The run's base is the one in its request; else, by `rule`, always `base` (every night is the same night), or
+    drawn for every run.
     """
 
     rule: Literal["vary", "repeat"] = "vary"

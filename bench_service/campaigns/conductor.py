@@ -2,7 +2,7 @@
 
 Any number of processes may conduct: a decision is written before it is acted on, acting twice gives the same job (its
 key is the run, the step and the attempt), and a change is only stored by a process that has read the run's last
-revision. So a process may be killed anywhere, and another one, or its next life, goes on. A method, which may take
+revision. So a process may be killed anywhere, and another one, or its successor, continues. A method, which may take
 long, is computed in the background, under such a key too.
 """
 
@@ -75,7 +75,7 @@ class Conductor:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread; runs stay as they are."""
+        """End the conductor's thread; runs stay as they are."""
         self._ending.set()
         self._wanted.set()
         if self._thread is not None:

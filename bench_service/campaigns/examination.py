@@ -53,7 +53,7 @@ class _Progress:
 
 
 class Examiner:
-    """Examines campaigns; moves and stores nothing."""
+    """Examines campaigns in advance; moves and stores nothing."""
 
     def __init__(self, planner: Planner) -> None:
         self._planner = planner

@@ -119,7 +119,7 @@ def _rising(moments: Iterator[datetime | None], after: datetime) -> Iterator[dat
 
 
 def next_start(cron: str, time_zone: str, moment: datetime) -> datetime:
-    """The first start after a moment, in UTC. Raises `BadParameter` where there is none within 50 years."""
+    """The first start after a moment, in UTC. Raises `BadParameter` for an expression not due within 50 years."""
     start = next(starts_after(cron, time_zone, moment), None)
     if start is None:
         raise BadParameter("cron", cron, "a time that comes: this one is not due within 50 years")

@@ -57,7 +57,7 @@ class Scheduler:
         self._prepared = prepared
 
     def add(self, request: ScheduleRequest, key: str | None = None) -> Schedule:
-        """Add a schedule. Raises `BadParameter` for a time that never comes, and the errors of preparing its run.
+        """Add a campaign's schedule. Raises `BadParameter` for a time that never comes, and its run's refusals.
 
         A key of a schedule that was removed since is used up: `IdempotencyConflict`.
         """
@@ -97,7 +97,7 @@ class Scheduler:
                 return changed
 
     def get(self, schedule_id: str) -> Schedule:
-        """Return one schedule. Raises `NotFound`."""
+        """Return one schedule by its id. Raises `NotFound`."""
         return self._stores.campaigns.schedule(schedule_id)
 
     def list(self, after: str | None = None, limit: int = 50) -> Page[Schedule]:
@@ -105,7 +105,7 @@ class Scheduler:
         return self._stores.campaigns.schedules(after, limit)
 
     def remove(self, schedule_id: str) -> None:
-        """Remove a schedule; its runs stay. Raises `NotFound`."""
+        """Remove a schedule by its id; its runs stay. Raises `NotFound`."""
         self._stores.campaigns.remove_schedule(schedule_id)
 
     def fire_due(self) -> None:

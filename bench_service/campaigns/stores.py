@@ -22,11 +22,11 @@ class CampaignStore(Protocol):
         ...
 
     def replace(self, campaign: Campaign, at: datetime) -> None:
-        """Change a campaign; runs keep the version that they began with. Raises `NotFound`."""
+        """Change a stored campaign; runs keep the version that they began with. Raises `NotFound`."""
         ...
 
     def get(self, name: str) -> Campaign:
-        """Return one campaign. Raises `NotFound`."""
+        """Return one campaign by its name. Raises `NotFound`."""
         ...
 
     def list(self, after: str | None = None, limit: int = 50) -> tuple[Campaign, ...]:
@@ -56,7 +56,7 @@ class CampaignStore(Protocol):
     ) -> Page[CampaignRun]: ...
 
     def counts(self) -> dict[tuple[str, str, str], int]:
-        """Number of runs by campaign, state and verdict ("" where there is none)."""
+        """Number of runs by campaign, state and verdict ("" for no verdict)."""
         ...
 
     def open_runs(self) -> tuple[CampaignRun, ...]:
@@ -68,11 +68,11 @@ class CampaignStore(Protocol):
         ...
 
     def add_schedule(self, schedule: Schedule, idempotency: Idempotency | None = None) -> Schedule:
-        """Add a schedule. Raises `IdempotencyConflict`."""
+        """Add a campaign's schedule. Raises `IdempotencyConflict`."""
         ...
 
     def schedule(self, schedule_id: str) -> Schedule:
-        """Return one schedule. Raises `NotFound`."""
+        """Return one schedule by its id. Raises `NotFound`."""
         ...
 
     def schedules(self, after: str | None = None, limit: int = 50) -> Page[Schedule]: ...
@@ -90,7 +90,7 @@ class CampaignStore(Protocol):
         ...
 
     def remove_schedule(self, schedule_id: str) -> None:
-        """Remove a schedule; its runs stay. Raises `NotFound`."""
+        """Remove a schedule by its id; its runs stay. Raises `NotFound`."""
         ...
 
 

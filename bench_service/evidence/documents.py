@@ -26,7 +26,7 @@ def require_storable(calibrations: Sequence[TriadCalibration], corrections: Sequ
 
 
 def require_fit(document: dict[str, Any], what: str) -> None:
-    """Check a document. Raises `UnfitResult` naming the first value that JSON and the databases cannot hold."""
+    """Check that a document can be stored. Raises `UnfitResult` naming the first value that JSON cannot hold."""
     fault = next(faults(document), None)
     if fault is None:
         return

@@ -26,7 +26,7 @@ class RecordingWriter(Protocol):
         ...
 
     def abandon(self) -> None:
-        """End without sealing; never raises. Whole chunks of a job's recording are kept as interrupted.
+        """End the recording without sealing; never raises. Whole chunks of a job's recording are kept as interrupted.
 
         An import, or a recording without a committed chunk, leaves nothing.
         """

@@ -30,7 +30,7 @@ class ResultStore(Protocol):
         ...
 
     def get(self, result_id: str) -> StoredResult:
-        """Return one result. Raises `NotFound`."""
+        """Return one result by its id. Raises `NotFound`."""
         ...
 
     def list(
@@ -71,5 +71,5 @@ class ResultStore(Protocol):
         ...
 
     def calibration(self, calibration_id: str) -> StoredCalibration:
-        """Return one calibration. Raises `NotFound`."""
+        """Return one calibration by its id. Raises `NotFound`."""
         ...

@@ -34,7 +34,7 @@ class Trend:
     """Unit of the values; empty where the result does not give it."""
     points: tuple[TrendPoint, ...]
     limits: ControlLimits | None
-    """The control limits; None with fewer than two points."""
+    """Control limits of the chart; None with fewer than two points."""
     signals: tuple[Signal, ...]
     without: int
     """Number of results of that procedure that lack the quantity."""

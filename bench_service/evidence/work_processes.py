@@ -1,7 +1,7 @@
 """Analyses and drawings in separate processes, so that the one that drives a bench and answers a stop stays free.
 
 A few processes at a low priority. A refusal by the work is raised here as the same error; work that is cut off, because
-its process died, may be asked for again.
+its process died, may be requested again.
 """
 
 import contextlib
@@ -86,7 +86,7 @@ class WorkProcesses:
         return found
 
     def close(self) -> None:
-        """End the processes; work that is under way is cut off."""
+        """End the worker processes; work that is under way is cut off."""
         with self._mutex:
             pool, self._pool = self._pool, None
         if pool is not None:

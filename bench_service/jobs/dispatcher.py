@@ -2,15 +2,15 @@
 
 The queue is the service's own jobs table. A job is claimed in one transaction (it is running from then on, and no bench
 has two running jobs), and its durable workflow begins at once. Jobs orphaned by a crash are recovered whenever the
-queue is looked at, so that no job stays running without a process that runs it:
+queue is read, so that no job stays running without a process that runs it:
 
 - claimed, and the process died before its workflow was written: back into its place in the queue;
-- its workflow is this engine's and unfinished: the engine goes on with it by itself, and is waited for;
+- its workflow is this engine's and unfinished: the engine resumes it by itself, and the dispatcher waits;
 - its workflow is of another version, or the engine gave it up: the job is interrupted, with the reason.
 
 A job that this version does not understand is interrupted too, and blocks no other job.
 
-While the bench's lease is lost (the database was restarted) nothing is claimed, and the lease is asked for again.
+While the bench's lease is lost (the database was restarted) nothing is claimed, and the dispatcher tries to regain it.
 """
 
 import logging
@@ -39,7 +39,7 @@ class Unfinished:
     """The engine's state of a running job's workflow. Neither field set: it never began."""
 
     alive: bool = False
-    """The engine goes on with it."""
+    """True where the engine resumes the workflow."""
     gone: Failure | None = None
     """The reason why the workflow will not go on."""
 
@@ -48,7 +48,7 @@ class JobEngine(Protocol):
     """The part of `bench_service.jobs.engine.Engine` that the dispatcher uses."""
 
     def launch(self) -> None:
-        """Start working; unfinished jobs of a dead process resume. The bench's lease must be held."""
+        """Start working on jobs; unfinished jobs of a dead process resume. The bench's lease must be held."""
         ...
 
     def run(self, job: Job) -> None:
@@ -60,7 +60,7 @@ class JobEngine(Protocol):
         ...
 
     def shut_down(self) -> None:
-        """Stop working, once the running job has left the bench safe; it goes on after the next start."""
+        """Stop working, once the running job has left the bench safe; it resumes after the next start."""
         ...
 
 
@@ -148,14 +148,14 @@ class Dispatcher:
         return True
 
     def _settle(self) -> None:
-        """Make sure that no job of this bench is running without a workflow that goes on."""
+        """Recover the bench's running job where its workflow does not go on: requeue or interrupt it."""
         job = self._stores.queue.running(self._bench_id)
         if job is None or self._ending.is_set():
             return
         found = self._engine.unfinished(job)
         now_running = self._stores.queue.running(self._bench_id)
         if found.alive or now_running is None or (now_running.id, now_running.attempt) != (job.id, job.attempt):
-            return  # it goes on, or it came to its end or back into the queue between the two looks
+            return  # it goes on, or it ended or was requeued between the two reads
         why = self._not_understood(job.id) or found.gone
         if why is None:
             never = Failure("NeverBegan", "the service ended after it had chosen this job and before it began")
@@ -164,7 +164,7 @@ class Dispatcher:
             self._interrupt(job.id, why)
 
     def _not_understood(self, job_id: str) -> Failure | None:
-        """The reason why this version could not resume a job, whatever its workflow's state; None: there is none."""
+        """The reason why this version could not resume a job, whatever its workflow's state; None where it could."""
         try:
             self._stores.jobs.get(job_id)
         except NotUnderstood as error:

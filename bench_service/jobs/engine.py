@@ -1,9 +1,9 @@
 """The job engine, DBOS, behind four verbs. The only file that knows it.
 
 Jobs wait in the service's own table (`bench_service.jobs.dispatcher`); here a claimed job is run, as a workflow that
-survives the process: one step per station, steps that may be repeated. An operator's cancel is a flag of our own that
-the steps see (a cancelled DBOS workflow would free the bench while it still moves); the workflow then makes the bench
-safe and ends. The version is the procedures' contract, not a hash of the sources, so a new build goes on with the jobs
+survives the process: one step per station, steps that may be repeated. An operator's cancel is a flag of the service
+that the steps see (a cancelled DBOS workflow would free the bench while it still moves); the workflow then makes the
+bench safe and ends. The version is the procedures' contract, not a hash of the sources, so a new build resumes the jobs
 of the old one.
 """
 
@@ -105,7 +105,7 @@ class Engine:
         self._workflow = run_job
 
     def launch(self) -> None:
-        """Start working; jobs orphaned by a dead process resume. The bench's lease must be held.
+        """Start working on jobs; jobs orphaned by a dead process resume. The bench's lease must be held.
 
         Raises the error that kept it from starting; then nothing is left running.
         """
@@ -139,7 +139,7 @@ class Engine:
         return Unfinished(gone=Failure("EngineGaveUp", f"the job engine ended this job as {status.status}"))
 
     def shut_down(self) -> None:
-        """Stop working, once the running job has left the bench safe; it goes on after the next start."""
+        """Stop working, once the running job has left the bench safe; it resumes after the next start."""
         self._ending.set()
         if self._one_at_a_time.acquire(timeout=SHUT_DOWN_S):
             self._one_at_a_time.release()
@@ -167,7 +167,7 @@ class Engine:
             outcome = self._stations(job_id, count)
             if outcome.good and count > 0:
                 outcome = self._checked("safe", lambda: runner.make_safe(job_id))
-            if outcome.good:  # no step of its own: it may be repeated, and its end is in our own books
+            if outcome.good:  # no step of its own: it may be repeated, and its end is in the service's own tables
                 outcome = runner.conclude(job_id)
         except ShuttingDown:
             self._make_safe(job_id)
@@ -223,7 +223,7 @@ class Engine:
         return StepOutcome()
 
     def _station(self, job_id: str, index: int) -> StepOutcome:
-        """Record one station. After a bad outcome make the bench safe before the engine notes it, which can be slow."""
+        """Record one station's samples. After a bad outcome make the bench safe before the engine notes it."""
         try:
             outcome = self._runner.acquire(job_id, index)
         except Exception as error:

@@ -42,7 +42,7 @@ class Planner:
         self._units = units
 
     def context(self, unit: str, bench: str | None = None) -> Context:
-        """The present context. Raises `NotFound` for an unknown bench, `NotMounted` for a unit it does not have."""
+        """The unit and bench as known now. Raises `NotFound` for an unknown bench, `NotMounted` for an unknown unit."""
         description = self.benches.description(self.benches.default() if bench is None else bench)
         return Context(self.unit(unit, description.id), description)
 

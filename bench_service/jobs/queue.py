@@ -61,7 +61,7 @@ class BenchQueue:
     """The reservations that hold now, of the bench and of the units in the queue."""
 
     def next(self) -> QueueEntry | None:
-        """The next eligible job; None where there is none."""
+        """The next eligible job; None where no job is eligible."""
         return next((entry for entry in self.entries if self.hold(entry) is None), None)
 
     def hold(self, entry: QueueEntry) -> str | None:
@@ -77,7 +77,7 @@ class BenchQueue:
         return None
 
     def place(self, job_id: str, driven: bool) -> Place | None:
-        """A job's place; None where it is not in the queue. `driven`: True where a worker drives the bench."""
+        """The place of a job; None where it is not in the queue. `driven`: True where a worker drives the bench."""
         return self.places(driven).get(job_id)
 
     def places(self, driven: bool) -> dict[str, Place]:

@@ -55,7 +55,7 @@ class QueueService:
         return self._stores.queue.look(self._benches.description(bench_id).id, now())
 
     def standing(self, jobs: Sequence[Job]) -> dict[str, Standing]:
-        """The standing of each of these jobs; each bench is looked at once."""
+        """The standing of each of these jobs; each bench's queue is read once."""
         places: dict[str, Place] = {}
         for bench in {job.bench for job in jobs if job.state is JobState.QUEUED}:
             places |= self._stores.queue.look(bench, now()).places(self._benches.driven(bench))

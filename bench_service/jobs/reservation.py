@@ -41,14 +41,14 @@ class Reservation:
 
 
 class ReservationStore(Protocol):
-    """The stored reservations. Every method is one transaction."""
+    """Stored reservations of all holders. Every method is one transaction."""
 
     def add(self, reservation: Reservation, idempotency: Idempotency | None = None) -> Reservation:
         """Add a reservation, at its `created_at`. Raises `AlreadyReserved`, `IdempotencyConflict`."""
         ...
 
     def get(self, reservation_id: str) -> Reservation:
-        """Return one reservation. Raises `NotFound`."""
+        """Return one reservation by its id. Raises `NotFound`."""
         ...
 
     def list(

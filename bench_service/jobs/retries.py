@@ -11,7 +11,7 @@ RETRY_PAUSES_S = (10.0, 30.0, 60.0, 120.0, LONGEST_PAUSE_S)
 DATABASE_FAULTS = frozenset({"StorageFailure", "LeaseLost"})
 """Kinds of failure that a restart of the database leaves in a running job."""
 DATABASE_PAUSE_S = 1.0
-"""Pause before such a job goes on [s]."""
+"""Pause before such a job is retried [s]."""
 MOST_ATTEMPTS = 20
 """Maximum attempts of a job: one that was queued this often is not requeued after a database fault."""
 

@@ -92,13 +92,13 @@ class JobRunner:
         return len(job.stations) if job.state is JobState.RUNNING and job.attempt == attempt else -1
 
     def acquire(self, job_id: str, index: int) -> StepOutcome:
-        """Record one station. An existing recording means that a crash came between storing and noting it.
+        """Record one station's samples. An existing recording means that a crash came between storing and noting it.
 
         Raises `ShuttingDown` when the service is ending.
         """
         if self._ending.is_set():
             raise ShuttingDown
-        if self._stopped():  # before the database is asked anything
+        if self._stopped():  # before any query of the database
             return StepOutcome(cancelled=True)
         jobs, recordings = self._stores.jobs, self._stores.recordings
         if index in {r.info.station.index for r in recordings.of_job(job_id) if r.info.station}:

@@ -98,7 +98,7 @@ class JobService:
         return None if driving is None else driving.id
 
     def result_of(self, job_id: str) -> StoredResult:
-        """The result that gave the job its verdict. Raises `NotFound` where there is none (yet)."""
+        """The result that gave the job its verdict. Raises `NotFound` where it has none (yet)."""
         job = self._stores.jobs.get(job_id)
         if job.result_id is None:
             raise NotFound("result of job", job_id, f"it is {job.state.value}")

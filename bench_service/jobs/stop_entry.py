@@ -29,7 +29,7 @@ class StopEntry:
         self._trail = trail
 
     def enter(self, bench_id: str, word: StopWord) -> str | None:
-        """Enter a stop; the id of the running job, which is cancelled. Raises `StorageFull`, `StorageFailure`."""
+        """Enter a stop; return the running job's id, which is cancelled. Raises `StorageFull`, `StorageFailure`."""
         new = all(stop.id != word.id for stop in self._benches.standing_stops(bench_id))
         self._benches.stop_bench(BenchStop(bench_id, word.at, word.reason, by=word.by, id=word.id))
         running = self._queue.running(bench_id)

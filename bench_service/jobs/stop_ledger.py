@@ -58,7 +58,7 @@ class StopLedger:
                 pause(AGAIN_S)
 
     def _entered(self, waiting: _Waiting) -> bool:
-        """Enter one stop; True where no retry is needed."""
+        """Enter one waiting stop; True where no retry is needed."""
         try:
             waiting.entered.set_result(self._enter(waiting.bench_id, waiting.word))
         except NotFound as unknown:
@@ -68,7 +68,7 @@ class StopLedger:
                 log.warning("a stop of bench %s is not in the books yet: %s", waiting.bench_id, error)
             self.failure = str(error)
             return False
-        except Exception as error:  # a defect must not keep the next stop out of the books
+        except Exception as error:  # a defect must not keep the next stop out of the database
             log.exception("a stop of bench %s could not be entered", waiting.bench_id)
             waiting.entered.set_exception(error)
         self.failure = ""

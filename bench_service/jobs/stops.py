@@ -101,7 +101,7 @@ class StopService:
             return None, str(error)
 
     def release(self, bench_id: str, stop_id: str, by: str, remark: str) -> BenchStop:
-        """Release one stop. Once no stop stands the bench works again, and the jobs in its queue go on.
+        """Release one standing stop. Once none stands the bench works again, and the jobs in its queue start.
 
         `by`: the person who releases it. Raises `NotFound`, `NotSafe` while the devices are not known to be safe, and
         `IllegalTransition` where another person released it before.

@@ -29,7 +29,7 @@ class JobStore(Protocol):
         ...
 
     def get(self, job_id: str) -> Job:
-        """Return one job. Raises `NotFound`."""
+        """Return one job by its id. Raises `NotFound`."""
         ...
 
     def list(
@@ -80,7 +80,7 @@ class JobStore(Protocol):
     def cancel_requested(self, job_id: str) -> bool: ...
 
     def request_pause(self, job_id: str, at: datetime) -> Job:
-        """Ask a job to be put aside: a queued one is paused at once, a running one before its next station.
+        """Request a pause: a queued job is paused at once, a running one before its next station.
 
         Raises `IllegalTransition` for a job that has ended or was interrupted; for a paused one it is a no-op.
         """

@@ -1,7 +1,7 @@
 """The worker of a bench: its dispatcher, and the job engine, which is launched while the service already answers.
 
-The engine takes longer to load than everything else together. The service answers liveness checks
-meanwhile; jobs that are submitted meanwhile wait in the queue.
+The engine takes longer to load than everything else together. Until then the service answers liveness checks, and
+submitted jobs wait in the queue.
 """
 
 import logging
@@ -95,7 +95,7 @@ class Worker:
         return self._runner.running_job()
 
     def shut_down(self) -> None:
-        """Stop the worker. The running job is left for the next start; the bench is made safe first."""
+        """Stop the bench's worker. The running job is left for the next start; the bench is made safe first."""
         if self._thread is None:
             return
         self._runner.shut_down()

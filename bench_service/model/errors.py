@@ -11,8 +11,8 @@ ServiceError
 ├── NotReady             a job could not start here now
 ├── NotSafe              the bench's devices are not known to be safe
 ├── SeveralStops         a release must name one of the stops that stand
-├── AlreadyReserved      somebody keeps this bench or unit
-├── Overloaded           too much is asked for at one time
+├── AlreadyReserved      another holder has reserved this bench or unit
+├── Overloaded           too much is requested at one time
 ├── NotUnderstood        a job was stored by a version whose format this one does not know
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow

@@ -110,7 +110,7 @@ class Job(JobTerms):
     requested_by: str = ""
     """Person who requested it, as given by the client; may be empty."""
     prompt: dict[str, Any] | None = None
-    """Open request to the person at the bench: {"text", "asked_at"}; None: there is none."""
+    """Open request to the person at the bench: {"text", "asked_at"}; None: none is open."""
     started_at: datetime | None = None
     finished_at: datetime | None = None
     result_id: str | None = None
@@ -118,7 +118,7 @@ class Job(JobTerms):
 
     @property
     def resumable(self) -> bool:
-        """Tell if it can be queued again to go on where it ended."""
+        """Tell if it can be queued again to continue where it ended."""
         if self.state is JobState.FAILED:
             return self.failure is not None and self.failure.kind in RESUMABLE
         return self.state in (JobState.PAUSED, JobState.INTERRUPTED)

@@ -37,7 +37,7 @@ class AuditTrail(Protocol):
     """PORT of memory: the audit trail."""
 
     def add(self, entry: AuditEntry) -> None:
-        """Add an entry. Raises `StorageFull`, `StorageFailure`."""
+        """Add an entry to the trail. Raises `StorageFull`, `StorageFailure`."""
         ...
 
     def list(
@@ -48,7 +48,7 @@ class AuditTrail(Protocol):
 
 
 def record(trail: AuditTrail, who: str, action: str, target: str, outcome: str, **detail: Any) -> None:
-    """Add an entry. Never raises for a database that fails: the act was done, with or without its record."""
+    """Add an entry to the trail. Never raises for a failing database: the act was done, with or without its record."""
     entry = AuditEntry(new_id(), now(), who, action, target, outcome, detail)
     try:
         trail.add(entry)

@@ -28,7 +28,7 @@ def subjects() -> dict[str, str]:
 
 
 def request_id() -> str:
-    """Id of the request that is being answered; empty where there is none."""
+    """Id of the request that is being answered; empty outside of requests."""
     return (_ABOUT.get() or {}).get("request", "")
 
 

@@ -40,7 +40,7 @@ class LiveDevices:
     """True while the table follows a demand, or settles after it."""
     unit_on: bool
     chamber: ChamberReading | None = None
-    """The chamber's reading; None: the bench has none."""
+    """Reading of the chamber; None: the bench has none."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class BenchLive:
     """False: the driver ended in an orderly way."""
     job: LiveJob | None = None
     devices: LiveDevices | None = None
-    """None: no process has opened the bench, or its devices do not answer."""
+    """State of the devices; None: no process has opened the bench, or they do not answer."""
     samples: LiveSamples | None = None
 
     def seen_s(self, at: datetime) -> float:
@@ -109,8 +109,6 @@ class BenchLive:
 
         A heartbeat dated more than `SEEN_S` in the future comes from before the clock was set back, and counts as
         stale: a living driver writes a new one.
-
-        A word from later than `SEEN_S` from now is as old as the clock's being set back: who lives says it anew.
         """
         return self.driving and abs((at - self.at).total_seconds()) <= SEEN_S
 
@@ -182,7 +180,7 @@ class Heartbeat:
         self._thread = Thread(target=self._run, name="heartbeat", daemon=True)
 
     def begin(self) -> None:
-        """Start the thread. The bench's lease must be held."""
+        """Start the heartbeat's thread. The bench's lease must be held."""
         self._thread.start()
 
     def end(self) -> None:

@@ -1,1 +1,1 @@
-"""The stop of a bench outside every database: its channel, its way from other hosts, its entry into the books."""
+"""The stop of a bench outside every database: its channel, its way from other hosts, its entry into the database."""

@@ -36,7 +36,7 @@ from bench_service.wall_clock import monotonic_s, pause
 WORDS = 16
 """Maximum number of stops that a bench has at once; further ones change nothing: the bench is stopped."""
 WORKER, SUPERVISOR = 0, 1
-"""Roles of those who answer; each is also the number of its answer's record."""
+"""Roles that answer a stop; each is also the number of its answer's record."""
 _FIRST = 2
 """Record number of the first stop request."""
 LOCK_S = 0.2

@@ -84,7 +84,7 @@ class StopAddresses:
         self._thread.start()
 
     def end(self) -> None:
-        """Stop reading; a thread that hangs in the database ends with the process."""
+        """Stop reading the addresses; a thread that hangs in the database ends with the process."""
         self._ending.set()
         self._thread.join(LEARN_S)
 

@@ -12,7 +12,7 @@ from bench_service.bench.stop.word import StopWord
 from bench_service.model.records import BenchStop
 
 LATE_S = 2.0
-"""A stop that is entered later than this after it was asked for is noted as late [s]."""
+"""Delay after which the entry of a stop is noted as late [s]."""
 
 
 class StopBooks(Protocol):

@@ -25,7 +25,7 @@ def bound(folder: Path, name: str) -> socket.socket:
 
 
 def send(folder: Path, name: str, body: bytes) -> bool:
-    """Send without waiting; True where a process receives it."""
+    """Send a message without waiting; True where a process receives it."""
     with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as sender:
         sender.setblocking(False)
         with SocketAddress(folder, name) as address:

@@ -28,7 +28,7 @@ class StopKeeper:
         self._thread.start()
 
     def end(self) -> None:
-        """Stop comparing; a thread that hangs in the database ends with the process."""
+        """Stop comparing channel and database; a thread that hangs in the database ends with the process."""
         self._ending.set()
         self._thread.join(KEEP_S)
 
@@ -41,5 +41,5 @@ class StopKeeper:
                 if str(error) != self._said:
                     log.warning("the stops of bench %s are not compared with the books: %s", self._bench_id, error)
                 self._said = str(error)
-            except Exception:  # the books of a stop may be late, they may not be given up
+            except Exception:  # a stop's entry into the database may be late, but is never given up
                 log.exception("the stop keeper of bench %s", self._bench_id)

@@ -37,7 +37,7 @@ class Listening:
 
 
 def read_secret(file: Path) -> bytes | None:
-    """The secret in a file; None where there is none that may be used."""
+    """The secret in a file; None where the file has no usable one."""
     try:
         found = file.read_bytes().strip()
     except OSError:
@@ -49,7 +49,7 @@ def made_secret(file: Path) -> bytes | None:
     """The secret in a file; an absent file is made, with a new secret. None where it cannot be made."""
     try:
         made = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
-    except OSError:  # it is there, or there is no room for it
+    except OSError:  # it exists already, or the disk is full
         return read_secret(file)
     try:
         os.write(made, secrets.token_hex(32).encode() + b"\n")

@@ -79,7 +79,7 @@ class StopRoads:
             return found
 
     def to(self, bench_id: str) -> StopRoad | None:
-        """The way to a bench; None where there is none but the database."""
+        """The way to a bench; None where the database is the only one."""
         channel = self.channel(bench_id)
         return self._elsewhere(bench_id) if channel is None else ChannelRoad(channel)
 

@@ -158,7 +158,7 @@ class EventHub:
                     yield self._frames.event(event)
 
     async def _run(self, watch: _Watch) -> None:
-        """Read and fan out events while the job has listeners and goes on."""
+        """Read and fan out events while the job has listeners and has not ended."""
         look_s = OWN_WATCH_S if watch.bench == self._board.own else WATCH_S
         wait_s = look_s
         try:

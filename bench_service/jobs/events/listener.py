@@ -42,7 +42,7 @@ class Listener:
         self._woken = asyncio.Event()
 
     def put(self, sequence: int, frame: bytes) -> bool:
-        """Queue an event. False where the queue is full: the listener is dropped, and its queue emptied."""
+        """Queue an event's message. False where the queue is full: the listener is dropped, and its queue emptied."""
         if len(self._frames) >= self._lag:
             self.dropped = self.ended = True
             self._frames.clear()
