@@ -1,6 +1,6 @@
 """Files of a driving process in the bench's device folder: stop channel, heartbeat, and its identity.
 
-Composed here because devices, stop guard and books meet in it.
+Composed here because it joins devices, stop guard and database.
 """
 
 from collections.abc import Callable
@@ -49,7 +49,7 @@ class BenchFiles:
             ) from error
 
     def stopped(self) -> bool:
-        """Tell if a stop stands on the bench's channel."""
+        """Return whether a stop stands on the bench's channel."""
         return bool(self._channel.standing())
 
     def guard(self, make_safe: Callable[[], object], wake: Callable[[], object]) -> StopGuard:

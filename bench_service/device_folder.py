@@ -1,6 +1,6 @@
 """The folder of a bench's device state, from the settings, without loading the settings' model.
 
-`bench stop` reads no more than this of its environment, so that it begins at once and no wrong setting keeps it out.
+`bench stop` reads only these settings, so that it starts at once and no invalid setting keeps it from working.
 """
 
 from pathlib import Path

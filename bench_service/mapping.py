@@ -1,4 +1,4 @@
-"""One value made from others: fields of the same name are copied, the others are given by name.
+"""Makes a value from others: fields of the same name are copied, the others are given by name.
 
 Serves dataclasses, pydantic models and mapped tables alike, so a field that two shapes share is written in no mapper.
 Must not know any of these shapes.

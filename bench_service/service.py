@@ -108,7 +108,7 @@ class BenchService:
     def ready(self) -> tuple[str, ...]:
         """Return once a job could start, with notes for a person.
 
-        A stopped bench is such a note: it refuses by a person's will, and the service works. Raises `NotReady` with
+        A stopped bench is such a note: a person has stopped it, and the service works. Raises `NotReady` with
         every reason, `StorageFailure` where the database does not answer.
         """
         self.stores.jobs.counts()

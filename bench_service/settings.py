@@ -46,7 +46,7 @@ class Settings(BaseModel):
     or through a proxy there that lets in only people it knows; then every peer counts as one of this host."""
     port: int = Field(8000, ge=0, le=65535)
     bench_id: str = Field(BENCH_ID, pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")
-    """The one bench that this process drives."""
+    """Id of the bench that this process drives."""
     unit_truth: Path | None = None
     """Truth file of the simulated unit; None: the one that ships."""
     bench_truth: Path | None = None
@@ -126,7 +126,7 @@ class Settings(BaseModel):
 
     @classmethod
     def variables(cls) -> tuple[str, ...]:
-        """Every environment variable that is read."""
+        """Names of all environment variables that are read."""
         return tuple(_variable(name) for name in cls.model_fields)
 
 

@@ -35,7 +35,7 @@ class BenchDirectory:
         self._holder = holder
 
     def ids(self) -> tuple[str, ...]:
-        """Every bench that is registered."""
+        """Ids of all registered benches."""
         return tuple(bench.id for bench in self._registry.benches())
 
     def description(self, bench_id: str) -> BenchDescription:
@@ -56,7 +56,7 @@ class BenchDirectory:
         return ids[0] if len(ids) == 1 else self._preferred
 
     def one(self) -> str:
-        """A bench to look at where none is named and nothing will move: the default, or else the first registered one.
+        """The bench of a read-only request that names none: the default, or else the first registered one.
 
         Raises `NotFound` where no bench is registered.
         """
@@ -76,7 +76,7 @@ class BenchDirectory:
         return tuple(units) if drawn is None else (*units, drawn)
 
     def driven(self, bench_id: str) -> bool:
-        """Tell if a worker drives the bench now, that is, if some process holds its lease."""
+        """Return whether a worker drives the bench now, that is, if some process holds its lease."""
         return self.holder(bench_id) is not None
 
     def holder(self, bench_id: str) -> str | None:

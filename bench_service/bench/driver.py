@@ -22,7 +22,7 @@ class Lease(Protocol):
     """The right to drive a bench, held for a process's life unless it is lost."""
 
     def held(self) -> bool:
-        """Tell if this process still holds the lease."""
+        """Return whether this process still holds the lease."""
         ...
 
     def regain(self) -> bool:
@@ -30,7 +30,7 @@ class Lease(Protocol):
         ...
 
     def release(self) -> None:
-        """Give the bench back; a second time does nothing."""
+        """Release the lease; a second call does nothing."""
         ...
 
 
@@ -54,7 +54,7 @@ class BenchDriver(BenchDevices, Protocol):
     ) -> Bench:
         """The bench with a unit on it, for a job; from a checkpoint, a simulated world continues where it was.
 
-        It has the devices' links until `Bench.close`. Raises `NotMounted`, `DeviceBusy`, `BenchError`.
+        The bench has the devices' links until `Bench.close`. Raises `NotMounted`, `DeviceBusy`, `BenchError`.
         """
         ...
 

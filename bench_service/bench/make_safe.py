@@ -1,12 +1,12 @@
-"""The road to a safe bench: the order of its steps, written once, for every way on which a bench has to be made safe.
+"""Making a bench safe: the order of the steps, written once for every situation in which a bench must be made safe.
 
-1. Where a job's session has the devices' link: whatever is under way is left, the procedure is closed, and the devices
+1. Where a job's session has the devices' link: the step under way is left, the procedure is closed, and the devices
    are made safe over that link, in the order of `procedures.bench.SAFE_ORDER`.
 2. The session's link is given back, so that nothing that still comes from the job reaches a device.
 3. Where a device did not answer over that link, or there was none: the same order over a link of its own.
 
-A job's end, a stop, a start, the supervisor and a release all come here; the first three steps are a job's, the others
-have the third alone. None of it needs a database.
+A job's end, a stop, a start, the supervisor and a release all use this module. Only a job goes through all three steps;
+the others take the third alone. None of it needs a database.
 """
 
 from collections.abc import Callable
@@ -39,7 +39,7 @@ class Obstacle:
 
     @property
     def why(self) -> str:
-        """The reasons in one line."""
+        """All reasons in one line."""
         return "; ".join(self.reasons)
 
     def __str__(self) -> str:
@@ -57,8 +57,8 @@ class RoadEnd:
 
 
 def over_new_link(devices: BenchDevices, by: str) -> Obstacle | None:
-    """Make devices safe that no job of this process has; None where they are safe then. On a safe bench nothing is
-    asked of them.
+    """Make devices safe that no job of this process has; None where they are safe then. Safe devices get no
+    command.
     """
     try:
         devices.make_safe(by)
@@ -80,7 +80,7 @@ class Rescue:
 
 
 def before_anything_else(devices: BenchDevices, by: str) -> Rescue | None:
-    """Make safe what a dead process left; None where nothing had to be done. Needs neither database nor disk space.
+    """Make devices safe that a dead process left unsafe; None where they were safe. Needs no database or disk space.
 
     Where another process has the devices' link it is left alone: that one drives them.
     """
@@ -92,7 +92,7 @@ def before_anything_else(devices: BenchDevices, by: str) -> Rescue | None:
 
 
 def over_the_jobs_link(session: DrivingSession) -> tuple[tuple[str, ...], bool]:
-    """Make devices safe over the link of a job; what failed, and whether a new link may help against all of it."""
+    """Make devices safe over the link of a job; return the failures, and whether a new link may avoid them all."""
     try:
         session.make_safe()
     except ExceptionGroup as group:

@@ -32,11 +32,11 @@ class ProcessIdentity:
         return self.host == HOST
 
     def alive(self) -> bool:
-        """Tell if the process lives; a process of another host cannot be checked, and counts as dead."""
+        """Return whether the process lives; a process of another host cannot be checked, and counts as dead."""
         return self.here and self.started != "" and _started(self.pid) == self.started
 
     def kill(self) -> bool:
-        """End it at once, as `kill -9` does; False where it was gone, or its number is another process's by now."""
+        """Kill the process, as `kill -9` does; False where it was gone, or its number is another process's by now."""
         if not self.alive():
             return False
         try:

@@ -56,7 +56,7 @@ class AskedOperator:
         self._then = then
 
     async def set_by_hand(self, angles: TableAngles, request: str) -> None:
-        """Ask, and wait for the answer as long as it takes. Raises `Stopped` where the person refuses."""
+        """Send the request, and wait for the answer without a limit. Raises `Stopped` where the person refuses."""
         self._prompts.ask(self._job_id, request, now())
         try:
             while (answer := self._prompts.answered(self._job_id)) is None:

@@ -21,13 +21,13 @@ AGAIN_S = 0.002
 
 
 class Unreadable(Exception):
-    """A record that is there and does not match its checksum."""
+    """Raised for a record that does not match its checksum."""
 
 
 def encoded(document: Mapping[str, Any]) -> bytes | None:
     """Encode a record: CRC-32, then the document as JSON, padded; None where the document is too long for one."""
     text = json.dumps(document, ensure_ascii=False)
-    body = text.encode(errors="backslashreplace")  # half a character becomes its escape, as JSON has it
+    body = text.encode(errors="backslashreplace")  # a lone surrogate becomes its JSON escape
     if len(body) > RECORD_BYTES - 16:
         return None
     return f"{zlib.crc32(body):08x} ".encode() + body + b" " * (RECORD_BYTES - 10 - len(body)) + b"\n"
@@ -60,7 +60,7 @@ def write_record(file: int, number: int, record: bytes) -> None:
 
 
 def preallocate(file: int, records: int) -> None:
-    """Give a file its full length, in blocks that are its own. Raises `OSError` where there is no room."""
+    """Give a file its full length, in allocated blocks. Raises `OSError` where there is no room."""
     size = os.fstat(file).st_size
     missing = records * RECORD_BYTES - size
     if missing > 0:  # zeros that are written, not a hole: a hole would need its blocks when it is filled

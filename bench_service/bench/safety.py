@@ -39,7 +39,7 @@ class Safety:
 
 
 class SafetyService:
-    """Asks a bench's devices, and the processes around them, on this host; of other hosts, the database."""
+    """Reads a bench's safety from its devices and processes on this host; for other hosts, from the database."""
 
     def __init__(
         self,
@@ -140,7 +140,7 @@ class SafetyService:
         if job is not None:
             try:
                 self._append(job, "note", now(), {"text": text, "by": self._by})
-            except NotFound:  # another database's job: the register was moved, or the database was
+            except NotFound:  # a job of another database: the register or the database was moved
                 return
 
 

@@ -107,7 +107,7 @@ class BenchSession:
     def stop(self) -> None:
         """Leave the step under way, with `Stopped` for its waiting caller; nothing more is recorded. From any thread.
 
-        It waits for nothing but the procedure's leaving, for `UNWIND_S`: neither for a database nor for the job's own
+        It waits only for the procedure to unwind, at most `UNWIND_S`: neither for a database nor for the job's own
         thread, which may hang in one.
         """
         self._stopped.set()
@@ -121,7 +121,7 @@ class BenchSession:
 
     def make_safe(self) -> None:
         """Close the procedure, then stop the table and switch the unit off. Raises an `ExceptionGroup` of failures,
-        and `Disconnected` where a device does not answer. Once it is safe a second time does nothing.
+        and `Disconnected` where a device does not answer. Once it is safe a second call does nothing.
         """
         with self._safety:
             if self._is_safe or self._closed:
@@ -166,7 +166,7 @@ class BenchSession:
             try:
                 return future.result(timeout=STOP_CHECK_S)
             except TimeoutError:
-                if future.done():  # this moment, or its own error was one
+                if future.done():  # it ended this moment, or its own error is a TimeoutError
                     return future.result()
             now_s = monotonic_s()
             passed_s = now_s - looked_s

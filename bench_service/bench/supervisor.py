@@ -105,13 +105,13 @@ class Supervisor:
             self._channel.receive(listening)
         try:
             return ending.is_set() or self.look(companion)
-        except Exception:  # a supervisor that ended would leave the bench alone
+        except Exception:  # the supervisor must outlive any defect
             log.exception("the supervisor of bench %s", self._bench_id)
             ending.wait(LOOK_S)
             return True
 
     def look(self, companion: bool = False) -> bool:
-        """Look once, and do what must be done; False once a companion has nothing left to watch."""
+        """Look once, and act on it; False once a companion has nothing left to watch."""
         now_s = monotonic_s()
         driving, state = self._watch.driving(), self._devices.device_state()
         alive = driving is not None and driving.alive
@@ -135,7 +135,7 @@ class Supervisor:
         return not companion or alive or not self._may_leave(now_s, driving, state)
 
     def _may_leave(self, now_s: float, driving: Driving | None, state: DeviceState | None) -> bool:
-        """Tell if it may end: at once after an orderly end, later after a crash, never while the bench is not safe."""
+        """Return whether it may end: at once after an orderly end, later after a crash, never from an unsafe bench."""
         if self._unsaid or self._unsaid_stop is not None or (state is not None and not state.safe):
             return False
         assert self._gone_since_s is not None
@@ -177,7 +177,7 @@ class Supervisor:
         return ids
 
     def _end_hung(self, now_s: float, driving: Driving, state: DeviceState | None, words: frozenset[str]) -> None:
-        """Kill a worker that has the devices' link, leaves them unsafe, and does not answer, beat or get on."""
+        """Kill a worker that leaves the devices unsafe under its link, and is unresponsive, silent or hung."""
         if state is None or state.safe or not state.linked:
             self._patience.reset(now_s)
             return

@@ -1,7 +1,7 @@
 """Time limits that a supervisor sets a worker whose bench is not safe: one that leaves a stop unanswered, gives no
 heartbeat, or has seen a stop and does not get the bench safe.
 
-Times are counted look by look on the supervisor's own clock, so neither a clock that jumps nor a supervisor that was
+Delays are summed look by look on the supervisor's own clock, so neither a clock that jumps nor a supervisor that was
 held up itself makes a worker late.
 """
 

@@ -51,7 +51,7 @@ class StepLimit(Document):
         return bounds(self.minimum, self.maximum, self.unit)
 
     def excludes(self, other: "StepLimit") -> bool:
-        """Tell if every value that passes the other limit of the same quantity is below this one's minimum."""
+        """Return whether every value that passes the other limit of the same quantity is below this one's minimum."""
         if other.quantity != self.quantity or self.minimum is None or other.maximum is None:
             return False
         try:

@@ -148,7 +148,7 @@ class Conductor:
             if step.job_id is None:
                 return transitions.submitted(run, index, self._submitted(run, index).id)
             return self._followed(run, index, late)
-        except (StorageFull, StorageFailure, Overloaded):  # nothing can be noted now: the next look tries again
+        except (StorageFull, StorageFailure, Overloaded):  # nothing can be stored now: the next look tries again
             raise
         except (NotDriving, BenchBusy) as error:  # not the step's fault
             return transitions.waiting(run, str(error))

@@ -175,7 +175,7 @@ def _first(error: ValidationError, where: str) -> BadParameter:
 
 
 def _require_known(step: Step, where: str, names: tuple[str, ...] | None) -> None:
-    """Refuse a limit or trend on something that the result can never have, where that is known."""
+    """Refuse a limit or trend on a quantity that the result can never have, where its quantities are known."""
     if names is None:
         return
     for kind, wanted in (("limits", step.limits), ("trends", step.trends)):

@@ -32,7 +32,7 @@ class Judgement:
 def judge(step: Step, campaign: Campaign, result: StoredResult, stores: Stores) -> Judgement:
     """The result's own verdict, made worse where the campaign's requirements are not met.
 
-    A limit on something that the result does not have, or has in another kind of unit, is an error of the step.
+    A limit on a quantity that the result lacks, or has in another kind of unit, is an error of the step.
     """
     own = checks_of(result.document)
     warnings = list(result.document.get("warnings", []))

@@ -22,7 +22,7 @@ class StepLineage:
     """State of the job, or of the step of a method."""
     result: str | None
     recordings: tuple[tuple[str, str], ...]
-    """(id, content hash) of each recording that the result rests on, or that the job made before it broke off."""
+    """(id, content hash) of each recording that the result is based on, or that the job made before it broke off."""
     calibrations: tuple[str, ...]
     """Ids of the calibrations that were used."""
     parameters: dict[str, Any]

@@ -50,7 +50,7 @@ class StepRun:
     attempt: int = 0
     """Number of the present attempt; 0 before the first."""
     decided: bool = False
-    """The present attempt is decided on, so its job may be there even where `job_id` does not know it yet."""
+    """True once the present attempt is decided: its job may exist even where `job_id` is not set yet."""
     job_id: str | None = None
     result_id: str | None = None
     earlier_jobs: tuple[str, ...] = ()
@@ -68,7 +68,7 @@ class StepRun:
 
 @dataclass(frozen=True)
 class CampaignRun:
-    """One execution, with the campaign as it was at the time of the request."""
+    """The progress of one execution, with the campaign as it was at the time of the request."""
 
     id: str
     campaign: Campaign

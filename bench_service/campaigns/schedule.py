@@ -88,7 +88,7 @@ def starts_after(cron: str, time_zone: str, moment: datetime) -> Iterator[dateti
 
 
 def _at_fixed_times(cron: str) -> bool:
-    """Tell if an expression means times on the wall clock, not every so many minutes or hours."""
+    """Return whether an expression means times on the wall clock, not every so many minutes or hours."""
     return not any(part.startswith("*") for part in cron.split()[:2])
 
 
@@ -127,7 +127,7 @@ def next_start(cron: str, time_zone: str, moment: datetime) -> datetime:
 
 
 def latest_due(schedule: Schedule, at: datetime) -> datetime:
-    """The latest start that is not after `at`, of a schedule whose next start is not either."""
+    """The latest start up to `at` of a schedule that is due, that is, whose next start is not after `at`."""
     assert schedule.next_at is not None
     latest = schedule.next_at
     for begin in (max(schedule.next_at, at - LOOK_BACK), schedule.next_at):

@@ -3,8 +3,8 @@
 At most one run starts however many starts were due, for the latest of them. It is on time until `start_within_s` after
 it was planned; later than that it was missed, and the schedule's rule decides if one run makes up for it. While the
 schedule's previous run is open, its rule decides if the new one waits or is left out. The next start moves on in the
-transaction that stores the run, so of several processes one starts it. A clock that is set back repeats nothing: a
-start that was seen is in the schedule's past.
+transaction that stores the run, so of several processes one starts it. A clock that is set back repeats no start:
+a start that was handled is in the schedule's past.
 """
 
 import logging

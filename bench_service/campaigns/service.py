@@ -61,7 +61,7 @@ class CampaignService:
         return Page(shown, shown[-1].name if len(names) > limit else None)
 
     def add(self, campaign: Campaign, key: str | None = None) -> Campaign:
-        """Store a campaign once it was examined. Raises `NameTaken`, and what `examine` raises."""
+        """Store a campaign once it was examined. Raises `NameTaken`, and the errors of `examine`."""
         idempotency = None if key is None else Idempotency(f"campaigns:{key}", fingerprint(campaign.model_dump()))
         if self._stores.keys.made(idempotency, "campaign") is not None:
             return self._stores.campaigns.get(campaign.name)

@@ -1,4 +1,4 @@
-"""Campaigns that come with the service. They cannot be changed, only taken as a model for others."""
+"""Campaigns that come with the service. They cannot be changed, only copied."""
 
 from collections.abc import Mapping
 from functools import cache

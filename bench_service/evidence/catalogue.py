@@ -1,4 +1,4 @@
-"""The catalogue of procedures and methods, read when it is first wanted: that imports all of the numerics."""
+"""The catalogue of procedures and methods, read at its first use, because that imports all of the numerics."""
 
 import logging
 from collections.abc import Mapping

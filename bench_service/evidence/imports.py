@@ -17,7 +17,7 @@ from procedures.core.recording import RecordingInfo
 from procedures.core.unit import Unit
 
 CRASHED_IMPORT = timedelta(hours=1)
-"""An import that is not sealed after this long will never be: its process is gone."""
+"""Age at which an unsealed import counts as orphaned: its process is gone."""
 
 
 class ImportService:
@@ -32,7 +32,7 @@ class ImportService:
         self._reader.close()
 
     def discard_crashed(self) -> int:
-        """Remove imports that a crash left unsealed; the number removed."""
+        """Remove imports orphaned by a crash; return their number."""
         return self._stores.recordings.discard_open_imports(now() - CRASHED_IMPORT)
 
     def import_recording(

@@ -15,7 +15,7 @@ from procedures.core.recording import RawArray, Recording, RecordingInfo
 
 
 class RecordingWriter(Protocol):
-    """A recording while it is made. Chunks are committed as they fill; nothing is listed before `seal`."""
+    """Writer of one recording. Chunks are committed as they fill; the recording is not listed before `seal`."""
 
     def write(self, block: RawArray) -> None:
         """Append samples, shape (n, channels), in the order of the channels. Raises `StorageFull`."""

@@ -65,7 +65,7 @@ class JobEngine(Protocol):
 
 
 class Dispatcher:
-    """Gives one bench its jobs, one after the other, in a thread of its own."""
+    """Runs the jobs of one bench, one after the other, in a thread of its own."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class Dispatcher:
     ) -> None:
         """Set up to look at the queue every `poll_s` seconds for jobs that other processes put there.
 
-        `stopped`: tells if the bench is stopped over its host's stop channel, of which the database may not know yet.
+        `stopped`: returns whether the bench is stopped over its host's stop channel; the database may not know yet.
         """
         self._stopped = stopped
         self._bench_id = bench_id
@@ -102,7 +102,7 @@ class Dispatcher:
         self._wake.set()
 
     def lease_held(self) -> bool:
-        """Tell if this process holds the bench's lease now."""
+        """Return whether this process holds the bench's lease now."""
         return self._lease.held()
 
     def shut_down(self) -> None:
@@ -121,12 +121,12 @@ class Dispatcher:
                 self._ending.wait(RETRY_S)
             except ShuttingDown:
                 return
-            except Exception:  # the engine's own books; a dispatcher that ended would strand every job
+            except Exception:  # of the engine's own database; a dispatcher that ended would strand every job
                 log.exception("the dispatcher of bench %s", self._bench_id)
                 self._ending.wait(RETRY_S)
 
     def _one(self) -> bool:
-        """Claim and run the next job; False where there is none."""
+        """Claim and run the next job, or interrupt it; False where nothing was done."""
         if not self._lease.held() and not self._lease.regain():
             return False
         queue = self._stores.queue.front(self._bench_id, now())

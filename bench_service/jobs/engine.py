@@ -1,4 +1,4 @@
-"""The job engine, DBOS, behind four verbs. The only file that knows it.
+"""The job engine, DBOS, behind four verbs. The only file that imports it.
 
 Jobs wait in the service's own table (`bench_service.jobs.dispatcher`); here a claimed job is run, as a workflow that
 survives the process: one step per station, steps that may be repeated. An operator's cancel is a flag of the service
@@ -26,7 +26,7 @@ from bench_service.model.job import Failure, Job
 from bench_service.telemetry.defects import described
 
 PROCEDURE_ABI = "1"
-"""Raise it when stored workflows can no longer be continued by this code."""
+"""Version of the workflows' contract: raise it when this code can no longer continue stored workflows."""
 SHUT_DOWN_S = 20.0
 """Time that the running job may take to leave the bench safe when the service ends [s]."""
 RETRY_S = 0.5
@@ -131,7 +131,7 @@ class Engine:
             return Unfinished()
         if status.app_version != self._version:
             if status.status in ALIVE:
-                DBOS.cancel_workflow(status.workflow_id)  # an older version that came back would go on with it
+                DBOS.cancel_workflow(status.workflow_id)  # or an older version that is started again would resume it
             begun = f"begun by version {status.app_version} of the procedures, this is {self._version}"
             return Unfinished(gone=Failure("OtherVersion", begun))
         if status.status in ALIVE:

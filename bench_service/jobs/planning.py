@@ -42,7 +42,7 @@ class Planner:
         self._units = units
 
     def context(self, unit: str, bench: str | None = None) -> Context:
-        """The unit and bench as known now. Raises `NotFound` for an unknown bench, `NotMounted` for an unknown unit."""
+        """The unit and bench as known now. Raises `NotFound` for an unknown bench, `NotMounted` for a unit not on it."""
         description = self.benches.description(self.benches.default() if bench is None else bench)
         return Context(self.unit(unit, description.id), description)
 
@@ -70,7 +70,7 @@ class Planner:
         return Plan(procedure, parameters, context, stations, prediction, data_bytes, violations)
 
     def refreshed(self, context: Context) -> Context:
-        """The same bench, and the unit as it is known now: its noise, and the calibration that is current."""
+        """Refresh a context's unit: its noise, and the calibration that is current; the bench stays the same."""
         return replace(context, unit=self._units.unit(context.unit.serial))
 
 
@@ -99,7 +99,7 @@ def _violations(station: Station, bench: BenchDescription) -> tuple[str, ...]:
 
 def _samples(station: Station, unit: Unit) -> int:
     """Number of samples of all channels; a profile counts for its expected time."""
-    if station.current_ma is not None:  # a converter alone: three channels and its own sensor, after it has soaked
+    if station.current_ma is not None:  # a converter alone: three channels and its own sensor, after its soak
         return round(station.record_s * (station.sample_rate_hz or unit.sample_rate_hz)) * 4
     seconds = station.record_s if station.profile is None else station.profile.expected_s()
     channels = len(unit.channels) + TEMPERATURE_CHANNELS * station.temperatures

@@ -102,7 +102,7 @@ class BenchQueue:
         return f"behind {ahead} jobs; the last of them is {last}"
 
     def _of_others(self, entry: QueueEntry) -> Iterator[Reservation]:
-        """Reservations of its bench or unit by another holder than that of the job's own reservation."""
+        """Reservations of the job's bench or unit by holders other than that of its own reservation."""
         mine = next((r.holder for r in self.reservations if r.id == entry.reservation), None)
         for reservation in self.reservations:
             concerned = {Reserved.BENCH: self.bench, Reserved.UNIT: entry.unit}[reservation.kind]
@@ -114,7 +114,7 @@ class QueueStore(Protocol):
     """The stored queues of all benches. Every method is one transaction."""
 
     def look(self, bench: str, at: datetime) -> BenchQueue:
-        """A bench's queue now."""
+        """The whole queue of a bench now."""
         ...
 
     def front(self, bench: str, at: datetime) -> BenchQueue:

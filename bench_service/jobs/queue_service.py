@@ -77,14 +77,14 @@ class QueueService:
         return self._stores.reservations.add(made, key)
 
     def give_back(self, reservation_id: str) -> Reservation:
-        """End a reservation before its time. Raises `NotFound`."""
+        """End a reservation early. Raises `NotFound`."""
         kept = self._stores.reservations.end(reservation_id, now())
         for bench_id in (kept.name,) if kept.kind is Reserved.BENCH else self._benches.ids():
             self._wake(bench_id)
         return kept
 
     def usable(self, reservation_id: str, bench: str, unit: str) -> None:
-        """Refuse a job under a reservation that does not hold, or is of something else. Raises `BadParameter`."""
+        """Refuse a reservation that does not hold, or is for another bench or unit. Raises `BadParameter`."""
         try:
             found = self._stores.reservations.get(reservation_id)
         except NotFound:

@@ -31,7 +31,7 @@ class Reservation:
     """Time when its holder gave it back early."""
 
     def active(self, at: datetime) -> bool:
-        """Tell if it holds at a moment: the one place where a reservation's end is compared with a clock."""
+        """Return whether it holds at a moment: the one place where a reservation's end is compared with a clock."""
         return self.ended_at is None and at < self.until
 
     @property

@@ -9,7 +9,7 @@ from bench_service.wall_clock import now
 RETRY_PAUSES_S = (10.0, 30.0, 60.0, 120.0, LONGEST_PAUSE_S)
 """Pause before a job's first, second, … retry after a fault of the bench [s]."""
 DATABASE_FAULTS = frozenset({"StorageFailure", "LeaseLost"})
-"""Kinds of failure that a restart of the database leaves in a running job."""
+"""Kinds of failure that a restart of the database causes in a running job."""
 DATABASE_PAUSE_S = 1.0
 """Pause before such a job is retried [s]."""
 MOST_ATTEMPTS = 20

@@ -59,11 +59,11 @@ class JobRunner:
         retry_scale: float = 1.0,
         stopped: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Set up with `lease_held`: tells if this process still holds the bench's lease; asked before every station.
+        """Set up with `lease_held`: returns whether this process holds the bench's lease; called before every station.
 
         `live`: the board for the bench's live state; None: it is not published.
         `retry_scale`: factor on the pauses before a retry; less than 1 where bench time is not real time.
-        `stopped`: tells if the bench is stopped over its host's stop channel; asks no database.
+        `stopped`: returns whether the bench is stopped over its host's stop channel; asks no database.
         """
         self._stores = stores
         self._planner = planner
@@ -177,7 +177,7 @@ class JobRunner:
     def conclude(self, job_id: str) -> StepOutcome:
         """Analyse, store the result and its calibrations, and end the job with the verdict; may be repeated."""
         job = self._stores.jobs.get(job_id)
-        if job.state is not JobState.RUNNING:  # a crash came after its end was noted, or it is another attempt's by now
+        if job.state is not JobState.RUNNING:  # a crash came after its end was stored, or another attempt has begun
             return StepOutcome()
         procedure = self._planner.catalogue.procedure(job.procedure)
         try:
@@ -198,7 +198,7 @@ class JobRunner:
     def end_early(self, job_id: str, outcome: StepOutcome) -> Job:
         """End a job that was cancelled or failed, retry it, or pause it; its complete recordings are kept."""
         job = self._stores.jobs.get(job_id)
-        if job.state is not JobState.RUNNING:  # its end was noted, though the answer to that was lost
+        if job.state is not JobState.RUNNING:  # its end was stored, though the acknowledgement was lost
             return job
         self._stores.recordings.interrupt_open(job_id)
         if outcome.paused:
@@ -239,7 +239,7 @@ class JobRunner:
         return StepOutcome(Failure("NotSafe", text))
 
     def _stop_wanted(self, job_id: str) -> bool:
-        """Tell if the job was cancelled or its bench stopped, through any process.
+        """Return whether the job was cancelled or its bench stopped, through any process.
 
         A database that does not answer now, because it is restarted, counts as no stop: the recording goes on. A stop
         on the bench's own host does not depend on it.

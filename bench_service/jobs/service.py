@@ -68,21 +68,21 @@ class JobService:
         return stored
 
     def cancel(self, job_id: str) -> Job:
-        """Ask a job to end. Raises `IllegalTransition` where it has ended."""
+        """Request a job's cancellation. Raises `IllegalTransition` where it has ended."""
         return self._stores.jobs.request_cancel(job_id, now())
 
     def pause(self, job_id: str) -> Job:
-        """Put a job aside, a running one before its next station. Raises `IllegalTransition` where it has ended."""
+        """Pause a job, a running one before its next station. Raises `IllegalTransition` where it has ended."""
         return self._stores.jobs.request_pause(job_id, now())
 
     def resume(self, job_id: str) -> Job:
-        """Go on with a job that can be resumed, with the stations that remain. Raises `IllegalTransition`."""
+        """Resume a job with the stations that remain. Raises `IllegalTransition`."""
         job = self._stores.jobs.resume(job_id, now())
         self._wake(job.bench)
         return job
 
     def set_priority(self, job_id: str, priority: int) -> Job:
-        """Change the place of a queued job. Raises `IllegalTransition` where it is not queued."""
+        """Change the priority of a queued job. Raises `IllegalTransition` where it is not queued."""
         return self._stores.queue.set_priority(job_id, priority, now())
 
     def running_job(self, bench_id: str) -> QueueEntry | None:

@@ -117,9 +117,9 @@ class StopService:
         return released
 
     def release_only(self, bench_id: str, by: str, remark: str) -> None:
-        """Release the only stop that stands; nothing where none does.
+        """Release the only stop that stands; without one nothing is changed.
 
-        Raises `SeveralStops` where more than one stands, and what `release` raises.
+        Raises `SeveralStops` where more than one stands, and the errors of `release`.
         """
         self._benches.description(bench_id)
         standing = self._stores.benches.standing_stops(bench_id)

@@ -4,7 +4,7 @@ ServiceError
 ├── NotFound             no such job, recording, result, unit, bench, procedure, method
 ├── IllegalTransition    the job's state does not allow it
 ├── IdempotencyConflict  the key was used before with another request
-├── NameTaken            a campaign of that name is there already
+├── NameTaken            a campaign of that name exists already
 ├── BenchBusy            another process drives this bench
 ├── Misconfigured        a file that the settings name cannot be used
 ├── NotDriving           this process drives no bench

@@ -60,7 +60,7 @@ LEGAL: dict[JobState, frozenset[JobState]] = {
 
 FAULTS = (BenchError, NotSettled, SoakNotReached, NotPowered, DeviceFault, DeviceBusy, Disconnected)
 BENCH_FAULTS = frozenset(fault.__name__ for fault in FAULTS)
-"""Kinds of failure that are the bench's, and may be gone the next time; a demand out of range never will be."""
+"""Kinds of transient failure of the bench, which a retry may cure; a demand out of range is not one."""
 
 RESUMABLE = BENCH_FAULTS | {"NotSafe", "DeadlinePassed", "LeaseLost", "StorageFull", "StorageFailure", "OtherVersion"}
 """Kinds of failure after which the stations that remain, or the analysis, can still be done: after `OtherVersion` by
@@ -118,7 +118,7 @@ class Job(JobTerms):
 
     @property
     def resumable(self) -> bool:
-        """Tell if it can be queued again to continue where it ended."""
+        """Return whether it can be queued again to continue where it ended."""
         if self.state is JobState.FAILED:
             return self.failure is not None and self.failure.kind in RESUMABLE
         return self.state in (JobState.PAUSED, JobState.INTERRUPTED)

@@ -76,7 +76,7 @@ class NewRecording:
     gaps: bool = False
     """True where samples may be NaN, in the place of missing ones."""
     idempotency: Idempotency | None = None
-    """A client's key, remembered when the recording is sealed."""
+    """A client's idempotency key, stored when the recording is sealed."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class BenchStop:
 
     @property
     def stands(self) -> bool:
-        """Tell if the stop is not yet released."""
+        """Return whether the stop is not yet released."""
         return self.released_at is None
 
 

@@ -13,8 +13,8 @@ ROOT = Path(__file__).resolve().parents[2]
 def described(error: BaseException) -> str:
     """Kind, message and place of an error: `ValueError: boom (procedures/catalog/static_run.py, line 12, in analyse)`.
 
-    The place is the innermost one in a catalogue file, where an author looks first, with the one in this project's
-    other code that raised; of a syntax error, the error's own.
+    The place is the innermost one in a catalogue file, where an author looks first, and the one in this project's
+    other code that raised; for a syntax error, the error's own.
     """
     kind = f"{type(error).__name__}: {error.msg if isinstance(error, SyntaxError) else error}".strip(": ")
     places = _places(error)

@@ -20,7 +20,7 @@ PAGE = 5000
 RECORDINGS_S = 30.0
 """Maximum age of the sum over all recordings [s]: it walks an index."""
 DURATION_S = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5)
-"""Upper ends of the buckets of durations and waits [s]; a last one has no end."""
+"""Upper ends of the buckets of durations and waits [s]; one more bucket has no upper end."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Spread:
 
 
 class Tallies:
-    """The counts of this process, brought up to date at each scrape."""
+    """The counts of this process, updated at each scrape."""
 
     def __init__(self, store: TallyStore) -> None:
         self.store = store

@@ -1,6 +1,6 @@
 """Traces of jobs (job → station → analysis), sent to an OpenTelemetry collector where one is configured.
 
-All spans of a job, whichever process makes them, belong to one trace whose id is the job's: a job that outlives its
+All spans of a job, from any process, belong to one trace whose id is the job's: a job that outlives its
 worker is still one trace. The span of the job itself is written at its end, under an id that its parts know beforehand.
 OpenTelemetry is imported only where traces are wanted; a collector that fails costs a line in the log.
 """

@@ -1,7 +1,7 @@
 """Publishes a session's live state: progress, devices, a few samples. Lives in the bench's own thread.
 
 Everything here is bounded: at most one block in `LOOK_S` of real time is looked at, however fast the samples come, and
-only the last `STRETCHES` are kept. It reads devices, and asks nothing of them.
+only the last `STRETCHES` are kept. It reads devices, and commands none.
 """
 
 from collections import deque
@@ -114,7 +114,7 @@ class LiveTap:
 
 
 def _channel(channel: Channel, rates: Array) -> LiveChannel:
-    """`rates` is (stretches, 3): those of the least, the mean and the greatest count."""
+    """One channel's live values from `rates`, shape (stretches, 3): of the least, the mean and the greatest count."""
     low, mean, high = rates.T
     if channel.scale < 0.0:
         low, high = high, low
@@ -122,7 +122,7 @@ def _channel(channel: Channel, rates: Array) -> LiveChannel:
 
 
 def _shares(stations: tuple[Station, ...], duration_s: float) -> tuple[float, ...]:
-    """The planned bench time [s] of each station: what it declares, moves spread over all of them alike."""
+    """The planned bench time [s] of each station: its declared durations, plus an equal share of all moves."""
     declared = [s.power_off_s + s.settle_s + s.record_s for s in stations]
     rest = (duration_s - sum(declared)) / len(stations) if stations else 0.0
     if rest >= 0.0:

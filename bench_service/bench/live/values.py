@@ -59,7 +59,7 @@ class LiveSamples:
     """A few of the last stretches of the recording: enough for a live plot, never the data."""
 
     start_s: tuple[float, ...]
-    """Bench time of each stretch's beginning."""
+    """Bench time of each stretch's beginning [s]."""
     stop_s: tuple[float, ...]
     channels: tuple[LiveChannel, ...]
 
@@ -78,9 +78,9 @@ class LiveJob:
     fraction: float
     """Part of the planned bench time that is over, 0 … 1."""
     eta_s: float
-    """Bench time left, by the plan."""
+    """Bench time left, by the plan [s]."""
     eta_wall_s: float | None
-    """Real time left at the rate so far, without the analysis; None: nothing has passed yet."""
+    """Real time left at the rate so far, without the analysis [s]; None: no bench time has passed yet."""
     bench_s_per_s: float | None
     """Seconds of bench time in a second of real time, since this process opened the bench."""
 
@@ -105,7 +105,7 @@ class BenchLive:
         return max(0.0, (at - self.at).total_seconds())
 
     def there(self, at: datetime) -> bool:
-        """Tell if a driver is alive, judged by the age of its last heartbeat.
+        """Return whether a driver is alive, judged by the age of its last heartbeat.
 
         A heartbeat dated more than `SEEN_S` in the future comes from before the clock was set back, and counts as
         stale: a living driver writes a new one.

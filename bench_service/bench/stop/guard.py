@@ -2,7 +2,7 @@
 
 A thread of its own that needs no database and no free disk. Whatever else the process waits for, a stop that came by
 the channel is seen here, and the bench made safe in yet another thread. Where not even this thread gets to run, the
-supervisor, another process, misses the answer and ends this one.
+supervisor, another process, sees no answer and kills this one.
 """
 
 import logging
@@ -77,7 +77,7 @@ class StopGuard:
                 self._look()
                 if woken:
                     self._wake()
-            except Exception:  # a guard that ended would guard nothing
+            except Exception:  # the guard must outlive any defect
                 log.exception("the stop guard of bench %s", self._channel.bench_id)
                 self._ending.wait(LOOK_S)
 

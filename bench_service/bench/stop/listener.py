@@ -1,7 +1,7 @@
 """The supervisor's listener: it enters a stop from an API on another host into the bench's channel.
 
-It can do nothing else: it releases nothing and gives away nothing but whether the bench is safe. Connections are few
-and short; where more come than it has room for, the oldest goes.
+It can do nothing else: it releases no stop, and discloses only whether the bench is safe. Connections are few
+and short; beyond their limit, the oldest is closed.
 """
 
 import json

@@ -3,7 +3,7 @@
 Lines of JSON over TCP. The supervisor begins with a number that it never uses again; the API's stop and the
 supervisor's answer each carry an HMAC-SHA-256, under a secret that both have, over that number, one of the API's own,
 and the text. So an intercepted stop cannot be replayed, an answer cannot be forged, and neither side
-needs a clock that is right. The text itself is no secret, and is not hidden.
+needs a correct clock. The text itself is no secret, and is not hidden.
 """
 
 import hashlib

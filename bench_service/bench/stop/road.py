@@ -1,6 +1,6 @@
 """The way of a stop to its bench: the stop channel of this host, or the listener of the supervisor on another one.
 
-Neither needs the database. Where a bench's supervisor listens is learned while the database is well, and kept in
+Neither needs the database. The address of a bench's supervisor is read while the database answers, and kept in
 memory (`StopAddresses`).
 """
 
@@ -64,8 +64,8 @@ class StopRoads:
         self._channels: dict[str, StopChannel] = {}
 
     def channel(self, bench_id: str) -> StopChannel | None:
-        """The stop channel of a bench on this host; None where it has none here. Kept open: a stop needs no
-        descriptor that may be lacking then.
+        """The stop channel of a bench on this host; None where it has none here. Kept open, so that a stop
+        needs no new file descriptor.
         """
         with self._mutex:
             found = self._channels.get(bench_id)
@@ -73,7 +73,7 @@ class StopRoads:
                 found = StopChannel(self._folder, bench_id)
                 if not found.exists:
                     return None
-                with suppress(OSError):  # of a bench that an older version drove; else it is whole already
+                with suppress(OSError):  # for a bench that an older version drove; else the file is complete already
                     found.prepare()
                 self._channels[bench_id] = found
             return found
