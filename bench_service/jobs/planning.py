@@ -42,7 +42,7 @@ class Planner:
         self._units = units
 
     def context(self, unit: str, bench: str | None = None) -> Context:
-        """The unit and bench as known now. Raises `NotFound` for an unknown bench, `NotMounted` for a unit not on it."""
+        """The current unit and bench. Raises `NotFound` for an unknown bench, `NotMounted` for a unit not on it."""
         description = self.benches.description(self.benches.default() if bench is None else bench)
         return Context(self.unit(unit, description.id), description)
 
