@@ -1,4 +1,4 @@
-"""How far noise that nobody knows must be scaled up before the residuals of a fit are likely."""
+"""Scale factor that unknown noise needs before the residuals of a fit are likely."""
 
 import numpy as np
 from scipy.linalg import eigh

@@ -29,7 +29,7 @@ _TURNS = (
 
 @dataclass(frozen=True)
 class TriadPlan:
-    """One triad at the stations of a plan: what it will see, what is known of its noise, and the table's flaws."""
+    """One triad at the stations of a plan: its input vectors, its noise as far as known, and the table's flaws."""
 
     triad: str
     unit: Unit
@@ -41,11 +41,11 @@ class TriadPlan:
     matrix: Array
     """K as far as known: of the current calibration, else the identity (nominal outputs)."""
     calibrated: bool = False
-    """Whether K is of a calibration."""
+    """True if K comes from a calibration, not from nominal outputs."""
     weighting: Weighting = "noise_and_table"
 
     def noise_covariance(self, dwell_s: float | None = None) -> Array | None:
-        """Of the station means, (3, n, n), at the planned dwell or another; None where the noise is not known."""
+        """Covariance of the station means, (3, n, n), at the planned or another dwell; None for unknown noise."""
         stations = [s if dwell_s is None else replace(s, record_s=dwell_s) for s in self.stations]
         return triad_covariance(self.unit.triad(self.triad), windows(stations, self.axes))
 
@@ -55,7 +55,7 @@ class TriadPlan:
         return estimator(f"the {self.triad} coefficients", self.vectors, noise_covariance, flaws)
 
     def share(self, plan: Estimator) -> TableShare:
-        """What the table's flaws add."""
+        """Contribution of the table's flaws to the coefficients of this plan."""
         return table_share(plan, self.table.of_outputs(self.matrix), self.table)
 
 
@@ -67,7 +67,7 @@ class Requirement:
     name: str
     columns: tuple[int, ...]
     limit: float
-    """SI; relative for a scale factor."""
+    """Limit in SI units; relative for a scale factor."""
     display: str
     display_size: float
 
@@ -109,7 +109,7 @@ def parts_by_noise(plan: TriadPlan, noise_covariance: Array) -> tuple[Array, Arr
 
 
 def basis(plans: Sequence[TriadPlan]) -> str:
-    """What the predicted uncertainties of a unit rest on: its calibration, or its nominal scale factors."""
+    """Basis of a unit's predicted uncertainties: its calibration, or its nominal scale factors."""
     nominal = [plan.triad for plan in plans if not plan.calibrated]
     if len(nominal) == len(plans):
         return "nominal scale factors: the unit has no calibration yet; uncertainties scale with the true ones"

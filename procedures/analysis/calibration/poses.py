@@ -16,7 +16,7 @@ from procedures.core.recording import TRIADS, Recording
 from procedures.core.unit import Unit
 
 _SMALLEST_SD = 1e-9
-"""Of the largest reading: the noise of pose means that nothing is known of, before it is scaled to the residuals."""
+"""Noise assumed for pose means of unknown noise, relative to the largest reading, before scaling to the residuals."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Poses:
     noise: Array
     """Covariance by channel, (3, n, n)."""
     known: bool
-    """Whether that comes from the unit's record."""
+    """True if the noise comes from the unit's record."""
     slow: float
     """Share of slow noise, of noise that is not known."""
     output_unit: str

@@ -34,7 +34,7 @@ class Scatter:
     value_sds: tuple[float, ...] = ()
 
     def resolves(self, limit: float) -> bool:
-        """Whether the measurement is finer than a limit on the standard deviation."""
+        """True if the measurement is finer than a limit on the standard deviation."""
         return self.expected_from_measurement < limit
 
 

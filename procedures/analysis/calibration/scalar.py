@@ -46,7 +46,7 @@ class ScalarFit:
     """In the order of `PARAMETERS`."""
     covariance: Array
     condition: float
-    """Of the linear system of thesis 3.23 at these stations, columns scaled."""
+    """Condition number of the linear system of thesis 3.23 at these stations, columns scaled."""
     residuals: Array
     """|v̂| − reference [SI], shape (n,)."""
     residual_sd: Array
@@ -59,7 +59,7 @@ class ScalarFit:
 
     @property
     def standard_uncertainties(self) -> Array:
-        """Shape (9,)."""
+        """Standard uncertainties of the nine parameters, shape (9,)."""
         return np.sqrt(np.diagonal(self.covariance))
 
     @property

@@ -1,4 +1,4 @@
-"""One recording a station in, one mean output a channel out, with what the dwell itself says of its scatter."""
+"""Reduce one recording a station to one mean output a channel, with its scatter as observed within the dwell."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,13 +35,13 @@ class StationMeans:
     output_unit: str
     """"rad/s", "m/s^2" or "count"."""
     outputs: Array
-    """Shape (n, 3)."""
+    """Mean nominal outputs, shape (n, 3)."""
     scatter_sd: Array
     """Standard deviation of single samples within the dwell, shape (n, 3)."""
     mean_sd: Array
     """Standard uncertainty of the mean from the scatter of batch means within the dwell, shape (n, 3)."""
     slow_excess: Array
-    """What slow noise adds to the variance of the mean (`slow_excess`), shape (n, 3)."""
+    """Excess variance of the mean due to slow noise (`slow_excess`), shape (n, 3)."""
     windows: Array
     """[start, stop] of each dwell since the first one's launch [s], shape (n, 2)."""
     counts: tuple[int, ...]
@@ -172,7 +172,7 @@ def _batch_edges(seen: int, length: int, count: int) -> tuple[list[int], list[in
 
 
 def _refuse_frozen(recordings: Sequence[Recording], summaries: Sequence[_Summary], triad: str) -> None:
-    """A channel that never changes is dead if it says the same at every one of several stations; it is stuck if it
+    """Refuse a frozen channel: dead if it gives the same value at every one of several stations; stuck if it
     stands at a whole number other than zero at some and moves at others.
 
     A counter proves less than a sample does: across the Earth's rate it gives no pulse for minutes, and a quiet input

@@ -93,6 +93,6 @@ def pose_means(samples: Array, stretches: tuple[Stretch, ...], batches: int = 10
 
 
 def pose_excess(samples: Array, stretches: tuple[Stretch, ...], batches: int = 12) -> Array:
-    """What slow noise adds to the variance of every stretch's mean (`slow_excess`), shape (poses, 3)."""
+    """Excess variance of every stretch's mean due to slow noise (`slow_excess`), shape (poses, 3)."""
     parts = (np.array_split(samples[p.start : p.stop], batches) for p in stretches)
     return np.array([slow_excess(np.array([part.mean(axis=0) for part in pose])) for pose in parts]).reshape(-1, 3)

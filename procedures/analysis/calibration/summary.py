@@ -1,4 +1,4 @@
-"""What a calibration tells of one triad, as plain JSON-ready numbers."""
+"""Calibration results of one triad, as plain JSON-ready numbers."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -61,7 +61,7 @@ class ScalarCheck:
 
 @dataclass(frozen=True)
 class TriadSummary:
-    """Everything a calibration says of one triad."""
+    """Complete calibration results of one triad."""
 
     calibration: TriadCalibration
     coefficients: tuple[Coefficient, ...]
@@ -74,9 +74,9 @@ class TriadSummary:
     magnitudes: Magnitudes
     scalar: ScalarCheck | None = None
     weighting: Weighting = "noise"
-    """Results of procedure versions before 1.1.0 do not say: theirs is this."""
+    """Weights of the fit; results of procedure versions before 1.1.0 lack the field and were weighted by noise."""
     misfit: float | None = None
-    """Residuals over what noise and table allow; None where no equation is spare, or an older version did not say."""
+    """Residuals over what noise and table allow; None without a spare equation and in results of older versions."""
     worst: str = ""
     """Station and channel with the greatest residual."""
 
@@ -141,7 +141,7 @@ def scalar_check(fit: TriadFit, scalar: ScalarFit) -> ScalarCheck:
 
     Both are functions of the same outputs, so the difference has the covariance ``D·(C + F·Fᵀ)·Dᵀ`` with
     ``D = J·G_linear − G_scalar`` over all outputs of all channels, C noise and F the table's flaws; G_linear is the
-    estimator that made the fit, whatever its weights.
+    estimator that made the fit, with its own weights.
     """
     linear_gain = np.einsum("pk,kcn->pnc", observable_derivative(fit.coefficients), fit.estimator.gain)
     difference = linear_gain - scalar.gain

@@ -58,7 +58,7 @@ def analyse_means(
     weighting: Weighting = "noise_and_table",
     more: Array | None = None,
 ) -> tuple[TriadSummary, TriadFit]:
-    """Calibrate one triad from its station means; `more` is what else makes them uncertain beside noise, (3, n, n).
+    """Calibrate one triad from its station means; `more` is their covariance from causes other than noise, (3, n, n).
 
     Raises `UnfitRecording`, `Undetermined`.
     """
@@ -90,14 +90,14 @@ LEAST_SCATTER = 0.5
 
 @dataclass(frozen=True)
 class AccelerometerSettings:
-    """How accelerometers are calibrated."""
+    """Settings of the accelerometers' calibration."""
 
     with_scalar: bool = False
     weighting: Weighting = "noise_and_table"
     correction: ThermalCorrection | None = None
     """Brings their means to its reference temperatures first; None: they are taken as they are."""
     lag_s: tuple[float, float] = (0.0, 0.0)
-    """Of case and converter sensor."""
+    """Time constants of case and converter sensor [s]."""
 
 
 def analyse_accelerometers(
@@ -107,7 +107,7 @@ def analyse_accelerometers(
     record: TriadRecord | None,
     settings: AccelerometerSettings,
 ) -> tuple[TriadSummary, ThermalShare | None, tuple[str, ...]]:
-    """The accelerometers' summary; with a correction what that did to them, and what to know of its use.
+    """Calibrate the accelerometers; with a correction also return its effect on them and warnings about its use.
 
     Raises as `analyse_triad` and `bring_to_reference`.
     """
@@ -134,7 +134,7 @@ def noise_of_means(means: StationMeans, record: TriadRecord | None) -> tuple[Arr
 
 
 def scatter_covariance(outputs: Array, sd: Array) -> Array:
-    """Covariance (3, n, n) of means (n, 3) whose noise nobody knows, from their scatter (n, 3).
+    """Covariance (3, n, n) of means (n, 3) of unknown noise, from their scatter (n, 3).
 
     Where nothing scatters, a part in 10⁹ of the greatest output stands in, so that it can be weighed.
     """

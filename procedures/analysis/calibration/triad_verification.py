@@ -26,7 +26,7 @@ class TriadVerification:
 
     magnitudes: Magnitudes
     chi_square: float | None
-    """Of the errors after correction against their predicted covariance; None where the noise is not known."""
+    """Chi-square of the errors after correction against their predicted covariance; None for unknown noise."""
     p_value: float | None
     run_to_run_known: bool
     """False where the unit's record has no change from launch to launch: then the prediction holds in one launch

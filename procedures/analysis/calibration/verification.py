@@ -27,14 +27,14 @@ class Magnitudes:
     """None where the outputs are in counts: they have no magnitude."""
     after: tuple[float, ...]
     expected_sd: tuple[float, ...]
-    """Of the errors after correction; empty where the noise is not known."""
+    """Standard deviations of the errors after correction; empty where the noise is not known."""
     mean_error_before: float | None
     sd_before: float | None
     mean_error_after: float
     sd_after: float
     """Sample standard deviation over the stations, n − 1 (Tables 5.3, 5.4)."""
     per_axis: float
-    """``δ/√3`` (thesis 5.1): one axis's share of it, all three taken as alike."""
+    """Error per axis ``δ/√3`` (thesis 5.1): one axis's share, all three taken as alike."""
     per_axis_sd: float
     """Standard uncertainty of that figure, ``δ/√(2(n − 1))/√3``: independent errors of n stations."""
 
@@ -92,7 +92,7 @@ def error_covariance(
     noise_covariance: Array,
     record: TriadRecord | None,
 ) -> Array:
-    """Covariance (n, n) [SI²] of the errors of |v̂| to expect when the unit is switched on anew and verified.
+    """Covariance (n, n) [SI²] of the errors of |v̂| to expect when a unit is switched on again and verified.
 
     Three parts: the calibration's own covariance; the noise of the verification's dwells, `noise_covariance` (3, n, n);
     and the change of bias and scale factor between two launches by the unit's record, each of which departs from the
