@@ -166,7 +166,7 @@ STEP_C = 0.01
 
 
 def _of_correction(axis: AxisCorrection, v: Array, case: Array, converter: Array) -> Array:
-    """``J·Σ·Jᵀ`` (n, n): ``∂V₀/∂α = x·(V + B0 + B)/K0``, ``∂V₀/∂β = (1 + A/K0)·x``, x the powers of the departures."""
+    """Covariance ``J·Σ·Jᵀ`` (n, n): ``∂V₀/∂α = x·(V + B0 + B)/K0``, ``∂V₀/∂β = (1 + A/K0)·x``, x powers of Δ."""
     if not axis.covariance:
         return np.zeros((len(v), len(v)))
     dt, db = case - axis.case_reference_c, converter - axis.converter_reference_c

@@ -31,20 +31,20 @@ class FieldUncertainty:
     """Standard deviations of what is taken as known [rad, relative]."""
 
     angle_sd_rad: float = 0.0
-    """Of each turn at each position, anew."""
+    """Setting error of each turn at each position, independent."""
     tilt_covariance_rad2: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 0.0), (0.0, 0.0))
-    """Of (α₀, β₀) where they are not estimated."""
+    """Covariance of (α₀, β₀) where they are not estimated."""
     azimuth_sd_rad: float = 0.0
     cross_coupling_sd: float = 0.0
-    """Of each of the six neglected ones, relative to its channel's scale factor."""
+    """Standard deviation of each of the six neglected cross-couplings, relative to its channel's scale factor."""
     magnitude_relative_sd: float = 0.0
     scale_relative_sd: float = 0.0
-    """Of the nominal scale factor, where it is not estimated."""
+    """Relative standard deviation of the nominal scale factor, where it is not estimated."""
 
 
 @dataclass(frozen=True)
 class FieldModel:
-    """What is asked of the positions."""
+    """Model fitted to the positions: which parameters are estimated."""
 
     positions_rad: Array
     """(α, β), shape (n, 2)."""
@@ -67,11 +67,11 @@ class FieldFit:
 
     bias: Array
     scale: Array
-    """Both (3,); the scale is one where it was not estimated."""
+    """Bias and scale of each channel, (3,) each; the scale is one where it was not estimated."""
     tilt_rad: Array
     """(α₀, β₀), estimated or as given, shape (2,)."""
     covariance: Array
-    """Of (b, k, α₀, β₀), shape (8, 8); zero for what was not estimated, but for a nominal scale."""
+    """Covariance of (b, k, α₀, β₀), shape (8, 8); zero for fixed parameters, but for a nominal scale."""
     residuals: Array
     """Shape (n, 3), in the output's unit."""
     residual_sd: Array

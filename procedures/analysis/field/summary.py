@@ -1,4 +1,4 @@
-"""What a field calibration says of one triad, as plain JSON-ready numbers."""
+"""Results of a field calibration of one triad, as plain JSON-ready numbers."""
 
 from dataclasses import dataclass
 

@@ -59,7 +59,7 @@ def _hypotheses(outputs: Array, model: FieldModel) -> Iterator[tuple[Array, Arra
 
 
 def _line(outputs: Array, model: FieldModel, positions: Array) -> tuple[float, bool]:
-    """Root mean square residual of a line through each channel, and whether no slope is negative.
+    """Root mean square residual of a line through each channel, and True if no slope is negative.
 
     A channel whose input hardly changes has no slope of its own; one counts as negative beyond the noise alone.
     """

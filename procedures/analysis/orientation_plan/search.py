@@ -20,7 +20,7 @@ from procedures.core.arrays import Array
 Indices = NDArray[np.int64]
 
 _STEP_DEG = 1e-3
-"""Of the central differences."""
+"""Step of the central differences [deg]."""
 
 
 @dataclass(frozen=True)

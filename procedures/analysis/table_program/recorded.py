@@ -1,4 +1,4 @@
-"""What a program's recordings hold: dwell by dwell, the mean of every channel with its standard uncertainty."""
+"""Summary of a program's recordings: dwell by dwell, the mean of every channel with its standard uncertainty."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,12 +25,12 @@ class ChannelMean:
     standard_uncertainty: float | None
     """None where neither noise nor scatter is known: fewer samples than batches."""
     from_noise: bool
-    """Whether it comes from the unit's noise; else from the scatter of batch means, blind to noise slower than them."""
+    """True if it comes from the unit's noise; else from the scatter of batch means, blind to noise slower than them."""
 
 
 @dataclass(frozen=True)
 class DwellRecord:
-    """One dwell: where, how long, whether its recording is whole, and what it says."""
+    """Results of one dwell: position, duration, completeness of its recording, and the channel means."""
 
     station: int
     label: str

@@ -33,7 +33,7 @@ class ConverterSoaks:
     """Means of n soaks, in the order that they were measured."""
 
     target_c: Array
-    """Chamber's, (n,)."""
+    """Target temperatures of the chamber, (n,)."""
     sensor_c: Array
     """Converter's own sensor at +I and at −I, (n, 2)."""
     codes: Array
@@ -46,7 +46,7 @@ class Fitted:
 
     value: Normalised
     bic: tuple[float, ...]
-    """Of orders 1, 2, …; the chosen one is the least, unless the order was given."""
+    """Bayesian criterion of orders 1, 2, …; the chosen order has the least, unless the order was given."""
 
 
 @dataclass(frozen=True)

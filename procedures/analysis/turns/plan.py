@@ -21,7 +21,7 @@ from procedures.core.unit import Unit
 UPRIGHT = {"x": TableAngles(0.0, 90.0, 0.0), "y": TableAngles(), "z": TableAngles(0.0, 0.0, -90.0)}
 """Where each axis of the unit points upwards, along the table's outer axis."""
 MOST_TIMES_LONGER = 64
-"""A plan that would have to turn longer than so many times is said to get nowhere."""
+"""Factor on the turning time beyond which a plan is reported as hopeless."""
 
 
 @dataclass(frozen=True)
@@ -72,10 +72,10 @@ class TurnPlan:
     terms: tuple[Term, ...]
     reference_rad_s: float
     cross_coupling_sd: float = 0.0
-    """Of each cross-coupling of a unit that has no calibration."""
+    """Standard uncertainty of each cross-coupling of a unit without a calibration."""
 
     def estimator(self) -> TurnEstimator | None:
-        """What the plan will give; None where the unit's noise is not known. Raises `Undetermined`.
+        """Predicted estimator of the plan; None where the unit's noise is not known. Raises `Undetermined`.
 
         K is that of the current calibration, else the identity (nominal outputs) with cross-couplings of
         `cross_coupling_sd`: they carry the table's orthogonality into the scale factors.
@@ -98,7 +98,7 @@ class TurnPlan:
 
 
 def coefficient_names(terms: Sequence[Term]) -> tuple[str, ...]:
-    """Of all three channels: "b_x", "K11", …, "asymmetry_x", …"""
+    """Coefficient names of all three channels: "b_x", "K11", …, "asymmetry_x", …"""
     return tuple(
         f"K{number}{name[1]}" if name.startswith("K") else f"{name}_{axis}"
         for number, axis in enumerate(AXES, start=1)

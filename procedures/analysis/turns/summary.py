@@ -1,4 +1,4 @@
-"""What whole turns tell of a gyro triad, as plain JSON-ready numbers."""
+"""Results of whole turns for a gyro triad, as plain JSON-ready numbers."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from procedures.core.unit import TriadRecord
 PLAUSIBLE = 0.2
 """A channel that counts so much more or less than the turns made, relative, is not that of the turning axis."""
 LINEAR = 4
-"""Of each channel's parameters the first four: b and its row of K."""
+"""Number of each channel's linear parameters, which come first: b and its row of K."""
 
 
 @dataclass(frozen=True)
@@ -32,19 +32,19 @@ class RatePoint:
 
     axis: str
     rate_deg_s: float
-    """Signed."""
+    """Signed table rate [deg/s]."""
     turns: int
     departure: float
     """``(y − b·T − K·E)/(2πn·K·e) − 1``, relative: what asymmetry and nonlinearity are made of."""
     standard_uncertainty: float
-    """Of noise and table at this station alone."""
+    """Standard uncertainty of noise and table at this station alone."""
     modelled: float
     """The same by the fitted terms."""
 
 
 @dataclass(frozen=True)
 class WholeTurns:
-    """Everything that whole turns tell of a gyro triad."""
+    """Complete results of whole turns for a gyro triad."""
 
     coefficients: tuple[Coefficient, ...]
     calibration: TriadCalibration

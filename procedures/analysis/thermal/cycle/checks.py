@@ -22,7 +22,7 @@ class CycleLimits:
     gyro_random_walk_deg_sqrt_h: float
     gyro_bias_in_run_deg_h: float
     level: float
-    """Chance that three sound gyros together are said to depend on temperature."""
+    """Significance level: chance that three sound gyros together fail the temperature test."""
 
 
 def cycle_checks(cycle: ThermalCycle, limits: CycleLimits) -> tuple[Check, ...]:

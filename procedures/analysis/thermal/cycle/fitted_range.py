@@ -9,7 +9,7 @@ from procedures.core.thermal_correction import EXTRAPOLATED_C, TemperatureRange,
 
 
 def range_of(cells: Sequence[ThermalRun]) -> TemperatureRange:
-    """What the fit has seen."""
+    """Temperature range that the fit's cells cover."""
     case, board = (np.concatenate([getattr(c, name) for c in cells]) for name in ("case_c", "converter_c"))
     return TemperatureRange((float(case.min()), float(case.max())), (float(board.min()), float(board.max())))
 

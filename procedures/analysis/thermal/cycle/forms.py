@@ -1,4 +1,4 @@
-"""What a way to correct is worth on a cycle, and C's normalised polynomial to compare with (thesis tables 4.5, 3.2.3).
+"""Performance of each correction form on a cycle, and C's normalised polynomial to compare with (thesis 4.5, 3.2.3).
 
 A correction is worth what it leaves: 3σ at each soak about the run's own reference soak, and |ĝ| over the whole run.
 """
@@ -92,7 +92,7 @@ def worth(
 
 @dataclass(frozen=True)
 class NormalisedTriad:
-    """C: zero and scale of each axis as normalised polynomials of the case temperature, from soaks alone."""
+    """Model of C: zero and scale of each axis as normalised polynomials of the case temperature, from soaks alone."""
 
     zeros: tuple[Normalised, Normalised, Normalised]
     """Output at zero force, V0 + Fs(t) [m/s²]."""
@@ -133,7 +133,7 @@ def normalised_triad(
 
 
 def _soak_means(run: PreparedRun, soaked: RunSoaks, axis: int) -> Array:
-    """Of each soak of a run: case temperature, output of an axis, and the force along it, (3, n)."""
+    """Mean case temperature, output of an axis and force along it in each soak of a run, (3, n)."""
     each, force = soaked.of_leg.values(), run.cells.force_m_s2[axis]
     rows = [(s.case_c, float(np.mean(run.cells.output_m_s2[s.start : s.stop, axis])), force) for s in each]
     return np.array(rows, dtype=np.float64).reshape(-1, 3).T

@@ -41,13 +41,13 @@ class CycleSeries:
     sample_s: float
     since_launch_s: float
     gyro_rad_s: Array
-    """(n, 3)"""
+    """Gyro rates [rad/s], shape (n, 3)."""
     output_m_s2: Array
     """Nominal accelerometer outputs, (n, 3)."""
     sensors_c: Array
     """The unit's temperature sensors in the order of `SENSORS`, (n, 5)."""
     air_c: Array
-    """What the chamber said, (n,)."""
+    """Chamber's air temperature, as it reports it, (n,)."""
     set_point_c: Array
     legs: tuple[LegEvidence, ...]
     """Each leg of the profile, judged again from the recording."""
@@ -62,7 +62,7 @@ class CycleSeries:
 
     @property
     def name(self) -> str:
-        """For tables: "x up"."""
+        """Display name of the run for tables, as "x up"."""
         return f"{AXES[self.up]} up"
 
     @property

@@ -15,7 +15,7 @@ from procedures.core.arrays import Array
 from procedures.core.recording import AXES
 
 MOST_POINTS = 720
-"""Of a series on a page: twelve hours by the minute."""
+"""Greatest number of points of a series on a page: twelve hours by the minute."""
 MOVED_C = 0.02
 """A set point that is further away than this from where it was, or is to be, is on a ramp."""
 SURE = 0.997
@@ -55,7 +55,7 @@ def trace(run: PreparedRun, judged: Corrects, plain: Corrects, reference: Soak, 
 
 
 def leg_regimes(run: PreparedRun, delay_s: float) -> tuple[LegRegime, ...]:
-    """What the indicator made of each leg; `delay_s` is how late it may be."""
+    """Regime switching of each leg; `delay_s` is the allowed delay of the indicator."""
     return tuple(_leg_regime(run, leg, delay_s) for leg in run.series.legs)
 
 
