@@ -43,8 +43,8 @@ def _inspected(
 
 
 def _explained(watch: Watch, analyse: Callable[[Sequence[Recording]], R]) -> R:
-    """The outcome. Where an analysis fails on a recording that is to be refused, the refusal is the reason; how many
-    samples it needs the analysis knows better."""
+    """Run the analysis. Where it fails on a recording that is to be refused, the refusal is raised instead, except for
+    too few samples: the analysis knows better how many it needs."""
     try:
         return analyse(watch.recordings)
     except (BadParameter, MissingChannel):

@@ -72,7 +72,7 @@ class NoiseParameters(Parameters):
 
 
 class NoiseResult(Outcome):
-    """Every launch with its channels, and what they say together."""
+    """Result of every launch with its channels, and the summary over all launches."""
 
     launches: tuple[LaunchNoise, ...]
     channels: tuple[ChannelSummary, ...]
@@ -109,7 +109,7 @@ def analyse_launches(result: type[R], recordings: Sequence[Recording], params: N
 
 
 def _warnings(launches: Sequence[LaunchNoise]) -> tuple[str, ...]:
-    """What the noise model says of each channel, each sentence once; what the inspection says is added elsewhere."""
+    """Warnings of the noise model for each channel, each sentence once; those of the inspection are added elsewhere."""
     several = len(launches) > 1
     found: list[str] = []
     for launch in launches:

@@ -1,4 +1,4 @@
-"""What a catalogue file provides: a procedure is three functions and a little around them."""
+"""Interface of a catalogue file: a procedure is three functions and a little around them."""
 
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -68,7 +68,7 @@ R = TypeVar("R", bound=Outcome)
 
 @dataclass(frozen=True)
 class Context:
-    """What is known when a job is planned or its recordings are analysed: kept with the job as part of its lineage."""
+    """Known facts when a job is planned or its recordings are analysed: kept with the job as part of its lineage."""
 
     unit: Unit
     bench: BenchDescription
@@ -87,19 +87,19 @@ class PredictedUncertainty:
     """The check or named estimate of the result that this is about, where its name is not `name`; kept out of JSON."""
 
     def about(self, quantity: str) -> bool:
-        """Whether this is the uncertainty of a quantity of the result."""
+        """True if this is the uncertainty of a quantity of the result."""
         return quantity == (self.quantity or self.name)
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a plan can be expected to give."""
+    """Prediction of a plan: its duration, the uncertainties, and warnings."""
 
     duration_s: float = 0.0
     uncertainties: tuple[PredictedUncertainty, ...] = ()
     warnings: tuple[str, ...] = ()
     basis: str = ""
-    """What the prediction rests on, in words: which calibration, or nominal scale factors where there is none."""
+    """Basis of the prediction, as text: which calibration, or nominal scale factors where there is none."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class DatedCalibration:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a method is given to work on."""
+    """Input of a method: recordings and calibrations."""
 
     recordings: tuple[Recording, ...] = ()
     calibrations: tuple[DatedCalibration, ...] = ()
@@ -134,7 +134,7 @@ def _uses_none(_: Any) -> tuple[CorrectionKind, ...]:
 STATIONS = Inspection(
     FitnessSettings(least_samples=1, counters_may_rest=True, beside_others=True, means_only=True, seeks_scale=True)
 )
-"""Stations at rest of which means are taken: what most procedures record. A station that turns says so itself."""
+"""Stations at rest whose means are taken, as most procedures record them. Turning stations need another one."""
 
 
 def _stations(_: Any) -> Inspection:
@@ -151,11 +151,11 @@ def _nothing_learnt(_: Any, unit: Unit, _origin: str) -> Unit:
 
 @dataclass(frozen=True)
 class Procedure(Generic[P, R]):
-    """A recipe: what to do on the bench, and what the recordings then say.
+    """A test procedure: the actions on the bench, and the analysis of the recordings.
 
     `resolve` fills defaults that depend on the unit or the bench (the dwell from the averaging time);
-    `schedule` is pure and gives the stations; `predict` says what the plan will be worth, or raises `DomainError` where
-    it is worth nothing; `acquire` may begin at any station and yields one stream per station, in order; `analyse` is
+    `schedule` is pure and gives the stations; `predict` gives the plan's uncertainties, or raises `DomainError` where
+    the plan is useless; `acquire` may begin at any station and yields one stream per station, in order; `analyse` is
     pure and can be run again on stored recordings. Storage, progress, cancelling and making safe are the executor's.
     """
 
@@ -172,7 +172,7 @@ class Procedure(Generic[P, R]):
     report: Callable[[R], Report]
     calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
     uses_calibration: bool = False
-    """Whether the result rests on the unit's current calibration, which then belongs to its lineage."""
+    """True if the result rests on the unit's current calibration, which then belongs to its lineage."""
     corrections: Callable[[R], tuple[UnitCorrection, ...]] = _no_corrections
     """The correction sets that a result gives: at most one of a kind."""
     uses_corrections: Callable[[P], tuple[CorrectionKind, ...]] = _uses_none

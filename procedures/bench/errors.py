@@ -1,4 +1,4 @@
-"""What can go wrong on a bench.
+"""Errors that a bench can raise.
 
 BenchError
 ├── OutOfRange      a demand beyond a limit: refused before anything moves, never clamped

@@ -24,7 +24,7 @@ class Stream:
 
 
 class Imu(Protocol):
-    """What the unit sends."""
+    """Data link of the unit, from which recordings are read."""
 
     @property
     def channels(self) -> tuple[Channel, ...]: ...

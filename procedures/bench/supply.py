@@ -4,7 +4,7 @@ from typing import Protocol
 
 
 class Supply(Protocol):
-    """Switches the unit. Both verbs are idempotent: switching on what is on is no new launch."""
+    """Power switch of the unit. Both verbs are idempotent: switching on what is on is no new launch."""
 
     async def switch_on(self) -> None: ...
 

@@ -1,4 +1,4 @@
-"""ONE FILE = ONE PROCEDURE. A file put here is found, listed by the service with its schema, and tested for form."""
+"""Catalogue of procedures, one file each. A file put in this folder is found, listed with its schema, and tested."""
 
 from typing import Any
 

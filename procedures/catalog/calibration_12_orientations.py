@@ -48,7 +48,7 @@ from procedures.site_parameters import TableParameters, declared_table
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 Lag = Annotated[float, Field(ge=0.0, le=600.0)]
 LEAST_DWELL_S = 10.0
-"""What the temperatures of a station need: means, slopes, and their scatter."""
+"""Least dwell for the temperatures of a station: means, slopes, and their scatter [s]."""
 
 
 _NOT_PREDICTED = (
@@ -57,7 +57,7 @@ _NOT_PREDICTED = (
 
 
 class Limits(Parameters):
-    """Requirements on the unit (thesis 4.3, 5.6) and on the calibration itself (ours)."""
+    """Requirements on the unit (thesis 4.3, 5.6) and on the calibration itself (this program's own)."""
 
     gyro_bias_in_run_deg_h: float = Field(0.015, gt=0.0, le=1e6)
     gyro_bias_run_to_run_deg_h: float = Field(0.015, gt=0.0, le=1e6)
@@ -70,7 +70,7 @@ class Limits(Parameters):
 
 
 class Params(TableParameters):
-    """What to do, where, and what to hold the unit to. None takes the unit's or the bench's value."""
+    """Orientations, dwell, site and limits of the calibration. None takes the unit's or the bench's value."""
 
     orientations: tuple[tuple[Angle, Angle], ...] = Field(
         THESIS_ORIENTATIONS, min_length=1, max_length=200, description="(β, γ) [deg], in order"
@@ -174,7 +174,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """One a triad."""
+    """Calibrations that the result gives, one a triad."""
     return tuple(t.calibration for t in result.triads)
 
 
@@ -205,7 +205,7 @@ def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
 
 
 def _require_scalar(params: Params, accelerometer: TriadPlan) -> None:
-    """Refuse a set that the cross-check cannot use, and say how to go on without it."""
+    """Refuse a set that the cross-check cannot use; the error names the way without it."""
     if not params.scalar_check:
         return
     directions = accelerometer.vectors / np.linalg.norm(accelerometer.vectors, axis=1)[:, None]
@@ -229,7 +229,7 @@ def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
 
 
 def _warnings(params: Params, plans: Sequence[TriadPlan]) -> tuple[str, ...]:
-    """Limits that the plan cannot resolve, and triads whose noise is not known."""
+    """Warnings of limits that the plan cannot resolve, and of triads with unknown noise."""
     limits = params.limits
     requirements = run_to_run_requirements(
         limits.gyro_bias_run_to_run_deg_h,

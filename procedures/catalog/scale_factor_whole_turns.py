@@ -38,11 +38,11 @@ from procedures.site_parameters import Arcsec
 Rate = Annotated[float, Field(ge=0.1, le=3600.0)]
 
 ACCELERATION_SHARE = 0.9
-"""Of the outer axis' acceleration, for ramps that are not told; the rest is for the servo."""
+"""Share of the outer axis' acceleration for ramps without a given length; the rest is for the servo."""
 
 
 class Limits(Parameters):
-    """Requirements, ours: on the measurement, and on the unit by the limit on the scale factor of thesis 4.3."""
+    """Requirements on the measurement (this program's own), and on the unit by thesis 4.3 (scale factor)."""
 
     scale_factor_3_sigma_ppm: float = Field(1.0, gt=0.0, le=1e6, description="three standard uncertainties")
     asymmetry_ppm: float = Field(10.0, gt=0.0, le=1e6)
@@ -113,7 +113,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 def predict(params: Params, context: Context) -> Prediction:
     """Duration, every coefficient's uncertainty, and whether 3σ of the scale factor comes within its limit.
 
-    Raises `Undetermined` where the rates cannot tell the terms apart, `BadParameter` where the table cannot turn so.
+    Raises `Undetermined` where the rates cannot separate the terms, `BadParameter` where the table cannot turn so.
     """
     params = resolve(params, context)
     _require_possible(params, context.bench)

@@ -133,7 +133,7 @@ def learns(result: Result, unit: Unit, origin: str) -> Unit:
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """Its checks: of channels in counts only that there is a noise."""
+    """Checks that a result will have; for channels in counts only that there is noise."""
     rates = [(c.name, c.rate_unit) for c in context.unit.channels if c.rate_unit in ("rad/s", "m/s^2")]
     walks = [f"{name} random walk" for name, unit in rates if unit == "rad/s"]
     return (*walks, *(f"{name} bias instability" for name, _ in rates)) if rates else ("noise processes observed",)

@@ -1,7 +1,7 @@
 """A position program of the table's controller, run as it is written, with a recording at every dwell (thesis, app. Д).
 
 The program is text in the controller's language, or a list of positions that is written as one. Nothing is judged but
-that every dwell was recorded whole: what the means say, an analysis or a person says.
+every dwell was recorded whole: the meaning of the means is left to an analysis or a person.
 """
 
 from collections.abc import AsyncIterator, Sequence
@@ -173,14 +173,14 @@ def _dwells(params: Params) -> tuple[Dwell, ...]:
 
 
 def _used_s(dwell: Dwell, at: TableAngles, params: Params) -> float:
-    """What of a delay is gone before the recording: the least time to move, and the settling [s]."""
+    """Time of a delay used before the recording: the least time to move, and the settling [s]."""
     if params.axis_motion is None:
         raise BadParameter("axis_motion", None, "resolve the parameters first: how fast the axes move the bench says")
     return move_time_s(at, dwell.angles, params.axis_motion) + params.settle_s
 
 
 def _recorded_s(dwell: Dwell, used_s: float) -> float:
-    """What of a delay is recorded [s]. Raises `BadParameter` where hardly anything is left."""
+    """Time of a delay left for the recording [s]. Raises `BadParameter` where hardly anything is left."""
     left = GRAIN_S * floor((dwell.delay_s - used_s) / GRAIN_S + 1e-6) if used_s > 0.0 else dwell.delay_s
     if left < SHORTEST_S:
         expected = f"a delay of at least {used_s + SHORTEST_S:.3g} s, of which moving and settling take {used_s:.3g} s"

@@ -36,9 +36,9 @@ from procedures.procedure import STATIONS, Context, Outcome, Parameters, Predict
 from procedures.reports import thermal_figures, thermal_tables
 
 LEAST_OFF_S = 3.0 * units.HOUR
-"""Thesis 4.2.1: at least three hours off between runs."""
+"""Least time switched off between runs, three hours (thesis 4.2.1)."""
 UPRIGHT_SHARE = 0.99
-"""Of gravity that an axis which is up feels at least."""
+"""Least share of gravity along an axis that counts as up."""
 
 
 class Leg(Parameters):
@@ -61,7 +61,7 @@ DEFAULT_LEGS = (
     *(_leg(target, 5100.0) for target in (-20.0, 0.0, 20.0, 40.0, 60.0)),
     _leg(20.0, 7080.0),
 )
-"""Twelve hours: by these least times a unit whose case takes some twenty minutes has soaked at every temperature."""
+"""Twelve hours: within these least times a unit with a case time constant of some twenty minutes soaks at every leg."""
 
 
 class Soak(Parameters):
@@ -83,7 +83,7 @@ class Regime(Parameters):
 
 
 class Limits(Parameters):
-    """Requirements (thesis 4.3, 5.6; tests at the level of significance are ours)."""
+    """Requirements (thesis 4.3, 5.6; tests at the level of significance are this program's own)."""
 
     three_sigma_m_s2: float = Field(0.0005, gt=0.0, le=100.0, description="of each axis after correction, worst soak")
     magnitude_rms_m_s2: float = Field(0.0005, gt=0.0, le=100.0, description="of |ĝ| about its mean, worst run")
@@ -237,7 +237,7 @@ def uses_corrections(params: Params) -> tuple[CorrectionKind, ...]:
 
 
 def report(result: Result) -> Report:
-    """Tables 4.3 to 4.7 and figures 3.15 to 3.17 and 4.11 to 4.16 of the thesis, in our words."""
+    """Report with Tables 4.3 to 4.7 and figures 3.15 to 3.17 and 4.11 to 4.16 of the thesis, reworded."""
     cycle = result.cycle
     return Report(thermal_tables.summary(cycle), (*thermal_tables.tables(cycle), *thermal_figures.figures(cycle)))
 

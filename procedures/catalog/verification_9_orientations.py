@@ -43,7 +43,7 @@ ORIENTATIONS = tuple((40.0 * i, 10.0 * i, 20.0 * i) for i in range(9))
 
 
 class Limits(Parameters):
-    """Requirements on the unit (thesis 4.3, 5.6) and on its agreement with the prediction (ours)."""
+    """Requirements on the unit (thesis 4.3, 5.6) and on its agreement with the prediction (this program's own)."""
 
     gyro_bias_in_run_deg_h: float = Field(0.015, gt=0.0, le=1e6)
     accelerometer_bias_in_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
@@ -118,7 +118,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """Its checks."""
+    """Names of the checks that a result will have."""
     checks = ("bias in run, δ/√3", "errors as predicted, p-value of chi-square")
     return tuple(f"{triad} {c}" for triad in TRIAD_NAMES for c in checks)
 

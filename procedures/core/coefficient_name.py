@@ -12,7 +12,7 @@ class CoefficientName(str):
 
     __slots__ = ("symbol", "triad")
     triad: str
-    """"gyro" or "accelerometer"."""
+    """Triad by its name, either "gyro" or "accelerometer"."""
     symbol: str
     """"b_x", "K11", "asymmetry_x", …"""
 

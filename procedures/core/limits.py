@@ -1,4 +1,4 @@
-"""A measured value against a requirement, and what all of them say together."""
+"""Measured values against requirements, and the verdict over all checks."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from math import isfinite
 
 
 class Verdict(StrEnum):
-    """What a finished job says of its unit."""
+    """Verdict of a finished job on its unit."""
 
     PASS = "pass"
     FAIL = "fail"

@@ -7,7 +7,7 @@ from procedures.core import units
 
 @dataclass(frozen=True)
 class Site:
-    """A laboratory's site.
+    """Site of a laboratory: its latitude, gravity and azimuth.
 
     `azimuth_deg` is the heading of the unit's x axis at zero table angles, clockwise from north, as
     measured by theodolite to the laboratory's prism (thesis 3.3.5); `azimuth_sd_arcsec` its standard uncertainty.

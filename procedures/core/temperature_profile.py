@@ -1,6 +1,6 @@
-"""What a thermal chamber is to go through while a unit is recorded: legs of a ramp and a soak, as plain values.
+"""Temperature profile of a thermal chamber during a recording: legs of a ramp and a soak, as plain values.
 
-Whether a soak is over the unit's own temperatures say (`procedures.analysis.thermal.profile_progress`), within the
+The unit's own temperatures decide when a soak is over (`procedures.analysis.thermal.profile_progress`), within the
 times that a leg allows. Temperatures in °C, ramps and slopes in °C/min as chambers and people speak of them.
 """
 
@@ -44,11 +44,11 @@ class ProfileLeg:
     target_c: float
     ramp_c_min: float
     least_soak_s: float
-    """So long the criterion must hold without a break."""
+    """Time for which the criterion must hold without a break [s]."""
     longest_s: float
-    """From setting out; with no soak by then the run ends with an error."""
+    """Longest duration from the leg's start [s]; with no soak by then the run ends with an error."""
     least_s: float = 0.0
-    """From setting out; the leg is no shorter, however soon the unit has soaked."""
+    """Shortest duration from the leg's start [s], however soon the unit has soaked."""
 
     def __post_init__(self) -> None:
         _within("target_c", self.target_c, -273.0, 500.0)

@@ -20,7 +20,7 @@ class Turn:
 
     axis: AxisName
     turns: int
-    """Whole turns, signed: positive by the right-hand rule about the axis."""
+    """Number of whole turns, signed: positive by the right-hand rule about the axis."""
     rate_deg_s: float
     """Size of the constant rate, above zero."""
     ramp_s: float

@@ -1,4 +1,4 @@
-"""Allan deviation and its relatives of the channels of a recording, with intervals, whatever its length.
+"""Allan deviation and its relatives of the channels of a recording of any length, with intervals.
 
 Overlapping and non-overlapping Allan, modified Allan, time and Hadamard deviation (NIST SP 1065); 68 % or another
 confidence from equivalent degrees of freedom. Samples are taken in nominal units, before any calibration.
@@ -67,7 +67,7 @@ class Curve:
     recording: str
     channel: str
     unit: str
-    """Of the deviation: of the channel's nominal rate, or of that times s for the time deviation."""
+    """Unit of the deviation: that of the channel's nominal rate, times s for the time deviation."""
     tau_s: tuple[float, ...]
     deviation: tuple[float, ...]
     lower: tuple[float, ...]
@@ -89,7 +89,7 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Block by block: memory does not grow with a recording's length. Raises `MissingChannel`, `UnfitRecording`."""
+    """Analyse block by block, in constant memory. Raises `MissingChannel`, `UnfitRecording`."""
     if not evidence.recordings:
         raise UnfitRecording("there is no recording to take a deviation of")
     statistic = STATISTICS[params.statistic]
@@ -200,7 +200,7 @@ def _finished(stream: DeviationStream, recording: str, channel: str) -> Deviatio
 
 @contextmanager
 def _naming(recording: str, channel: str = "") -> Generator[None]:
-    """A refusal says which recording and channel it is about."""
+    """Prefix a refusal with the recording and channel that it concerns."""
     try:
         yield
     except Uncorrelatable:

@@ -1,4 +1,4 @@
-"""What a calibration is worth in metres: growth of a parked navigator's errors (textbook S 4, equations 4.119).
+"""Position error due to a calibration: growth of a parked navigator's errors (textbook S 4, equations 4.119).
 
 The residual errors of a unit after calibration, with the noise and the launch-to-launch change of its record, or errors
 that are merely declared, carried through the linear error equations of a navigator that does not move.
@@ -71,7 +71,7 @@ class Params(Parameters):
 
 @dataclass(frozen=True)
 class Share:
-    """What one source does alone: radii that hold the position with 95 %, in m."""
+    """Contribution of one source alone: radii that hold the position with 95 %, in m."""
 
     source: str
     after_1h_m: float
@@ -79,10 +79,10 @@ class Share:
 
 
 class Result(Outcome):
-    """Growth of position, velocity and attitude, and what it is made of."""
+    """Growth of position, velocity and attitude errors, and the contributions to it."""
 
     basis: str
-    """What the errors come from."""
+    """Basis of the errors: a calibration, or declared values."""
     sentence: str
     schuler_period_s: float
     time_s: tuple[float, ...]
@@ -93,7 +93,7 @@ class Result(Outcome):
     """By source, the greatest first; at the time of one hour even where `hours` is less."""
     radius_95_1h_m: float
     calibration_radius_95_1h_m: float | None
-    """Of the calibration's own uncertainty alone, launch and noise left out."""
+    """Radius of the calibration's own uncertainty alone, launch and noise left out."""
     uncalibrated_1h_m: float | None
     """How far nominal outputs would have taken it in an hour, where the equations still hold."""
 

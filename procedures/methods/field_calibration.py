@@ -1,8 +1,8 @@
-"""Field calibration: bias and scale of a unit turned by hand through a few positions, without a bench (F).
+"""Field calibration, without a bench: bias and scale of a unit turned by hand through a few positions (F).
 
 Accelerometers from two positions, zero and (α, β), or from more with the tilt of the base found along (F 11-34); gyros'
 bias alone where they cannot feel the Earth's rate, bias and scale where they can (F 36, 45-48). Cross-couplings are
-neglected, and what that costs is in the uncertainty. Errata of F: `procedures.analysis.field.positions`.
+neglected, and their effect is in the uncertainty. Errata of F: `procedures.analysis.field.positions`.
 """
 
 from collections.abc import Sequence
@@ -78,7 +78,7 @@ class Result(Outcome):
 
     triads: tuple[FieldTriad, ...]
     tilt_deg: tuple[float, float] | None
-    """(α₀, β₀)."""
+    """Tilt of the base (α₀, β₀)."""
     tilt_sd_deg: tuple[float, float] | None
     tilt_model: str
 

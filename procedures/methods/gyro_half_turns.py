@@ -21,7 +21,7 @@ from procedures.core.unit import Unit
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
 
 CONFIDENCE = 0.999
-"""Of the interval within which the rate must agree with the latitude's: fails by chance once in a thousand."""
+"""Confidence of the interval in which the rate must agree with the latitude's: fails by chance once in a thousand."""
 WANDERS = 2.0
 """Scatter of the pairs over that of the noise within the dwells, beyond which the bias wanders."""
 
@@ -47,21 +47,21 @@ class Params(RecordedParameters):
 
 @dataclass(frozen=True)
 class GyroChannel:
-    """One gyro [rad/s]."""
+    """Result of one gyro [rad/s]."""
 
     channel: str
     horizontal: bool
     half_difference: float
-    """What it feels of the Earth's rate at the unturned heading."""
+    """Component of the Earth's rate along the channel at the unturned heading."""
     standard_uncertainty: float
-    """From the scatter of the pairs."""
+    """Standard uncertainty from the scatter of the pairs."""
     lower: float
     upper: float
-    """95 %, Student's factor for the number of pairs."""
+    """Interval of 95 %, Student's factor for the number of pairs."""
     within_sd: float
-    """What the noise within the recordings alone would leave."""
+    """Standard uncertainty expected from the noise within the recordings alone."""
     half_sum: float
-    """The bias; of the vertical channel with the Earth's vertical rate, where no latitude is given."""
+    """Bias of the channel; that of the vertical one includes the Earth's vertical rate, where no latitude is given."""
     half_sum_sd: float
 
 
@@ -170,7 +170,7 @@ def _warnings(found: HalfTurns, level: list[int]) -> tuple[str, ...]:
 
 
 def inspection(_params: Params, _count: int) -> Inspection:
-    """Headings at rest beside one another, the gyros alone."""
+    """Inspection of headings at rest against each other, the gyros alone."""
     return replace(STATIONS, channels=GYRO)
 
 

@@ -1,7 +1,7 @@
 """Heading, pitch and roll of a unit that rested, from its corrected mean outputs (textbook S 3.163-3.166, thesis 1.1).
 
 Each recording is an alignment of its own. The uncertainty has the calibration's covariance, the change from launch to
-launch and the noise of the recording; beside it stands the azimuth error of thesis 1.1, from the unit's noise.
+launch and the noise of the recording; the azimuth error of thesis 1.1, from the unit's noise, is given as well.
 """
 
 from dataclasses import dataclass, replace
@@ -75,7 +75,7 @@ class AlignedAttitude:
     step_at_s: float | None = None
     """When, since the recording's beginning; None: none was seen."""
     step_by: str = ""
-    """"accelerometers" or "gyros"."""
+    """Sensors that saw the step: "accelerometers" or "gyros"."""
     step_visible_deg: float | None = None
     """A tilt by less than this within the recording would not have been seen."""
 

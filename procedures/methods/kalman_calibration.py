@@ -1,8 +1,8 @@
-"""Kalman calibration: a constant bias from recordings at rest, sample by sample, with the moment it was sure enough.
+"""Kalman calibration of a constant bias from recordings at rest, sample by sample, with the time it took to be sure.
 
-Textbook S 5.4.3 and 6.2 take the noise for white. Ours is not: quantization ties neighbouring means (with opposite
+Textbook S 5.4.3 and 6.2 take the noise for white. The unit's is not: quantization ties neighbouring means (of opposite
 signs, so that it falls faster than white noise), flicker ties all of them (so that a longer dwell hardly helps). The
-filter has the whole covariance of the unit's record; what the white filter would have claimed stands beside it.
+filter has the whole covariance of the unit's record; the claim of the white filter is given for comparison.
 """
 
 from collections.abc import Sequence
@@ -50,11 +50,11 @@ class ChannelBias:
     channel: str
     unit: str
     noise: str
-    """"record": the unit's coefficients; "observed": those that the spectrum of the means themselves shows."""
+    """Noise model: "record" is the unit's coefficients; "observed" those that the spectrum of the means shows."""
     bias: float
     standard_uncertainty: float
     white_standard_uncertainty: float
-    """What S's filter claims, with the variance of one measurement and no covariance."""
+    """Standard uncertainty by S's filter, with the variance of one measurement and no covariance."""
     batch_mean: float
     target_sd: float | None
     """None for a channel in counts."""
@@ -63,9 +63,9 @@ class ChannelBias:
     dwell_needed_s: float | None
     """From the record alone, before the first sample; None where no dwell is long enough or the record is empty."""
     innovations_p_value: float
-    """Of the innovations' squares: small where the noise is larger than declared."""
+    """P-value of the innovations' squares: small where the noise is larger than declared."""
     slow_noise_p_value: float
-    """Of the scatter of ten parts of the recording: small where the channel wanders more than claimed."""
+    """P-value of the scatter of ten parts of the recording: small where the channel wanders more than claimed."""
     time_s: tuple[float, ...]
     estimates: tuple[float, ...]
     sds: tuple[float, ...]
@@ -78,7 +78,7 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Each recording alone: another orientation has another constant. Raises `MissingChannel`, `UnfitRecording`."""
+    """Estimate each recording alone: each orientation has its constant. Raises `MissingChannel`, `UnfitRecording`."""
     if not evidence.recordings:
         raise UnfitRecording("there is no recording to estimate a bias from")
     biases = tuple(b for r in evidence.recordings for b in _of_recording(r, params, unit))

@@ -1,4 +1,4 @@
-"""Noise of recordings of a unit at rest, each a launch: what a static run says, of any recording (thesis 3.1, 4.1).
+"""Noise of recordings of a unit at rest, each a launch: the analysis of a static run (thesis 3.1, 4.1).
 
 Channels may be angle or velocity increments, rates or specific forces, in SI or in counts.
 """

@@ -1,4 +1,4 @@
-"""Better orientations: the table angles that make a unit's calibration surest in the bench time of the thesis's twelve.
+"""Plan of better orientations: table angles of least uncertainty in the bench time of the thesis's twelve.
 
 A search over what the table can do, for the linear model on an ideal table, for the one that estimates the table's
 errors along, or for the scalar one; measured by the worst coefficient's predicted standard uncertainty over its limit,
@@ -85,18 +85,18 @@ class TriadWorth:
     bound: float
     """No plan of so many stations in this time has a lesser worst."""
     standard_uncertainties: tuple[float, ...]
-    """Of the twelve (b, K_i1, K_i2, K_i3 by channel) or the scalar nine (b, s, t), SI."""
+    """Standard uncertainties of the twelve (b, K_i1, K_i2, K_i3 by channel) or the scalar nine (b, s, t), SI."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Orientations in order; (outer, middle, inner) in degrees."""
+    """Plan of orientations in order; (outer, middle, inner) in degrees."""
 
     name: str
     orientations_deg: tuple[tuple[float, float, float], ...]
     dwell_s: float
     improvement: float
-    """Of the worst over all triads."""
+    """Improvement of the worst coefficient over all triads."""
     triads: tuple[TriadWorth, ...]
 
 
@@ -107,7 +107,7 @@ class Result(Outcome):
     total_s: float
     plans: tuple[Plan, ...]
     recommended: int
-    """Place in `plans`."""
+    """Index of the recommended plan in `plans`."""
     sentence: str
 
 
@@ -149,7 +149,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """Plans beside one another, then the recommended orientations."""
+    """Report comparing the plans, then the recommended orientations."""
     rows = tuple(
         (p.name, len(p.orientations_deg), p.dwell_s, t.triad, t.worst, t.improvement, t.bound)
         for p in result.plans

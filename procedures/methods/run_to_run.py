@@ -113,7 +113,7 @@ def _check(s: Scatter, limit: Limit) -> Check:
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """None: calibrations are what went in."""
+    """No calibrations: they are the input of this method."""
     return ()
 
 

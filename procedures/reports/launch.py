@@ -46,7 +46,7 @@ def _summary(launches: Sequence[LaunchNoise], averaging_time_s: float | None) ->
 
 
 def side_by_side(summaries: Sequence[ChannelSummary], launches: Sequence[LaunchNoise]) -> Table:
-    """The launches beside one another, by the likelihood fit (Tables 4.1 and 4.2)."""
+    """Compare the launches, by the likelihood fit (Tables 4.1 and 4.2)."""
     rows = [
         (
             s.channel,
@@ -112,7 +112,7 @@ def disagreements(launches: Sequence[LaunchNoise]) -> Table | None:
 
 
 def steps_table(launches: Sequence[LaunchNoise]) -> Table:
-    """What trimming, removal of self-heating and the wavelet split change: graphical readings step by step."""
+    """Effect of trimming, removal of self-heating and the wavelet split: graphical readings step by step."""
     rows: list[tuple[Cell, ...]] = []
     for launch in launches:
         for channel in launch.channels:
@@ -167,7 +167,7 @@ def channel_figures(name: str, launches: Sequence[LaunchNoise]) -> tuple[Figure,
 
 
 def allan_figure(channels: Sequence[ChannelNoise], labels: Sequence[str]) -> Figure:
-    """Deviation with intervals and band of the first launch, its slope lines and readings; the others beside it."""
+    """Deviation with intervals and band of the first launch, its slope lines and readings, with the other launches."""
     first = channels[0]
     unit, size = DEVIATION_DISPLAY[first.rate_unit]
     curve, band = first.analysed.curve, first.band

@@ -12,7 +12,7 @@ OF_COEFFICIENT = ("1/°C²", "1/°C", "1/°C²", "1/°C", "m/s²/°C", "m/s²/°
 
 
 def summary(cycle: ThermalCycle) -> str:
-    """What was done, in two sentences."""
+    """Summary of the cycle in two sentences."""
     hours = sum(run.duration_s for run in cycle.runs) / units.HOUR
     judged = "the correction that was fitted to them" if cycle.judged == "fit" else "the unit's current correction"
     seen = "" if cycle.judged == "fit" else ", which they had no part in"
@@ -36,7 +36,7 @@ def tables(cycle: ThermalCycle) -> tuple[Table, ...]:
 
 
 def soak_table(cycle: ThermalCycle) -> Table:
-    """Table 4.5."""
+    """Soak errors as in Table 4.5."""
     rows = tuple(
         (s.leg + 1, s.target_c, s.case_c, s.runs, axis, s.before_m_s2[i], s.after_m_s2[i], s.spread_after_m_s2[i])
         for s in cycle.soaks
@@ -130,7 +130,7 @@ def accelerometer_correlations(cycle: ThermalCycle) -> Table:
 
 
 def gyro_correlations(cycle: ThermalCycle) -> Table:
-    """Table 4.6."""
+    """Gyro correlations as in Table 4.6."""
     per_degree = units.DEG_PER_HOUR
     rows: list[tuple[Cell, ...]] = []
     for g in cycle.gyros:
@@ -148,7 +148,7 @@ def gyro_correlations(cycle: ThermalCycle) -> Table:
 
 
 def gyro_noise_table(cycle: ThermalCycle) -> Table:
-    """Table 4.7 beside what is known of the unit."""
+    """Gyro noise as in Table 4.7, with the unit's known noise."""
     shown = units.NOISE_DISPLAY["rad/s"]
     rows: list[tuple[Cell, ...]] = []
     for i, process in enumerate(("quantization", "random_walk", "bias_instability")):
@@ -209,7 +209,7 @@ def _evidence(leg: LegEvidence) -> tuple[Cell, ...]:
 
 
 def regime_table(cycle: ThermalCycle) -> Table:
-    """Switching times of the indicator beside the commanded ramps."""
+    """Compare switching times of the indicator with the commanded ramps."""
     rows = tuple((run.name, i, *_regime(r)) for run in cycle.runs for i, r in enumerate(run.regimes, start=1))
     columns = (
         "run",

@@ -1,8 +1,8 @@
 """The coefficients of T 4.1 from runs with each axis up in turn: one fit an axis, with their whole covariance.
 
 At rest the corrected output is the known force f, so ``V = f/(K0 + A) − B0 − B`` with A and B the polynomials of T 4.1.
-A run with the axis horizontal (f ≈ 0) gives B, the vertical one (f = g) gives A (thesis 4.2.1). Here all runs are
 A run with the axis horizontal (f ≈ 0) gives B, the vertical one (f = g) gives A (thesis 4.2.1). All runs are
+solved at once, because B acts in the vertical one too and a horizontal axis is never quite horizontal. Every launch has
 a bias of its own: an intercept for each horizontal run, and in the vertical one what it adds to K0.
 """
 

@@ -41,7 +41,7 @@ class HalfTurns:
 
 
 def half_turns(means: Array, mean_sd: Array, turned: NDArray[np.bool_]) -> HalfTurns:
-    """From the means (n, 3) of dwells in the order they were made, their own uncertainty (n, 3), and which were turned.
+    """Reduce the means (n, 3) of dwells, in the order they were made, with uncertainties (n, 3) and turned headings.
 
     Each dwell pairs with the next if that is at the other heading. Raises `UnfitRecording` of too few pairs.
     """

@@ -92,7 +92,7 @@ def worth(
 
 @dataclass(frozen=True)
 class NormalisedTriad:
-    """Model of C: zero and scale of each axis as normalised polynomials of the case temperature, from soaks alone."""
+    """Triad model of paper C: zero and scale of each axis as normalised polynomials of the case temperature."""
 
     zeros: tuple[Normalised, Normalised, Normalised]
     """Output at zero force, V0 + Fs(t) [m/s²]."""
