@@ -25,10 +25,10 @@ Shapes: one vector is (3,), many are (n, 3); samples are (n, channels), time fir
 Glossary
 --------
 procedure (the recipe), station (one orientation and/or temperature in it), job (one execution of a procedure on one
-unit on one bench), recording (raw samples of one stretch), result (what the analysis says), check (one value against
+unit on one bench), recording (raw samples of one stretch), result (outcome of the analysis), check (one value against
 one limit), verdict (all checks), unit (the device under test, by serial), bench (table + chamber + supply + data
 link), calibration (a set of coefficients of a unit with its lineage), launch (one power-up of the unit).
-unit on one bench), recording (raw samples of one stretch), result (outcome of the analysis), check (one value against
+
 Where does it live?
 -------------------
 One device's behaviour: its driver or its simulated plant. An order of things over several devices: a

@@ -1,4 +1,4 @@
-"""Reading a catalogue folder, one entry a file; a file that cannot be read is named, and the others stand."""
+"""Import of a catalogue folder, one entry a file; a broken file is named, and the others are kept."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

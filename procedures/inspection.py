@@ -21,7 +21,7 @@ def analyse_procedure(procedure: Procedure[P, R], recordings: Sequence[Recording
 
 
 def analyse_method(method: Method[P, R], evidence: Evidence, params: P, unit: Unit | None) -> R:
-    """`Method.analyse` on inspected recordings, or on the stretch of them that is asked for. Raises `DomainError`."""
+    """Run `Method.analyse` on inspected recordings, or on the requested stretch of them. Raises `DomainError`."""
     recordings = _stretches(evidence.recordings, params)
 
     def analyse(watched: Sequence[Recording]) -> R:
@@ -65,7 +65,7 @@ def _stretches(recordings: Sequence[Recording], params: object) -> tuple[Recordi
 def _each(
     recordings: Sequence[Recording], field: str, given: float | tuple[float, ...] | None
 ) -> tuple[float | None, ...]:
-    """One value for each recording. Raises `BadParameter`."""
+    """Expand to one value for each recording. Raises `BadParameter`."""
     if not isinstance(given, tuple):
         return (given,) * len(recordings)
     if len(given) != len(recordings):

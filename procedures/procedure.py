@@ -24,7 +24,7 @@ class Parameters(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def filled(self, defaults: Mapping[str, Any]) -> Self:
-        """The same parameters with each None replaced by its default, where there is one."""
+        """Copy the parameters with each None replaced by its default, where there is one."""
         return self.model_copy(update={name: value for name, value in defaults.items() if getattr(self, name) is None})
 
 
@@ -32,7 +32,7 @@ Second = Annotated[float, Field(ge=0.0, le=1e9)]
 
 
 class RecordedParameters(Parameters):
-    """Base of the parameters of methods that work on recordings: a stretch of them may be asked for."""
+    """Base of the parameters of methods that work on recordings, or on a stretch of them."""
 
     start_s: Second | tuple[Second, ...] | None = Field(
         None, description="from this second of each recording; a list: one for each"
@@ -76,7 +76,7 @@ class Context:
 
 @dataclass(frozen=True)
 class PredictedUncertainty:
-    """A coefficient's standard uncertainty before the job, and the parts it is made of."""
+    """Predicted standard uncertainty of a coefficient, and its contributions."""
 
     name: str
     unit: str
@@ -178,16 +178,16 @@ class Procedure(Generic[P, R]):
     uses_corrections: Callable[[P], tuple[CorrectionKind, ...]] = _uses_none
     """Kinds of the unit's current corrections that the result rests on; those it has then belong to its lineage."""
     learns: Callable[[R, Unit, str], Unit] = _nothing_learnt
-    """The unit's record with what a job's result found of it; the text names that result as its origin."""
+    """Function that updates the unit's record from a job's result; the text names that result as its origin."""
     quantities: Callable[[P, Context], tuple[str, ...]] | None = None
     """Names of the checks and of the named estimates that a result will have; None: not known before the job."""
     inspection: Callable[[P], Inspection] = _stations
-    """How its recordings are inspected before anything is judged; see `procedures.inspection`."""
+    """Inspection of the recordings before the analysis; see `procedures.inspection`."""
 
 
 @dataclass(frozen=True)
 class Method(Generic[P, R]):
-    """A question asked of recordings or calibrations that exist already; needs no bench."""
+    """A method of analysing existing recordings or calibrations; needs no bench."""
 
     name: str
     title: str
@@ -200,4 +200,4 @@ class Method(Generic[P, R]):
     corrections: Callable[[R], tuple[UnitCorrection, ...]] = _no_corrections
     """The correction sets that a result gives: at most one of a kind."""
     inspection: Callable[[P, int], Inspection] = _at_rest
-    """How so many recordings are inspected before anything is judged; see `procedures.inspection`."""
+    """Inspection of a number of recordings before the analysis; see `procedures.inspection`."""

@@ -1,4 +1,4 @@
-"""Where a bench stands and how well its table is known, as parameters that several procedures share.
+"""Site of a bench and accuracy of its table, as parameters that several procedures share.
 
 None takes what the bench declares.
 """

@@ -1,4 +1,4 @@
-"""Shared verbs over a bench: what several procedures do in the same way."""
+"""Steps on a bench that several procedures share."""
 
 from collections.abc import AsyncGenerator, AsyncIterator, Sequence
 from contextlib import aclosing
@@ -38,7 +38,7 @@ CHAMBER_CHANNELS = tuple(Channel(name, Quantity.TEMPERATURE, "degC", CHAMBER_SCA
 
 
 async def record_station(bench: Bench, station: Station) -> Stream:
-    """Power off for as long as the station wants, on (no-op where it is on), move, settle, begin its recording."""
+    """Switch off for the station's `power_off_s`, on (no-op where it is on), move, settle, begin its recording."""
     if station.power_off_s > 0.0:
         await bench.supply.switch_off()
         await bench.clock.sleep(station.power_off_s)

@@ -13,7 +13,7 @@ class ChamberLimits:
     ramp_c_min: float
     """Fastest change of the set point."""
     ambient_c: float
-    """Where it goes when the bench is made safe."""
+    """Temperature of the chamber when the bench is made safe."""
 
 
 @dataclass(frozen=True)

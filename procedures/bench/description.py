@@ -65,7 +65,7 @@ class BenchDescription:
     def violations(
         self, angles: TableAngles, turn: Turn | None = None, profile: TemperatureProfile | None = None
     ) -> tuple[str, ...]:
-        """One sentence for each limit that the angles pass, or whole turns that begin at them, or a profile."""
+        """Violations of the limits by angles, by whole turns that begin at them, or by a profile; a sentence each."""
         demands = (
             ("outer", self.outer, angles.outer_deg),
             ("middle", self.middle, angles.middle_deg),
@@ -81,7 +81,7 @@ class BenchDescription:
         return beyond if profile is None else beyond + self._profile_violations(profile)
 
     def current_violations(self, current_ma: float, profile: TemperatureProfile | None) -> tuple[str, ...]:
-        """The same for a converter alone: a current on its inputs, a profile that it soaks by."""
+        """Violations by a converter alone: of a current on its inputs, and of a profile that it soaks by."""
         found: tuple[str, ...] = () if profile is None else self._profile_violations(profile)
         if self.current_source is None:
             return (*found, f"bench {self.id} has no precision current source")

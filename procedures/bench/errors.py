@@ -14,7 +14,7 @@ BenchError
 
 
 class BenchError(Exception):
-    """Something on the bench went wrong; the message is fit for a person."""
+    """Base of all bench errors; the message is fit for a person."""
 
 
 class OutOfRange(BenchError):

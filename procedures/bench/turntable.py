@@ -7,8 +7,8 @@ from procedures.core.turn import Turn
 
 
 class Turntable(Protocol):
-    """Three-axis turntable. `move_to` returns when the axes are at rest and locked, `command_turn` and `read_angles` at
-    once.
+    """Port of the turntable. `move_to` returns when all axes are at rest and locked, `command_turn` and `read_angles`
+    at once.
     """
 
     async def move_to(self, angles: TableAngles) -> None:
@@ -23,7 +23,7 @@ class Turntable(Protocol):
         ...
 
     async def settle(self) -> None:
-        """Return when what was commanded is done and the axes are at rest and locked; at once where they are.
+        """Wait until the commanded motion is done and the axes are at rest and locked; at once where they are.
 
         Raises `NotSettled`, `DeviceFault`, `Stopped` where another demand took over.
         """

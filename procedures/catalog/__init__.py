@@ -12,5 +12,5 @@ def find() -> Discovered[Procedure[Any, Any]]:
 
 
 def discover() -> dict[str, Procedure[Any, Any]]:
-    """Every PROCEDURE of this folder by name, which is the file's. Raises what is wrong with the first broken file."""
+    """All procedures of this folder by name, which is the file's. Raises the error of the first broken file."""
     return find().complete()

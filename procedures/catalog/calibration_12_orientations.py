@@ -95,7 +95,7 @@ class Params(TableParameters):
 
 
 class Result(Outcome):
-    """Both triads' coefficients, how well they describe the stations, and the verdict."""
+    """Coefficients of both triads, their goodness of fit at the stations, and the verdict."""
 
     triads: tuple[TriadSummary, ...]
     thermal: ThermalShare | None = Field(
@@ -117,7 +117,7 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """One station an orientation, in the order given."""
+    """Stations of the calibration, one an orientation, in the order given."""
     turn = orientation_beta_gamma if params.rotation_order == "x_after_z" else orientation_gamma_beta
     if params.dwell_s is None:
         raise BadParameter("dwell_s", None, "resolve the parameters first: the dwell comes from the unit")
@@ -179,7 +179,7 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """Its checks and its coefficients."""
+    """Checks and coefficients that a result will have."""
     checks = (" bias in run, δ/√3", " condition number", " residuals, p-value of chi-square")
     return tuple(f"{triad}{n}" for triad in TRIAD_NAMES for n in (*checks, *(f".{c}" for c in COEFFICIENT_NAMES)))
 

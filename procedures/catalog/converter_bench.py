@@ -40,7 +40,7 @@ class Limits(Parameters):
 
 
 class Params(Parameters):
-    """Currents, soaks, and what to hold the converter to."""
+    """Currents, soaks, and limits of the converter."""
 
     current_ma: float = Field(10.0, gt=0.0, le=1000.0, description="given with either sign")
     temperatures_c: tuple[float, ...] = Field(TEMPERATURES_C, min_length=5, max_length=100)
@@ -208,7 +208,7 @@ def _checks(channel: ChannelResult, limits: Limits) -> list[Check]:
 
 
 def report(result: Result) -> Report:
-    """Coefficients, soaks, and the normalised functions with what they were fitted to."""
+    """Report of coefficients, soaks, and the normalised functions with the data that they were fitted to."""
     rows: list[tuple[str | float | None, ...]] = []
     for channel in result.channels:
         for title, part in (("Fc, K0 in codes/mA", channel.model.scale), ("Fs, N0 in codes", channel.model.zero)):

@@ -56,7 +56,7 @@ class Limits(Parameters):
 
 
 class Params(TableParameters):
-    """Where, how long, how often. None takes the bench's value."""
+    """Attitudes, durations and number of the alignments. None takes the bench's value."""
 
     orientations: tuple[tuple[Angle, Angle, Angle], ...] = Field(
         ((0.0, 0.0, 0.0),),

@@ -46,7 +46,7 @@ def report(result: Result) -> Report:
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """No quantities: nothing is measured."""
+    """No quantities of a result: nothing is measured."""
     return ()
 
 

@@ -51,7 +51,7 @@ class Limits(Parameters):
 
 
 class Params(Parameters):
-    """How to turn, and what to hold the unit to. None takes the bench's value."""
+    """Rates and durations of the turns, and limits of the unit. None takes the bench's value."""
 
     rates_deg_s: tuple[Rate, ...] = Field(
         (10.0, 20.0, 30.0, 40.0, 50.0), min_length=1, max_length=50, description="each forth and back, about each axis"
@@ -111,7 +111,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration, every coefficient's uncertainty, and whether 3σ of the scale factor comes within its limit.
+    """Predict the duration, every coefficient's uncertainty, and if 3σ of the scale factor comes within its limit.
 
     Raises `Undetermined` where the rates cannot separate the terms, `BadParameter` where the table cannot turn so.
     """
@@ -204,7 +204,7 @@ def _site(params: Params, context: Context) -> Site:
 
 
 def _require_possible(params: Params, bench: BenchDescription) -> None:
-    """Refuse what the table cannot do, before anything moves."""
+    """Refuse turns that the table cannot make, before anything moves."""
     for station in schedule(params):
         if station.angles is not None and (found := bench.violations(station.angles, station.turn)):
             raise BadParameter("rates_deg_s", params.rates_deg_s, f"station {station.label}: {'; '.join(found)}")

@@ -37,7 +37,7 @@ Rate = Annotated[float, Field(gt=0.0, le=1e5)]
 
 
 class Params(Parameters):
-    """The program, as text or as positions, and what its delays count from. Neither: the thesis's own program."""
+    """Program as text or as positions, and the timing of its delays. Neither: the thesis's own program."""
 
     program: str | None = Field(
         None,
@@ -63,7 +63,7 @@ class Params(Parameters):
 
 
 class Result(Outcome):
-    """The program as it was understood, and what every dwell's recording holds."""
+    """Program as it was read, and the means of every dwell's recording."""
 
     program: str
     dwells: tuple[DwellRecord, ...]
@@ -80,7 +80,7 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """One station a dwell, in order, its label naming the program's line. The table starts from its zero.
+    """Stations of the program, one a dwell, in order, labelled by the program's line. The table starts from its zero.
 
     Raises `BadParameter` "program" for a line outside the dialect, and for a delay that moving and settling use up.
     """

@@ -65,7 +65,7 @@ DEFAULT_LEGS = (
 
 
 class Soak(Parameters):
-    """When the unit counts as soaked: judged from its own case and converter sensors every ten seconds."""
+    """Soak criterion of the unit, judged from its own case and converter sensors every ten seconds."""
 
     slope_c_min: float = Field(0.1, ge=1e-4, le=100.0, description="most that either sensor may drift")
     window_s: float = Field(300.0, ge=60.0, le=86_400.0, description="of the straight line whose slope that is")
@@ -73,7 +73,7 @@ class Soak(Parameters):
 
 
 class Regime(Parameters):
-    """The indicator of T 3.18."""
+    """Settings of the regime indicator of T 3.18."""
 
     memory_s: float = Field(120.0, ge=3.0, le=86_400.0)
     enter_c_s2: float = Field(4.0e-6, gt=0.0, le=1.0)
@@ -95,7 +95,7 @@ class Limits(Parameters):
 
 
 class Params(Parameters):
-    """The profile, the analysis, and what to hold the unit to."""
+    """Profile, analysis and limits of the cycle."""
 
     legs: tuple[Leg, ...] = Field(DEFAULT_LEGS, min_length=1, max_length=100)
     soak: Soak = Field(default_factory=lambda: Soak.model_validate({}))
@@ -129,12 +129,12 @@ class Params(Parameters):
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
     def profile(self) -> TemperatureProfile:
-        """The same for the bench. Raises `BadParameter`."""
+        """Convert to the profile of the bench. Raises `BadParameter`."""
         legs = tuple(ProfileLeg(**leg.model_dump()) for leg in self.legs)
         return TemperatureProfile(legs, SoakCriterion(**self.soak.model_dump()), self.unit_margin_c)
 
     def settings(self) -> CycleSettings:
-        """The same for the numerics. Raises `BadParameter`."""
+        """Convert to the settings of the numerics. Raises `BadParameter`."""
         return CycleSettings(
             cell_s=self.cell_s,
             case_lag_s=self.case_lag_s,
@@ -149,7 +149,7 @@ class Params(Parameters):
 
 
 class Result(Outcome):
-    """The correction, and what it and the gyros are worth over temperature."""
+    """Thermal correction, and the performance of it and of the gyros over temperature."""
 
     cycle: ThermalCycle
 
@@ -160,7 +160,7 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """One station a run, x, y and z up; `record_s` is the longest that it may take."""
+    """Stations of the cycle, one a run, x, y and z up; `record_s` is the longest that it may take."""
     profile = params.profile()
     return tuple(
         Station(
@@ -178,7 +178,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration and what is known to be missing. Raises `BadParameter` where the cycle could give nothing."""
+    """Predict the duration and name what is missing. Raises `BadParameter` where the cycle could give nothing."""
     profile = params.profile()
     params.settings()
     _require_possible(params, context)
@@ -200,7 +200,7 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Each run read once, block by block; then one fit over all of them, and the judgement."""
+    """Read each run once, block by block; then fit all of them together, and judge the correction."""
     params = resolve(params, context)
     _require_correction(params, context)
     site = site_with(context.bench.site, None, params.gravity_m_s2, None, None)

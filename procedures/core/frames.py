@@ -1,4 +1,4 @@
-"""Attitudes of the unit on the table, and what gravity and the Earth's rotation are in its axes.
+"""Attitudes of the unit on the table, and gravity and the Earth's rotation in its axes.
 
 This is the *judge's* geometry: commanded angles through ideal, orthogonal axes. The simulated table
 has its own kinematics (MuJoCo bodies) and shares nothing with this file.

@@ -25,7 +25,7 @@ class Limit:
 
 
 def bounds(minimum: float | None, maximum: float | None, unit: str) -> str:
-    """A requirement as a person reads it: ≥ 1 and ≤ 2 deg/h."""
+    """Format the requirement for a reader: ≥ 1 and ≤ 2 deg/h."""
     found = [f"≥ {minimum:g}"] if minimum is not None else []
     found += [f"≤ {maximum:g}"] if maximum is not None else []
     return f"{' and '.join(found)} {unit}"
@@ -33,7 +33,7 @@ def bounds(minimum: float | None, maximum: float | None, unit: str) -> str:
 
 @dataclass(frozen=True)
 class Check:
-    """One value against one limit."""
+    """Check of one value against one limit."""
 
     name: str
     value: float

@@ -1,4 +1,4 @@
-"""Raw samples and what they mean: channels, stations, recordings.
+"""Raw samples and their meaning: channels, stations, recordings.
 
 A recording keeps what the unit sent, integer counts for a real or simulated one. `scale` and `offset` are the data
 sheet's nominal conversion, not the calibration: ``value = scale·(raw − offset)`` in the channel's unit, an increment
@@ -51,7 +51,7 @@ UNITS: dict[Quantity, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Channel:
-    """One column of a recording. `unit` is that of ``scale·(raw − offset)``."""
+    """Channel of a recording. `unit` is that of ``scale·(raw − offset)``."""
 
     name: str
     quantity: Quantity
@@ -102,7 +102,7 @@ class NominalScale:
         return (raw - self.offset) * self.gain
 
     def convert_rows(self, rows: Array) -> None:
-        """The same in place for raw values channel by channel, (channels, n)."""
+        """Convert raw values to nominal rates in place, (channels, n)."""
         if np.any(self.offset):
             rows -= self.offset[:, None]
         rows *= self.gain[:, None]
@@ -110,7 +110,7 @@ class NominalScale:
 
 @dataclass(frozen=True)
 class Station:
-    """One orientation and/or temperature of a procedure: move there, let settle, record."""
+    """Station of a procedure, one orientation and/or temperature: move there, let settle, record."""
 
     index: int
     label: str
@@ -125,7 +125,7 @@ class Station:
     temperatures: bool = False
     """True if the unit's temperature sensors are recorded with its triads."""
     sample_rate_hz: float | None = None
-    """How often the unit is to send; None: its own rate. The same for all stations of a job."""
+    """Sample rate of the unit; None: its own rate. The same for all stations of a job."""
     current_ma: float | None = None
     """Current of the source into all three inputs of a lone converter; None: a whole unit is tested."""
     profile: TemperatureProfile | None = None
@@ -166,7 +166,7 @@ class RecordingInfo:
         raise MissingChannel(name, tuple(c.name for c in self.channels))
 
     def nominal_scale(self, names: Sequence[str]) -> NominalScale:
-        """How raw samples of some channels become nominal rates. Raises `MissingChannel`."""
+        """Conversion of raw samples of some channels to nominal rates. Raises `MissingChannel`."""
         return NominalScale.of([self.channels[self.column(name)] for name in names], self.rate_hz)
 
 

@@ -17,7 +17,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Series:
-    """One line or set of marks. `error` are half-lengths of error bars; it and `upper` are as long as `y`, or empty."""
+    """Line or set of marks. `error` are half-lengths of error bars; it and `upper` are as long as `y`, or empty."""
 
     name: str
     x: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""Where the bench stands: gravity, latitude, and the azimuth of its zero, with what is known of their errors."""
+"""Site of a bench: gravity, latitude, and the azimuth of its zero, with their uncertainties."""
 
 from dataclasses import dataclass
 

@@ -19,7 +19,7 @@ def _within(name: str, value: float, low: float, high: float) -> None:
 
 @dataclass(frozen=True)
 class SoakCriterion:
-    """When a unit counts as soaked: its case and its converter both drift slowly, and the chamber is where it was sent.
+    """Soak criterion: case and converter of the unit both drift slowly, and the chamber's air is at its target.
 
     Judged from readings every `profile_progress.CHECK_S`; the slope is that of a straight line through the readings of
     the last `window_s`.
@@ -60,7 +60,7 @@ class ProfileLeg:
 
 @dataclass(frozen=True)
 class TemperatureProfile:
-    """Legs in their order, and what makes a soak."""
+    """Legs of the profile in order, and the soak criterion."""
 
     legs: tuple[ProfileLeg, ...]
     criterion: SoakCriterion = field(default_factory=SoakCriterion)
@@ -85,7 +85,7 @@ class TemperatureProfile:
         return min(targets), max(targets)
 
     def expected_s(self) -> float:
-        """How long a run takes where each soak begins with the end of its ramp; the first leg begins at its target."""
+        """Duration of a run in which each soak begins with the end of its ramp; the first leg begins at its target."""
         total, at = 0.0, self.legs[0].target_c
         for leg in self.legs:
             ramp_s = abs(leg.target_c - at) / leg.ramp_c_min * MINUTE_S
@@ -94,7 +94,7 @@ class TemperatureProfile:
         return total
 
     def violations(self, minimum_c: float, maximum_c: float, ramp_c_min: float) -> tuple[str, ...]:
-        """One sentence for each limit of a chamber that a leg passes."""
+        """Violations of a chamber's limits, one sentence for each limit that a leg passes."""
         found: list[str] = []
         for number, leg in enumerate(self.legs, start=1):
             if not minimum_c <= leg.target_c <= maximum_c:

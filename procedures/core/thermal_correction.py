@@ -33,7 +33,7 @@ POWERS_OF_BETA = ((0, 1), (0, 2), (1, 1), (1, 2))
 
 
 class Form(StrEnum):
-    """Which terms of T 4.1 act in which regime."""
+    """Form of the correction: the terms of T 4.1 that act in each regime."""
 
     BOTH = "both"
     SWITCHED = "switched"
@@ -63,7 +63,7 @@ class AxisCorrection:
     scale: float
     """K0, m/s² a m/s² of nominal output."""
     bias_m_s2: float
-    """B0, what is *added*: minus the output at zero input, at the reference temperatures."""
+    """Offset B0, which is *added*: minus the output at zero input, at the reference temperatures."""
     alpha: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     beta: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     case_reference_c: float = 20.0
@@ -121,7 +121,7 @@ class TemperatureRange:
                 raise BadParameter(name, (low, high), "two finite temperatures, the lower one first")
 
     def beyond_c(self, case_c: ArrayLike, converter_c: ArrayLike) -> Array:
-        """How far readings lie outside, the farther sensor's distance, zero inside, shape of the readings [°C]."""
+        """Distance of readings outside the range, of the farther sensor; zero inside; shape of the readings [°C]."""
         found = [
             np.maximum(low - np.asarray(t, dtype=np.float64), np.asarray(t, dtype=np.float64) - high)
             for t, (low, high) in ((case_c, self.case_c), (converter_c, self.converter_c))
@@ -144,7 +144,7 @@ class ThermalCorrection:
     must be wherever the correction is used; None: it is for outputs as they are. The reference of the whole is
     then these models' for the converter's own drift, and the axes' for the rest: best the same."""
     fitted_range: TemperatureRange | None = None
-    """Where it was fitted; beyond that it is extrapolated. None: not known (corrections of older versions)."""
+    """Temperature range of the fit; beyond it the correction extrapolates. None: not known (older versions)."""
 
     @property
     def scales(self) -> Array:

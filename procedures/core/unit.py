@@ -14,7 +14,7 @@ from procedures.core.thermal_correction import ThermalCorrection
 from procedures.core.unit_correction import CorrectionKind
 
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
-"""Form of a serial: what can stand in an address and in a file name."""
+"""Pattern of a serial that is safe in an address and in a file name."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class TriadRecord:
     scale_factor_run_to_run_sd: float = 0.0
     """Standard deviation of the scale factor from run to run, relative."""
     noise_origin: str = "data sheet"
-    """Where the coefficients come from: a data sheet, or the result that found them."""
+    """Origin of the coefficients: a data sheet, or the result that found them."""
 
     def launch_covariance(self, outputs: Array) -> Array:
         """How much outputs K·v (n, 3) of one launch depart from the unit's mean, for each channel, (3, n, n).
@@ -48,11 +48,11 @@ class Unit:
     gyro: TriadRecord | None = None
     accelerometer: TriadRecord | None = None
     averaging_time_s: float = 70.0
-    """Where quantization falls below the rest of the noise (thesis 4.1.3: 70 s); a static run updates it."""
+    """Averaging time at which quantization falls below the rest of the noise (thesis 4.1.3: 70 s)."""
     calibrations: tuple[TriadCalibration, ...] = field(default=(), repr=False)
     """The current calibration, one entry a triad; empty before the first."""
     calibration_id: str | None = None
-    """Which stored calibration that is."""
+    """Id of the stored calibration in use."""
     thermal_correction: ThermalCorrection | None = field(default=None, repr=False)
     """The current correction of the kind "thermal", or None."""
     thermal_correction_id: str | None = None

@@ -12,5 +12,5 @@ def find() -> Discovered[Method[Any, Any]]:
 
 
 def discover() -> dict[str, Method[Any, Any]]:
-    """Every METHOD of this folder by name, which is the file's. Raises what is wrong with the first broken file."""
+    """All methods of this folder by name, which is the file's. Raises the error of the first broken file."""
     return find().complete()

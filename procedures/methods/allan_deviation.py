@@ -38,7 +38,7 @@ Tau = Annotated[float, Field(gt=0.0, le=1e9)]
 
 
 class Params(RecordedParameters):
-    """Which statistic of which channels."""
+    """Statistic, channels and averaging times of the deviation."""
 
     statistic: Literal["allan", "overlapping_allan", "modified_allan", "time", "hadamard", "overlapping_hadamard"] = (
         "overlapping_allan"
@@ -148,7 +148,7 @@ def _curves(recording: Recording, statistic: Statistic, params: Params) -> tuple
 def _deviations(
     recording: Recording, names: tuple[str, ...], statistic: Statistic, params: Params, *, correlate: bool
 ) -> list[Deviation]:
-    """One pass over the recording for all its channels."""
+    """Process all channels of a recording in one pass."""
     info = recording.info
     columns = [info.column(name) for name in names]
     channels = [info.channels[c] for c in columns]
@@ -175,7 +175,7 @@ def _deviations(
 
 
 def _sizes(params: Params, largest: int, rate_hz: float) -> Sizes:
-    """The cluster sizes that are asked for. Raises `BadParameter` naming the times that the recording has."""
+    """Cluster sizes requested by the parameters. Raises `BadParameter` naming the times that the recording has."""
     if isinstance(params.taus, tuple):
         for tau_s in params.taus:
             if not 0.5 <= tau_s * rate_hz < largest + 0.5:
@@ -211,7 +211,7 @@ def _naming(recording: str, channel: str = "") -> Generator[None]:
 
 
 def _shown(curve: Curve) -> tuple[str, float]:
-    """The unit that people read a curve in, and its size in SI."""
+    """Display unit of a curve, and its size in SI."""
     known = {"rad/s": ("deg/h", units.DEG_PER_HOUR), "rad/s·s": ("arcsec", units.ARCSEC)}
     return known.get(curve.unit, (curve.unit, 1.0))
 

@@ -33,7 +33,7 @@ HEADING_MAX_RAD = 0.1
 
 
 class Declared(Parameters):
-    """Errors of a unit of which nothing is measured: standard uncertainties, alike on all axes."""
+    """Declared errors of a unit without a calibration: standard uncertainties, alike on all axes."""
 
     gyro_bias_deg_h: float = Field(0.01, ge=0.0, le=1e4)
     gyro_scale_ppm: float = Field(10.0, ge=0.0, le=1e5)
@@ -48,7 +48,7 @@ class Declared(Parameters):
 
 
 class Params(Parameters):
-    """Where the navigator stands and how it begins. The latitude has no default: it depends on the place."""
+    """Position, attitude and initial errors of the navigator. The latitude has no default: it depends on the place."""
 
     latitude_deg: float = Field(ge=-90.0, le=90.0)
     gravity_m_s2: float = Field(units.STANDARD_GRAVITY, ge=9.7, le=9.9)
@@ -90,12 +90,12 @@ class Result(Outcome):
     radius_95_m: tuple[float, ...]
     """Circle about the true place that holds the navigator's with 95 %, at `time_s`."""
     shares: tuple[Share, ...]
-    """By source, the greatest first; at the time of one hour even where `hours` is less."""
+    """Contributions by source, the greatest first; at one hour even where `hours` is less."""
     radius_95_1h_m: float
     calibration_radius_95_1h_m: float | None
     """Radius of the calibration's own uncertainty alone, launch and noise left out."""
     uncalibrated_1h_m: float | None
-    """How far nominal outputs would have taken it in an hour, where the equations still hold."""
+    """Position error of nominal outputs after an hour, where the equations still hold."""
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:

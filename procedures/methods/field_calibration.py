@@ -39,7 +39,7 @@ Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 
 
 class Params(RecordedParameters):
-    """Where and how the unit was turned, and how well that is known. Latitude and gravity depend on the place."""
+    """Positions of the unit, and their uncertainties. Latitude and gravity depend on the place and have no default."""
 
     latitude_deg: float = Field(ge=-90.0, le=90.0)
     gravity_m_s2: float = Field(ge=9.7, le=9.9)
@@ -84,7 +84,7 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """One recording a position. Raises `Undetermined` where the positions do not show what is asked, with the reason.
+    """Calibrate from one recording a position. Raises `Undetermined` where the positions are not sufficient.
 
     Also `UnfitRecording` and `BadParameter` where positions are missing or too few.
     """
@@ -174,7 +174,7 @@ def _gyro(
     unit: Unit | None,
     accelerometer: FieldFit,
 ) -> FittedTriad:
-    """On the base as the accelerometers found it."""
+    """Calibrate the gyros on the base as the accelerometers found it."""
     level = (params.level_sd_arcsec * units.ARCSEC) ** 2
     tilt = accelerometer.covariance[6:, 6:] if params.tilt != "level" else level * np.eye(2)
     uncertainty = FieldUncertainty(

@@ -27,7 +27,7 @@ WANDERS = 2.0
 
 
 class Params(RecordedParameters):
-    """How the unit was turned, and where."""
+    """Headings of the unit, site and limits."""
 
     up: Literal["x", "y", "z"] = Field("y", description="axis of the unit that points upwards; it is turned about it")
     turned: tuple[bool, ...] | None = Field(
@@ -66,7 +66,7 @@ class GyroChannel:
 
 
 class Result(Outcome):
-    """Three channels and the rate that the two horizontal ones feel together."""
+    """Results of three channels and the rate that the two horizontal ones measure together."""
 
     channels: tuple[GyroChannel, ...]
     pairs: int
@@ -76,7 +76,7 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """One recording a heading, in their order. Raises `UnfitRecording`, `MissingChannel`, `BadParameter`."""
+    """Analyse one recording a heading, in order. Raises `UnfitRecording`, `MissingChannel`, `BadParameter`."""
     means = station_means(evidence.recordings, "gyro")
     if means.output_unit != "rad/s":
         raise UnfitRecording(f"the gyro channels are in {means.output_unit}: give their scale, to rad/s")

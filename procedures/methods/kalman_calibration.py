@@ -29,7 +29,7 @@ P_VALUE_MIN = 0.001
 
 
 class Params(RecordedParameters):
-    """Which channels, what is known beforehand, and how sure is sure enough."""
+    """Channels, prior knowledge and target uncertainty of the filter."""
 
     channels: tuple[str, ...] | None = Field(None, min_length=1, max_length=64, description="None: both triads")
     window_s: float = Field(1.0, gt=0.0, le=3600.0, description="of one measurement; lengthened for long recordings")
@@ -44,7 +44,7 @@ class Params(RecordedParameters):
 
 @dataclass(frozen=True)
 class ChannelBias:
-    """One channel of one recording. Lists go with `time_s`, since the recording's beginning; SI, or counts."""
+    """Bias of one channel of one recording. Lists go with `time_s`, since the recording's beginning; SI, or counts."""
 
     recording: str
     channel: str
@@ -57,11 +57,11 @@ class ChannelBias:
     """Standard uncertainty by S's filter, with the variance of one measurement and no covariance."""
     batch_mean: float
     target_sd: float | None
-    """None for a channel in counts."""
+    """Target uncertainty; None for a channel in counts."""
     enough_after_s: float | None
-    """When the filter was as sure as asked for, which is when the dwell might have ended; None if it never was."""
+    """Time at which the filter reached its target, at which the dwell might have ended; None if it never did."""
     dwell_needed_s: float | None
-    """From the record alone, before the first sample; None where no dwell is long enough or the record is empty."""
+    """Dwell predicted from the record alone; None where no dwell is long enough or the record is empty."""
     innovations_p_value: float
     """P-value of the innovations' squares: small where the noise is larger than declared."""
     slow_noise_p_value: float

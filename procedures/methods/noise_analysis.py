@@ -11,7 +11,7 @@ from procedures.reports.launch import noise_report
 
 
 class Params(RecordedParameters, NoiseParameters):
-    """How to analyse, and what to hold the noise to."""
+    """Settings of the analysis, and limits of the noise."""
 
 
 class Result(NoiseResult):

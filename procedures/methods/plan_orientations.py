@@ -33,11 +33,11 @@ Arcsec = Annotated[float, Field(ge=0.0, le=3600.0)]
 Triad = Literal["gyro", "accelerometer"]
 SCALAR_MIN = 9
 WORSE_MAX = 1.05
-"""A plan may cost a triad so much of its worst uncertainty and still be recommended for what it gains in another."""
+"""Greatest loss of a triad's worst uncertainty for which a plan is still recommended by its gain in another."""
 
 
 class Params(Parameters):
-    """The place, the table, what to calibrate and what to measure it by. Latitude and gravity depend on the place."""
+    """Site, table and model of the calibration, and its limits. Latitude and gravity depend on the place."""
 
     latitude_deg: float = Field(ge=-90.0, le=90.0)
     gravity_m_s2: float = Field(ge=9.7, le=9.9)
@@ -75,15 +75,15 @@ class Params(Parameters):
 
 @dataclass(frozen=True)
 class TriadWorth:
-    """One triad under one plan."""
+    """Performance of one triad under one plan."""
 
     triad: str
     worst: float
     """Greatest standard uncertainty over its limit."""
     improvement: float
-    """The reference's worst over this."""
+    """Ratio of the reference's worst to this."""
     bound: float
-    """No plan of so many stations in this time has a lesser worst."""
+    """Lower bound of the worst for any plan of as many stations in this time."""
     standard_uncertainties: tuple[float, ...]
     """Standard uncertainties of the twelve (b, K_i1, K_i2, K_i3 by channel) or the scalar nine (b, s, t), SI."""
 
@@ -240,7 +240,7 @@ def _sentence(best: Plan, reference: Plan, params: Params) -> str:
 
 
 def _reach(plan: Plan, reference: Plan) -> float:
-    """The most that so many stations could gain."""
+    """Upper bound of the improvement by a number of stations."""
     return max(t.worst for t in reference.triads) / max(t.bound for t in plan.triads)
 
 

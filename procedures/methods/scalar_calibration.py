@@ -41,7 +41,7 @@ LEAST_TO_JUDGE = 6
 
 
 class Still(Parameters):
-    """How poses are found in one long recording."""
+    """Criteria by which poses are found in one long recording."""
 
     initial_s: float = Field(20.0, gt=0.0, le=3600.0, description="the unit rests for this long at the beginning")
     window_s: float = Field(1.0, gt=0.0, le=60.0, description="of the moving variance")
@@ -51,7 +51,7 @@ class Still(Parameters):
 
 
 class Params(RecordedParameters):
-    """Which triad, and the magnitude it is held against: gravity has no default, it depends on the place."""
+    """Triad, and the reference magnitude: gravity has no default, it depends on the place."""
 
     triad: Literal["accelerometer", "gyro"] = "accelerometer"
     gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9, description="needed for the accelerometers")
@@ -90,7 +90,7 @@ class Params(RecordedParameters):
 
 @dataclass(frozen=True)
 class Estimate:
-    """One of the nine."""
+    """Coefficient of the scalar model, one of nine."""
 
     name: str
     unit: str

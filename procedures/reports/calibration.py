@@ -37,7 +37,7 @@ def _coefficient_row(c: Coefficient, sources: Sequence[str]) -> tuple[str | floa
 
 
 def triad_figures(t: TriadSummary) -> tuple[Figure, ...]:
-    """Everything that is drawn of a triad: its magnitudes, then its residuals."""
+    """Figures of a triad: its magnitudes, then its residuals."""
     return (*magnitude_figures(t.magnitudes), residual_figure(t))
 
 

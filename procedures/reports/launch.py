@@ -99,7 +99,7 @@ def three_ways(launch: LaunchNoise) -> Table:
 
 
 def disagreements(launches: Sequence[LaunchNoise]) -> Table | None:
-    """Where the three ways contradict one another, and what the model leaves out."""
+    """Contradictions among the three ways, and effects outside the model."""
     rows = [
         (launch.label, channel.channel, sentence)
         for launch in launches
@@ -127,7 +127,7 @@ def steps_table(launches: Sequence[LaunchNoise]) -> Table:
 
 
 def averaging_table(summaries: Sequence[ChannelSummary], launches: Sequence[LaunchNoise]) -> Table:
-    """Where quantization falls below the rest of the noise, channel by channel."""
+    """Averaging times at which quantization falls below the rest of the noise, channel by channel."""
     rows = tuple(
         (s.channel, *(_of(c.averaging.time_s, 1.0) for c in _channel_of(s.channel, launches)), s.averaging_time_s)
         for s in summaries
@@ -151,7 +151,7 @@ def launch_means_table(summaries: Sequence[ChannelSummary], launches: Sequence[L
 
 
 def channel_figures(name: str, launches: Sequence[LaunchNoise]) -> tuple[Figure, ...]:
-    """All plots of one channel: the Allan plot, its parts, and what came before the noise was clean."""
+    """Figures of one channel: the Allan plot, its parts, and the signal before removal of trends."""
     channels = _channel_of(name, launches)
     first = channels[0]
     figures = [allan_figure(channels, [launch.label for launch in launches])]

@@ -8,7 +8,7 @@ from procedures.core.report import Cell, Table
 from procedures.core.thermal_correction import COEFFICIENTS, Form
 
 OF_COEFFICIENT = ("1/°C²", "1/°C", "1/°C²", "1/°C", "m/s²/°C", "m/s²/°C²", "m/s²/°C", "m/s²/°C²")
-"""In the order of `COEFFICIENTS`; T 4.1 does not print β in the order of α."""
+"""Units in the order of `COEFFICIENTS`; T 4.1 does not print β in the order of α."""
 
 
 def summary(cycle: ThermalCycle) -> str:
@@ -20,7 +20,7 @@ def summary(cycle: ThermalCycle) -> str:
 
 
 def tables(cycle: ThermalCycle) -> tuple[Table, ...]:
-    """All of them, in the order a reader wants them."""
+    """Tables of a cycle in reading order."""
     return (
         soak_table(cycle),
         forms_table(cycle),
@@ -183,7 +183,7 @@ def magnitude_table(cycle: ThermalCycle) -> Table:
 
 
 def evidence_table(cycle: ThermalCycle) -> Table:
-    """When each leg was reached and soaked."""
+    """Times at which each leg was reached and soaked."""
     rows = tuple((run.name, i, *_evidence(leg)) for run in cycle.runs for i, leg in enumerate(run.legs, start=1))
     columns = (
         *(

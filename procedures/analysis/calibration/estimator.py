@@ -1,4 +1,4 @@
-"""The linear estimator of a triad's coefficients and its weights, and what the table's flaws do to its answer.
+"""The linear estimator of a triad's coefficients, its weights, and the propagation of the table's flaws.
 
 Two weightings. "noise": the table is taken as it is commanded, and each channel is weighted by its noise alone (thesis
 3.3.6). "noise_and_table": the table's flaws are unknowns with declared spreads, so the outputs are weighted by

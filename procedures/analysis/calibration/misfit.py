@@ -1,4 +1,4 @@
-"""How badly a fit describes its poses: residuals against the noise within the poses, and which pose is the worst.
+"""Misfit of a fit to its poses: residuals against the noise within the poses, and the worst pose.
 
 Unknown noise is taken from the data, and a fit's uncertainty is scaled up to its residuals. That alone hides
 a bad fit behind a wide interval. The scatter within the poses does not see the model, so the ratio of the two shows it:
@@ -37,7 +37,7 @@ SCALES_ALIKE = 20.0
 
 @dataclass(frozen=True)
 class Misfit:
-    """How far a fit's residuals are beyond what the noise within its poses allows."""
+    """Misfit of a fit: its residuals relative to the noise within its poses."""
 
     ratio: float | None
     """Root mean square of the residuals over what the scatter allows; None where no equation is spare."""

@@ -21,7 +21,7 @@ from procedures.core.imu_model import TriadCalibration, triad_calibration
 
 @dataclass(frozen=True)
 class TriadFit:
-    """Coefficients of a triad, their uncertainty in two parts, and how well the model describes the stations."""
+    """Coefficients of a triad, their uncertainty in two parts, and the goodness of fit at the stations."""
 
     triad: str
     output_unit: str

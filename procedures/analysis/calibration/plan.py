@@ -39,7 +39,7 @@ class TriadPlan:
     vectors: Array
     table: TableErrors
     matrix: Array
-    """K as far as known: of the current calibration, else the identity (nominal outputs)."""
+    """Best known K: of the current calibration, else the identity (nominal outputs)."""
     calibrated: bool = False
     """True if K comes from a calibration, not from nominal outputs."""
     weighting: Weighting = "noise_and_table"
@@ -136,7 +136,7 @@ def run_to_run_requirements(
 def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
     """A sentence where the plan is coarser than a limit: what is expected, and the dwell that would do, if any would.
 
-    What counts is what scatters from one calibration to the next: noise, and the table's pointing; constant flaws of
+    Counted is the scatter from one calibration to the next: noise, and the table's pointing; constant flaws of
     the table do not. Only the noise falls with the dwell.
     """
 
@@ -184,7 +184,7 @@ def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size:
 
 
 def _length(dwell_s: float) -> str:
-    """A dwell in the unit that a person would plan it in."""
+    """Format a dwell in the unit that a person would plan it in."""
     hours = dwell_s / units.HOUR
     return f"{hours:.2g} h" if hours < 48.0 else f"{hours / 24.0:.0f} days"
 

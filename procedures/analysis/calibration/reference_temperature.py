@@ -51,26 +51,26 @@ class StationTemperatures:
 
     mean_c: Array
     mean_sd_c: Array
-    """From the scatter about a straight line."""
+    """Standard uncertainty from the scatter about a straight line."""
     slope_c_s: Array
 
 
 @dataclass(frozen=True)
 class AtReference:
-    """Station means as they would have been at the reference temperatures, and what that leaves uncertain."""
+    """Station means corrected to the reference temperatures, with the uncertainty of that correction."""
 
     means: StationMeans
     temperatures: StationTemperatures
     change_m_s2: Array
     """Correction added to the outputs, (n, 3)."""
     of_correction: Array
-    """Covariance of the outputs from the correction's coefficients, alike at all stations, (3, n, n)."""
+    """Covariance of the outputs from the correction's coefficients, common to all stations, (3, n, n)."""
     of_sensors: Array
-    """The same from the sensors' noise, (3, n, n)."""
+    """Covariance of the outputs from the sensors' noise, (3, n, n)."""
 
     @property
     def covariance(self) -> Array:
-        """Both, (3, n, n) [(m/s²)²]."""
+        """Covariance from coefficients and sensors together, (3, n, n) [(m/s²)²]."""
         return self.of_correction + self.of_sensors
 
 
@@ -90,7 +90,7 @@ class ThermalShare:
     """Standard uncertainty that the correction's coefficients leave in each calibration coefficient; it is part of
     theirs."""
     from_sensors: dict[str, float]
-    """The same of the temperature sensors' noise."""
+    """Standard uncertainty due to the temperature sensors' noise."""
 
 
 def station_temperatures(recordings: Sequence[Recording], lag_s: tuple[float, float]) -> StationTemperatures:

@@ -16,7 +16,7 @@ from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One coefficient of ``U = b + K·v`` with its standard uncertainty and what that is made of."""
+    """Coefficient of ``U = b + K·v`` with its standard uncertainty and the contributions to it."""
 
     name: CoefficientName
     unit: str
@@ -39,7 +39,7 @@ class StationResidual:
 
 @dataclass(frozen=True)
 class ScalarParameter:
-    """One of the nine that magnitudes determine: from magnitudes alone, from the linear fit, and how far apart."""
+    """Cross-check of one of the nine parameters: from magnitudes alone, from the linear fit, and their difference."""
 
     name: str
     unit: str
@@ -47,7 +47,7 @@ class ScalarParameter:
     standard_uncertainty: float
     linear: float
     difference_sigmas: float
-    """In standard deviations of the difference, both estimates' common data allowed for."""
+    """Difference in standard deviations of the difference, both estimates' common data allowed for."""
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ class TableErrors:
         return np.einsum("cj,njp->ncp", matrix, self.sensitivity * self.sd)
 
     def columns(self, source: str) -> Array:
-        """Which columns belong to a source, boolean of shape (P,)."""
+        """Mask of the columns that belong to a source, boolean of shape (P,)."""
         return np.array([s == source for s in self.source], dtype=bool)
 
 

@@ -1,4 +1,4 @@
-"""From the recordings of a multiposition calibration to the summary of a triad: means, fit, magnitudes, cross-check."""
+"""Analysis of a triad's multiposition calibration, from recordings to summary: means, fit, magnitudes, cross-check."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -77,7 +77,7 @@ def analyse_means(
 
 
 def _slow(means: StationMeans, noise: Array, fit: TriadFit, known: bool) -> float:
-    """Share of slow noise in what noise and table allow; none of noise that is known."""
+    """Share of slow noise in the variance of noise and table; zero where the noise is known."""
     if known:
         return 0.0
     own = float(np.sum(np.diagonal(noise, axis1=1, axis2=2)))
@@ -121,7 +121,7 @@ def analyse_accelerometers(
 
 
 def noise_of_means(means: StationMeans, record: TriadRecord | None) -> tuple[Array, bool]:
-    """Covariance of the station means, (3, n, n), and whether it comes from the unit's record.
+    """Covariance of the station means, (3, n, n), and a flag that it comes from the unit's record.
 
     Outputs in counts have no record in their unit. Without one the scatter of batch means within each dwell stands in,
     for a dwell that hardly scatters (clipped, held) a part of the dwells' median.

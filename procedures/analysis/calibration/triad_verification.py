@@ -22,7 +22,7 @@ from procedures.core.unit import Unit
 
 @dataclass(frozen=True)
 class TriadVerification:
-    """One triad's verification, JSON-ready."""
+    """Verification result of one triad, JSON-ready."""
 
     magnitudes: Magnitudes
     chi_square: float | None

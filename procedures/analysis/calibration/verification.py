@@ -1,4 +1,4 @@
-"""Magnitudes before and after correction: what a calibration is worth at each orientation, and what it should be worth.
+"""Magnitudes before and after correction: errors of a calibration at each orientation, and their prediction.
 
 The magnitude of a corrected vector does not depend on where the table really stood, only on the unit and its
 coefficients (thesis 5.4, 5.5; Tables 5.3, 5.4).
@@ -77,7 +77,7 @@ def _sample_sd(values: Array) -> float:
 
 
 def magnitude_sensitivity(vectors: Array, matrix: Array) -> tuple[Array, Array]:
-    """How |v̂| errs with the outputs and with the coefficients: ∂|v̂|/∂U (n, 3) and ∂|v̂|/∂(twelve) (n, 12).
+    """Sensitivity of |v̂| to the outputs and the coefficients: ∂|v̂|/∂U (n, 3) and ∂|v̂|/∂(twelve) (n, 12).
 
     ``w = K⁻ᵀ·v/|v|``; an error of a coefficient of channel c acts as ``−w_c·[1 v_x v_y v_z]``.
     """

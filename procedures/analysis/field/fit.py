@@ -1,4 +1,4 @@
-"""Bias and scale of a triad from a few positions: least squares with everything that the positions leave uncertain.
+"""Bias and scale of a triad from a few positions: least squares with all uncertainties of the positions.
 
 The model is ``U_i = b_i + k_i·v_i`` per channel (F 8, 42): cross-couplings are neglected, so their declared spread is a
 part of the uncertainty, as are the angles set by hand, the level, the heading and gravity. Weights are those of noise
@@ -80,7 +80,7 @@ class FieldFit:
     degrees_of_freedom: int
     noise_known: bool
     noise_share: float
-    """Part of the outputs' variance that is noise; the rest is what is declared uncertain."""
+    """Noise part of the outputs' variance; the rest is the declared uncertainty."""
 
     @property
     def p_value(self) -> float | None:
@@ -93,7 +93,7 @@ class FieldFit:
         return np.sqrt(np.diagonal(self.covariance)[3:6]) / np.abs(self.scale)
 
     def calibration(self, triad: str, output_unit: str, input_unit: str, cross_sd: float) -> TriadCalibration:
-        """As ``U = b + K·v`` with K diagonal; the cross-couplings are zero with the spread declared."""
+        """Convert to ``U = b + K·v`` with K diagonal; the cross-couplings are zero with the spread declared."""
         coefficients = np.column_stack([self.bias, np.diag(self.scale)]).ravel()
         places = [0, 4, 8, 1, 6, 11]
         covariance = np.zeros((12, 12))

@@ -11,7 +11,7 @@ from procedures.core.imu_model import TriadCalibration
 
 @dataclass(frozen=True)
 class FieldTriad:
-    """One triad's bias and scale with standard uncertainties, and the base as this triad saw it."""
+    """Bias and scale of one triad with standard uncertainties, and the tilt of the base by this triad."""
 
     calibration: TriadCalibration
     bias: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""Which mistake would explain outputs that no bias and scale factor fit at the declared positions.
+"""Search for the mistake behind outputs that no bias and scale factor fit at the declared positions.
 
 Hypotheses: two positions are exchanged, a turn was made in the other sense, channels are reversed or exchanged. Each
 is tried by a plain line through every channel; one is named only where it explains the outputs `BETTER` times as well
@@ -18,9 +18,9 @@ BETTER = 5.0
 GOOD = 1e-3
 """A root mean square residual of this part of the magnitude is a good fit of positions set by hand."""
 FAIR = 0.03
-"""With a residual beyond this part of the magnitude a line describes nothing."""
+"""Residual, relative to the magnitude, beyond which a line describes nothing."""
 POSITIONS_MAX = 60
-"""With more positions than this no pairs are tried: their number grows as the square."""
+"""Number of positions beyond which no pairs are tried: their number grows as the square."""
 
 
 def suspected(outputs: Array, model: FieldModel) -> str:

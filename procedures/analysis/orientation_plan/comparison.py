@@ -72,10 +72,10 @@ class ScoredPlan:
     sd: Mapping[str, Array]
     """Standard uncertainties by triad, of the twelve or the nine coefficients, SI."""
     relative: Mapping[str, Array]
-    """The same over their limits."""
+    """Standard uncertainties divided by their limits."""
 
     def worst(self, triad: str) -> float:
-        """Greatest sd over limit of a triad."""
+        """Greatest ratio of standard uncertainty to limit of a triad."""
         return float(self.relative[triad].max())
 
     @property
@@ -93,12 +93,12 @@ def stations(angles: Sequence[TableAngles], dwell_s: float, settle_s: float) -> 
 
 
 def total_time_s(angles: Sequence[TableAngles], dwell_s: float, setting: Setting) -> float:
-    """From the table's zero to the end of the last dwell."""
+    """Duration from the table's zero to the end of the last dwell."""
     return float(windows(stations(angles, dwell_s, setting.settle_s), setting.axes)[-1, 1])
 
 
 def in_short_order(angles: Sequence[TableAngles], setting: Setting) -> tuple[TableAngles, ...]:
-    """Always the nearest orientation next, beginning from the table's zero."""
+    """Order orientations by the nearest next, beginning from the table's zero."""
     left, at, ordered = list(angles), TableAngles(), list[TableAngles]()
     while left:
         at = min(left, key=partial(move_time_s, at, axes=setting.axes))
@@ -129,7 +129,7 @@ def scored(angles: Sequence[TableAngles], total_s: float, setting: Setting) -> S
 
 
 def design(triad: str, count: int, dwell_s: float, setting: Setting) -> TriadDesign:
-    """A triad for a search of `count` orientations: the noise of a dwell, split in what stations share and what not."""
+    """Design of a triad for a search of `count` orientations: a dwell's noise in shared and independent parts."""
     record = stations([TableAngles()] * count, dwell_s, setting.settle_s)
     plan = triad_plan(triad, setting.unit, record, setting.axes, setting.site, setting.table)
     covariance = _known_noise(plan)
@@ -162,7 +162,7 @@ def worst_bound(triad: str, count: int, total_s: float, setting: Setting) -> flo
 
 
 def worst_by_triad(plan: ScoredPlan) -> dict[str, float]:
-    """Greatest sd over limit of each triad, for the search's objective."""
+    """Greatest ratio of standard uncertainty to limit of each triad, for the search's objective."""
     return {triad: plan.worst(triad) for triad in plan.relative}
 
 

@@ -25,7 +25,7 @@ FLAWS = 6
 
 @dataclass(frozen=True)
 class TriadDesign:
-    """One triad as the search sees it."""
+    """Description of one triad for the search."""
 
     triad: str
     vector_r: Array
@@ -37,7 +37,7 @@ class TriadDesign:
     limits: Array
     """Limits of the twelve coefficients, channel by channel, shape (12,), or of the scalar nine, (9,)."""
     matrix: Array
-    """K as far as known, shape (3, 3)."""
+    """Best known K of the triad, shape (3, 3)."""
 
 
 def unit_vectors(angles_deg: Array, vector_r: Array) -> Array:
@@ -83,7 +83,7 @@ def information(angles_deg: Array, design: TriadDesign, model: Model, table: Tab
 
 
 def _scalar(vectors: Array, design: TriadDesign) -> Array:
-    """From ``|v̂|`` at K = 1: ``∂/∂b = −u``, ``∂/∂s_i = u_i·v_i``, ``∂/∂t_ij = u_i·v_j`` (thesis 3.21)."""
+    """Derivatives of ``|v̂|`` at K = 1: ``∂/∂b = −u``, ``∂/∂s_i = u_i·v_i``, ``∂/∂t_ij = u_i·v_j`` (thesis 3.21)."""
     u = vectors / np.linalg.norm(vectors, axis=1)[:, None]
     of_angles = [u[:, i] * vectors[:, j] for i, j in ((0, 1), (0, 2), (1, 2))]
     rows = np.column_stack([-u, u * vectors, *of_angles]) * design.limits

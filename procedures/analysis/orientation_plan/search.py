@@ -25,7 +25,7 @@ _STEP_DEG = 1e-3
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """How far to look. The defaults take a few seconds a plan."""
+    """Effort of the search. The defaults take a few seconds a plan."""
 
     minimum_deg: tuple[float, float, float] = (-180.0, -180.0, -180.0)
     maximum_deg: tuple[float, float, float] = (180.0, 180.0, 180.0)

@@ -124,7 +124,7 @@ def read_program(text: str) -> tuple[Dwell, ...]:
 
 
 def refusal(line: int, code: str, expected: str) -> BadParameter:
-    """The answer to a line that cannot be taken: what stands there, its number, what was expected."""
+    """Refusal of a line that cannot be read: its text, its number, and the expected form."""
     shown = code if len(code) <= SHOWN else code[:SHOWN] + "…"
     return BadParameter("program", shown, f"line {line}: expected {expected}")
 

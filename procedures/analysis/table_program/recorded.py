@@ -23,7 +23,7 @@ class ChannelMean:
     unit: str
     mean: float
     standard_uncertainty: float | None
-    """None where neither noise nor scatter is known: fewer samples than batches."""
+    """Standard uncertainty; None where neither noise nor scatter is known: fewer samples than batches."""
     from_noise: bool
     """True if it comes from the unit's noise; else from the scatter of batch means, blind to noise slower than them."""
 

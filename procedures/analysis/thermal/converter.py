@@ -25,7 +25,7 @@ class ZeroAndScale:
 
 
 def zero_and_scale(current_ma: float, plus_code: Array, minus_code: Array) -> ZeroAndScale:
-    """From mean codes (n,) at equal and opposite currents [mA]. Raises `BadParameter`, `UnfitRecording`."""
+    """Compute zero and scale from mean codes (n,) at currents ±I [mA]. Raises `BadParameter`, `UnfitRecording`."""
     if not 0.0 < current_ma < np.inf:
         raise BadParameter("current_ma", current_ma, "finite and above 0")
     if len(plus_code) != len(minus_code) or not np.all(np.isfinite([*plus_code, *minus_code])):

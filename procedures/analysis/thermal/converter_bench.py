@@ -1,4 +1,4 @@
-"""From recordings of a converter alone to its models: currents of both signs at each soak (T 3.8–3.17; C).
+"""Models of a converter alone from its recordings: currents of both signs at each soak (T 3.8–3.17; C).
 
 The two stations of a soak are minutes apart, so the sensor does not read quite the same at both. Codes are brought to
 the mean of the two readings with the model itself, which is fitted again; the drift within a soak being small, it has
@@ -42,7 +42,7 @@ class ConverterSoaks:
 
 @dataclass(frozen=True)
 class Fitted:
-    """One normalised function, and how its order was chosen."""
+    """Normalised function of a channel, and the criterion that chose its order."""
 
     value: Normalised
     bic: tuple[float, ...]
@@ -51,7 +51,7 @@ class Fitted:
 
 @dataclass(frozen=True)
 class FittedChannel:
-    """One channel's model with what it was fitted to, (n,) each."""
+    """Model of one channel with the data that it was fitted to, (n,) each."""
 
     scale: Fitted
     zero: Fitted

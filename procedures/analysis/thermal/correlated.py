@@ -1,4 +1,4 @@
-"""Least squares where neighbouring residuals are alike: whitened by the noise's own spectrum, run by run.
+"""Least squares with correlated residuals: whitened by the noise's own spectrum, run by run.
 
 Residuals of thermal fits are not independent: an accelerometer's flicker lasts for hours. Cosines of a run are all
 but uncorrelated, with variances that the noise model of IEEE Std 952 gives (`coloured_noise`): Q, N, B and K are the
@@ -41,7 +41,7 @@ class Spectrum:
 
 
 def spectrum(residuals: Sequence[Array], cell_s: float) -> Spectrum:
-    """One noise for the residuals (n_r,) of several runs of cells of `cell_s` [s]. Raises `UnfitRecording`.
+    """Fit one noise to the residuals (n_r,) of several runs of cells of `cell_s` [s]. Raises `UnfitRecording`.
 
     Runs of different lengths are cut to the shortest for the fit; all of each is whitened.
     """
@@ -75,7 +75,7 @@ class LinearFit:
     spectrum: Spectrum | None
     """Spectrum of the weighted residuals; None where the fit is exact to rounding."""
     residuals: tuple[Array, ...]
-    """Each run's, not whitened."""
+    """Residuals of each run, not whitened."""
     effective_samples: float
     """Cells over the spectrum's inflation."""
     whitened: bool

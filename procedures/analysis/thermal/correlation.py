@@ -23,7 +23,7 @@ PASSES = 5
 
 @dataclass(frozen=True)
 class Correlation:
-    """How a signal goes with a temperature."""
+    """Correlation of a signal with a temperature."""
 
     r: float
     """Pearson's coefficient of the cells."""
@@ -32,7 +32,7 @@ class Correlation:
     """Slope of the signal by temperature [signal/°C], by generalised least squares."""
     slope_sd: float
     p_value: float
-    """How often noise alone would give as steep a slope, either way."""
+    """P-value: probability that noise alone gives as steep a slope, of either sign."""
 
 
 def correlation(

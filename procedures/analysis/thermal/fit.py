@@ -177,7 +177,7 @@ class _Problem:
         ]
 
     def first(self) -> Array:
-        """Where the iteration begins: biases from the horizontal runs, scales from the vertical ones, no slopes."""
+        """Start of the iteration: biases from the horizontal runs, scales from the vertical ones, no slopes."""
         bias = [-float(np.mean(self.runs[i].output_m_s2[:, self.axis])) for i in self._horizontal]
         scale = [
             self.runs[i].force_m_s2[self.axis]
@@ -268,7 +268,7 @@ def _spread(runs: Sequence[ThermalRun], residuals: Sequence[Array]) -> tuple[flo
 
 
 def _order(problem: _Problem, parameters: Array, fit: LinearFit, weights: Sequence[Array]) -> Order:
-    """Orders 1, 2 and 3 on cells weighted and whitened alike, linear about the answer."""
+    """Compare orders 1, 2 and 3 on cells weighted and whitened alike, linear about the answer."""
     designs, values = problem.linear(parameters, 3)
     variances = (
         fit.spectrum.variances if fit.spectrum and fit.whitened else [np.ones(len(r.dynamic)) for r in problem.runs]

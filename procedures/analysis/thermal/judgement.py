@@ -66,15 +66,15 @@ def nearest(found: Sequence[Soak], case_c: float, within_c: float = 8.0) -> Soak
 
 @dataclass(frozen=True)
 class ThreeSigma:
-    """One soak of one run, x, y, z, each (3,) [m/s²]."""
+    """Errors of one soak of one run, x, y, z, each (3,) [m/s²]."""
 
     soak: Soak
     before: Array
     """Departure from the reference soak, uncorrected outputs over K0."""
     after: Array
-    """The same of the corrected specific forces."""
+    """Departure of the corrected specific forces from the reference soak."""
     spread_before: Array
-    """About the soak's own mean."""
+    """Spread about the soak's own mean."""
     spread_after: Array
 
 
@@ -84,7 +84,7 @@ def corrected(run: ThermalRun, correction: Corrects) -> Array:
 
 
 def three_sigma(run: ThermalRun, correction: Corrects, reference: Soak, at: Soak) -> ThreeSigma:
-    """3σ before and after at a soak, about what the run itself shows in its reference soak."""
+    """Errors 3σ before and after at a soak, relative to the run's own reference soak."""
     before = run.output_m_s2 * correction.scales
     after = corrected(run, correction)
     own, zero = slice(at.start, at.stop), slice(reference.start, reference.stop)

@@ -22,7 +22,7 @@ SENSORS = (CASE, CONVERTER, "temperature_gyro_x", "temperature_gyro_y", "tempera
 AIR, SET_POINT = "chamber_air", "chamber_set_point"
 """Channels of the chamber's own readings, recorded with the unit's."""
 DISCONNECTED_CODE = -32768
-"""The least of 16 bits: what the unit sends for a sensor that is not there."""
+"""Code of a disconnected sensor, the least of 16 bits."""
 STUCK_C = 5.0
 """Change of all other sensors but one beyond which a sensor with a constant code is stuck [°C]."""
 
@@ -58,9 +58,9 @@ class LegEvidence:
     ramp_c_min: float
     began_s: float
     reached_s: float | None
-    """When the chamber's air was first near the target."""
+    """Time when the chamber's air was first near the target."""
     soaked_s: float | None
-    """When the criterion began to hold for good."""
+    """Time when the criterion began to hold for good."""
     ended_s: float
     case_c: float
     converter_c: float
@@ -76,7 +76,7 @@ _SAME_C = 1e-9
 
 
 class ReadingSteps:
-    """By which steps a sensor's readings change, and what drift may hide between two of them.
+    """Resolution of a sensor's readings, and the drift that may hide between two of them.
 
     The resolution is the smallest change seen. A drift of r shows as a step every q/r at the latest, so a reading that
     has stood for a time t excludes no drift under q/t. Readings that went up and down meanwhile are dithered by noise,
@@ -142,7 +142,7 @@ class ProfileProgress:
         return case, converter
 
     def step(self, t_s: float, case_c: float, converter_c: float, air_c: float) -> Standing:
-        """One more reading, `CHECK_S` after the one before, `t_s` since the recording began [s].
+        """Take one more reading, `CHECK_S` after the one before, `t_s` since the recording began [s].
 
         After `DONE` the next leg has begun, if there is one. Raises `BadParameter` where no leg is left.
         """
@@ -182,7 +182,7 @@ class ProfileProgress:
         return ""
 
     def why_late(self, air_c: float) -> str:
-        """A sentence on what the present leg lacks."""
+        """Sentence on the criteria that the present leg does not meet."""
         leg, criterion = self.leg, self.profile.criterion
         if leg is None:
             return "nothing is late"

@@ -1,4 +1,4 @@
-"""One run of the thermal cycle as the fits see it: cell means of outputs and temperatures, and the regime of each.
+"""Input of the fits from one run of the thermal cycle: cell means of outputs and temperatures, and regimes.
 
 The unit's temperature sensors lag behind what they stand on; where their time constants are known from the data sheet
 the lag is taken out to first order, ``T = T_s + τ·dT_s/dt``.
@@ -40,7 +40,7 @@ class ThermalRun:
     """Cell means of one run, one launch with one axis up. All of n cells of `cell_s`."""
 
     up: int
-    """Which axis stands upwards, 0 … 2."""
+    """Index of the axis that stands upwards, 0 … 2."""
     cell_s: float
     output_m_s2: Array
     """Nominal outputs of the accelerometers, (n, 3), the converter's own model already taken out (stage one)."""

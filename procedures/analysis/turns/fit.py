@@ -41,7 +41,7 @@ TERMS: tuple[Term, ...] = ("asymmetry", "quadratic", "cubic")
 RAMP_SQUARE, RAMP_CUBE = 13.0 / 35.0, 43.0 / 140.0
 """Means of the ramp's ``(3s² − 2s³)²`` and of its cube."""
 UNKNOWN_NOISE_SD = units.ARCSEC
-"""Stands in [rad] for a noise that is not known until the residuals scale it."""
+"""Noise assumed in [rad] while it is not known, until the residuals scale it."""
 
 _CROSS = np.eye(9).reshape(9, 3, 3)[[1, 2, 3, 5, 6, 7]]
 """A matrix of one for each cross-coupling, (6, 3, 3)."""
@@ -65,7 +65,7 @@ class Turning:
     moments: Array
     """``∫|ω| dt``, ``∫ω² dt``, ``∫ω³ dt`` of the table's rate [rad, rad²/s, rad³/s²], (n, 3)."""
     angles: tuple[TableAngles, ...]
-    """Where each recording begins and ends."""
+    """Table angles at the beginning and the end of each recording."""
 
     @property
     def turned_b(self) -> Array:
@@ -247,7 +247,7 @@ class TurnFit:
     chi_square: float
     degrees_of_freedom: int
     p_value: float | None
-    """None where the noise was not known."""
+    """P-value of chi-square; None where the noise was not known."""
 
 
 def fit_turns(

@@ -50,7 +50,7 @@ class WholeTurns:
     calibration: TriadCalibration
     """b and K with their covariance; the terms beyond the linear ones are not part of it."""
     reference_rate_deg_s: float
-    """Where the quadratic and the cubic term have the sizes given."""
+    """Rate at which the quadratic and the cubic term have the given sizes."""
     points: tuple[RatePoint, ...]
     condition: float
     chi_square: float

@@ -1,4 +1,4 @@
-"""A whole thermal cycle: runs with each axis up become a correction, and what it is worth (thesis 4.2, paper C)."""
+"""Analysis of a thermal cycle: from runs with each axis up to a correction and its errors (thesis 4.2, paper C)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

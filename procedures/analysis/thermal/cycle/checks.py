@@ -14,7 +14,7 @@ THESIS = "thesis 4.3, 5.6"
 
 @dataclass(frozen=True)
 class CycleLimits:
-    """Each the most that is allowed."""
+    """Limits of a thermal cycle, each the largest value allowed."""
 
     three_sigma_m_s2: float
     magnitude_rms_m_s2: float

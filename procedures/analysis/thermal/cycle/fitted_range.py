@@ -1,4 +1,4 @@
-"""At which temperatures a correction was fitted, and whether a cycle goes beyond them."""
+"""Temperature range of a correction's fit, and warnings where a cycle goes beyond it."""
 
 from collections.abc import Sequence
 

@@ -10,7 +10,7 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Trace:
-    """A run for the eye: means over `step_s`, all lists alike long."""
+    """Plot data of a run: means over `step_s`, lists of equal length."""
 
     t_s: tuple[float, ...]
     """Middles since the recording's beginning."""
@@ -23,9 +23,9 @@ class Trace:
     acceleration_c_s2: tuple[float, ...]
     """The indicator's second derivative."""
     before_m_s2: tuple[tuple[float, ...], ...]
-    """Outputs over K0 less those of the reference soak, x, y, z: what an uncorrected unit is wrong by."""
+    """Outputs over K0 less those of the reference soak, x, y, z: the error of an uncorrected unit."""
     after_m_s2: tuple[tuple[float, ...], ...]
-    """The same of the corrected forces."""
+    """Corrected forces less those of the reference soak."""
     magnitude_before_m_s2: tuple[float, ...]
     """|ĝ| − g with K0 and B0 alone."""
     magnitude_after_m_s2: tuple[float, ...]
@@ -36,12 +36,12 @@ class LegRegime:
     """Regime switching observed by the indicator in one leg of the profile."""
 
     ramp_began_s: float | None
-    """When the chamber's set point began to move; None where it stood."""
+    """Time when the chamber's set point began to move; None where it stood."""
     ramp_ended_s: float | None
     dynamic_s: float | None
-    """When the regime became dynamic; None where it was dynamic before the ramp began, or did not."""
+    """Time when the regime became dynamic; None where it was dynamic before the ramp began, or did not."""
     static_s: float | None
-    """When it became static for the rest of the leg; None where it did not."""
+    """Time when the regime became static for the rest of the leg; None where it did not."""
     onset_delay_s: float | None
     chatter: int
     """Changes to dynamic that no ramp explains."""
@@ -89,7 +89,7 @@ class SoakFound:
     target_c: float
     case_c: float
     runs: int
-    """In how many runs the unit was static long enough."""
+    """Number of runs in which the unit was static long enough."""
     before_m_s2: Triple
     """Three-sigma error: three times the rms departure from the run's reference soak."""
     after_m_s2: Triple
@@ -113,7 +113,7 @@ class FormFound:
 
 @dataclass(frozen=True)
 class CorrelationFound:
-    """How one channel of one run goes with a temperature."""
+    """Correlation of one channel of one run with a temperature."""
 
     run: str
     axis: str
@@ -135,7 +135,7 @@ class AccelerometerCorrelation:
 
 @dataclass(frozen=True)
 class GyroTemperature:
-    """Is a gyro independent of its temperature? Three runs together (thesis table 4.6)."""
+    """Test of a gyro's independence of its temperature, over three runs together (thesis table 4.6)."""
 
     axis: str
     runs: tuple[CorrelationFound, ...]

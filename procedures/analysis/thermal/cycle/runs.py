@@ -46,13 +46,13 @@ class CycleSettings:
 
     @property
     def lag_s(self) -> dict[str, float]:
-        """By the names of `thermal_run`."""
+        """Sensor time constants by the names of `thermal_run`."""
         return {"case": self.case_lag_s, "converter": self.converter_lag_s}
 
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """One run, a row a second and a row a cell."""
+    """Data of one run, a row a second and a row a cell."""
 
     series: CycleSeries
     trace: RegimeTrace

@@ -33,11 +33,11 @@ RATE_UNITS = {**dict.fromkeys(GYRO, "rad/s"), **dict.fromkeys(ACCELEROMETER, "m/
 
 @dataclass(frozen=True)
 class CycleSeries:
-    """One run, a row a second."""
+    """Recorded series of one run, a row a second."""
 
     label: str
     up: int
-    """Which axis stands upwards, 0 … 2."""
+    """Index of the axis that stands upwards, 0 … 2."""
     sample_s: float
     since_launch_s: float
     gyro_rad_s: Array
@@ -50,7 +50,7 @@ class CycleSeries:
     """Chamber's air temperature, as it reports it, (n,)."""
     set_point_c: Array
     legs: tuple[LegEvidence, ...]
-    """Each leg of the profile, judged again from the recording."""
+    """Evidence of each leg of the profile, judged again from the recording."""
 
     @property
     def case_c(self) -> Array:
