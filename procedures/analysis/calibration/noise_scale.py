@@ -1,4 +1,4 @@
-"""Scale factor that unknown noise needs before the residuals of a fit are likely."""
+"""Factor by which unknown noise must be scaled up before the residuals of a fit are likely."""
 
 import numpy as np
 from scipy.linalg import eigh

@@ -136,7 +136,7 @@ def run_to_run_requirements(
 def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
     """A sentence where the plan is coarser than a limit: what is expected, and the dwell that would do, if any would.
 
-    Counted is the scatter from one calibration to the next: noise, and the table's pointing; constant flaws of
+    Only the scatter from one calibration to the next counts: noise, and the table's pointing; constant flaws of
     the table do not. Only the noise falls with the dwell.
     """
 

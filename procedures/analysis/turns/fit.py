@@ -61,7 +61,7 @@ class Turning:
     rate_rad_s: Array
     """The constant rate, signed, (n,)."""
     earth_rad: Array
-    """Earth's turn E during each recording, (n, 3)."""
+    """Earth's turn E during each recording, in the unit's axes [rad], (n, 3)."""
     moments: Array
     """``∫|ω| dt``, ``∫ω² dt``, ``∫ω³ dt`` of the table's rate [rad, rad²/s, rad³/s²], (n, 3)."""
     angles: tuple[TableAngles, ...]
