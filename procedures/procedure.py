@@ -54,7 +54,7 @@ class Outcome(BaseModel):
 
 @dataclass(frozen=True)
 class Estimate:
-    """A named number of a result. Limits and trends of campaigns may be about it, as about a check."""
+    """Named number of a result. Limits and trends of campaigns may be about it, as about a check."""
 
     name: str
     unit: str
@@ -104,7 +104,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class DatedCalibration:
-    """A stored calibration of a unit: its id, when it was made (ISO 8601), and its triads."""
+    """Stored calibration of a unit: its id, when it was made (ISO 8601), and its triads."""
 
     id: str
     made_at: str

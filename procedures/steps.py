@@ -50,7 +50,7 @@ async def record_station(bench: Bench, station: Station) -> Stream:
 
 
 async def record_turn(bench: Bench, station: Station) -> Stream:
-    """Record as `record_station`; the station's turn begins with the first reading of the stream and ends before it.
+    """Record as `record_station`; the station's turn begins with the stream's first reading and ends before the stream.
 
     When the stream has ended the table is at rest and locked, so that the bench can be left there. Reading it may also
     raise `OutOfRange`, before anything turns, `NotSettled` and `DeviceFault`.

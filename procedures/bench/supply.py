@@ -1,4 +1,4 @@
-"""The unit's power supply."""
+"""Port of the unit's power supply."""
 
 from typing import Protocol
 
@@ -13,5 +13,5 @@ class Supply(Protocol):
     def is_on(self) -> bool: ...
 
     async def make_safe(self) -> None:
-        """Switch the unit off."""
+        """Switch the unit's power off."""
         ...

@@ -116,12 +116,12 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 SOAK_GUESS_S = 5400.0
-"""How long a converter in its case takes to drift by no more than the default criterion: case and board follow with
+"""Time that a converter in its case takes to drift by no more than the default criterion: case and board follow with
 some ten minutes each. Only for previews."""
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration, roughly; the uncertainty of the functions depends on noise that is not declared."""
+    """Predict the duration, roughly; the uncertainty of the functions depends on noise that is not declared."""
     params = resolve(params, context)
     reach = np.abs(
         np.diff([context.bench.chamber.ambient_c if context.bench.chamber else 20.0, *params.temperatures_c])

@@ -1,7 +1,7 @@
 """A position program of the table's controller, run as it is written, with a recording at every dwell (thesis, app. Д).
 
 The program is text in the controller's language, or a list of positions that is written as one. Nothing is judged but
-every dwell was recorded whole: the meaning of the means is left to an analysis or a person.
+that every dwell was recorded whole: the meaning of the means is left to an analysis or a person.
 """
 
 from collections.abc import AsyncIterator, Sequence
@@ -133,7 +133,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def report(result: Result) -> Report:
-    """A row a dwell with every channel's mean, and the standard uncertainties in a table of their own."""
+    """Table of every channel's mean, a row a dwell, and one of the standard uncertainties."""
     names = [(m.channel, *units.DISPLAY.get(m.unit, (m.unit, 1.0))) for m in result.dwells[0].means]
     columns = ("dwell", *(f"{name}, {unit}" for name, unit, _ in names))
     means = tuple(

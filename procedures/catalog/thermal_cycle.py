@@ -2,7 +2,7 @@
 
 Thesis 3.2 and 4.2, paper C. Each run is one launch of about twelve hours: the unit is set by hand, rests switched off,
 and is recorded with all its temperature sensors while the chamber goes through soaks and ramps. A leg ends when the
-*unit* has soaked, by the slopes of its own sensors. The profile, its times and its criterion are ours: the thesis shows
+*unit* has soaked, by the slopes of its own sensors. Profile, times and criterion are this program's own: the thesis has
 its profile in a figure only.
 """
 
@@ -155,7 +155,7 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Gravity of the site."""
+    """Gravity at the site of the bench."""
     return params.filled({"gravity_m_s2": context.bench.site.gravity_m_s2})
 
 
@@ -232,7 +232,7 @@ def corrections(result: Result) -> tuple[UnitCorrection, ...]:
 
 
 def uses_corrections(params: Params) -> tuple[CorrectionKind, ...]:
-    """Stage one rests on the converter's models; the unit's own correction is judged, or shown beside the new one."""
+    """Kinds of corrections used: the converter's models in stage one; the unit's own as judged or for comparison."""
     return "converter", "thermal"
 
 

@@ -51,9 +51,9 @@ class ConverterModel:
     """``N(I, t) = K0·Fc(t)·I + N0 + Fs(t)`` of one channel, t its own sensor's reading."""
 
     scale: Normalised
-    """K0 [codes a mA] and Fc."""
+    """Scale K0 [codes a mA] and Fc."""
     zero: Normalised
-    """N0 [codes] and Fs."""
+    """Zero N0 [codes] and Fs, the change."""
 
     def code(self, current_ma: ArrayLike, temperature_c: Array) -> Array:
         """Output code of the channel before rounding, at temperatures (n,) [°C]."""

@@ -57,7 +57,7 @@ class TriadCalibration:
 
     @property
     def matrix_array(self) -> Array:
-        """K, shape (3, 3)."""
+        """Matrix K as an array, shape (3, 3)."""
         return np.array(self.matrix, dtype=np.float64)
 
     @property

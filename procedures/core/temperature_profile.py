@@ -26,7 +26,7 @@ class SoakCriterion:
     """
 
     slope_c_min: float = 0.1
-    """Most that either sensor may drift [°C/min]."""
+    """Largest drift of either sensor [°C/min]."""
     window_s: float = 300.0
     air_within_c: float = 1.5
     """Chamber's air about the leg's target: with a plant that fails the unit may well be steady elsewhere."""
@@ -80,7 +80,7 @@ class TemperatureProfile:
 
     @property
     def span_c(self) -> tuple[float, float]:
-        """Least and greatest target."""
+        """Least and greatest target temperature."""
         targets = [leg.target_c for leg in self.legs]
         return min(targets), max(targets)
 

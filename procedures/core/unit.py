@@ -30,7 +30,7 @@ class TriadRecord:
     """Origin of the coefficients: a data sheet, or the result that found them."""
 
     def launch_covariance(self, outputs: Array) -> Array:
-        """How much outputs K·v (n, 3) of one launch depart from the unit's mean, for each channel, (3, n, n).
+        """Covariance by which outputs K·v (n, 3) of one launch depart from the unit's mean, per channel, (3, n, n).
 
         ``σ_b² + σ_s²·a_i·a_j``: the bias is common to all of them, and a scale factor carries its whole row of K.
         """

@@ -66,7 +66,7 @@ _SIZES: dict[str, dict[str, float]] = {
 
 
 def converted(value: float, unit: str, wanted: str) -> float:
-    """A value in another unit of the same kind. Raises `ValueError` naming the units that would do."""
+    """Convert a value to another unit of the same kind. Raises `ValueError` naming the units that would do."""
     if unit == wanted:
         return value
     for sizes in _SIZES.values():

@@ -107,7 +107,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """A plot for each curve, and a table with three of its points."""
+    """Report with a plot for each curve, and a table with three of its points."""
     name = result.statistic.replace("_", " ")
     figures = tuple(_figure(curve, name, result.confidence) for curve in result.curves)
     rows = tuple(
@@ -229,7 +229,7 @@ def _figure(curve: Curve, name: str, confidence: float) -> Figure:
 
 
 def inspection(params: Params, count: int) -> Inspection:
-    """Each recording by itself, the channels that are asked for."""
+    """Requested channels of each recording by itself."""
     gaps = "refuse" if params.gaps == "refuse" else "aware"
     return Inspection(FitnessSettings(least_samples=1, gaps=gaps), params.channels)
 

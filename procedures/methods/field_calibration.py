@@ -111,7 +111,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """Diagonal K, model "field"."""
+    """Calibration with diagonal K, model "field"."""
     return tuple(t.calibration for t in result.triads)
 
 

@@ -101,7 +101,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """A row a channel, and the rate."""
+    """Report with a row a channel, and the rate."""
     unit, size = units.DISPLAY["rad/s"]
     columns = ("gyro", "unit", "half difference", "±", "± by noise within", "half sum", "±")
     rows = tuple(

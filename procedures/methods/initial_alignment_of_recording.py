@@ -77,7 +77,7 @@ class AlignedAttitude:
     step_by: str = ""
     """Sensors that saw the step: "accelerometers" or "gyros"."""
     step_visible_deg: float | None = None
-    """A tilt by less than this within the recording would not have been seen."""
+    """Smallest tilt within the recording that would have been seen."""
 
 
 class Result(Outcome):
@@ -107,7 +107,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """A row a recording."""
+    """Report with a row a recording."""
     columns = ("recording", "heading, deg", "±", "pitch, deg", "±", "roll, deg", "±", "time, s", "thesis 1.1, deg")
     rows = tuple(
         (

@@ -87,7 +87,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """A row a channel, and how each estimate settles."""
+    """Report with a row a channel, and the convergence of each estimate."""
     columns = ("channel", "recording", "unit", "bias", "±", "± if white", "enough after, s", "dwell needed, s")
     rows = tuple(
         (
@@ -213,7 +213,7 @@ def _warnings(biases: Sequence[ChannelBias]) -> list[str]:
 
 
 def inspection(params: Params, count: int) -> Inspection:
-    """Each recording by itself, the channels that are asked for."""
+    """Requested channels of each recording by itself."""
     return Inspection(FitnessSettings(least_samples=1, counters_may_rest=True), params.channels or GYRO + ACCELEROMETER)
 
 

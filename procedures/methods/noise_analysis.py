@@ -19,7 +19,7 @@ class Result(NoiseResult):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Raises `UnfitRecording`, `MissingChannel`, `BadParameter`."""
+    """Analyse the recordings as launches. Raises `UnfitRecording`, `MissingChannel`, `BadParameter`."""
     return analyse_launches(Result, evidence.recordings, params)
 
 

@@ -113,7 +113,7 @@ def _check(s: Scatter, limit: Limit) -> Check:
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """No calibrations: they are the input of this method."""
+    """No calibrations to store: they are the input of this method."""
     return ()
 
 

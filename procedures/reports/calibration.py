@@ -110,7 +110,7 @@ def magnitude_table(all_magnitudes: Sequence[Magnitudes], title: str) -> Table:
 
 
 def station_table(m: Magnitudes) -> Table:
-    """Magnitude at every orientation."""
+    """Figure of the magnitude at every orientation."""
     unit, size = units.DISPLAY[m.unit]
     before = m.before or (None,) * len(m.after)
     expected = m.expected_sd or (None,) * len(m.after)

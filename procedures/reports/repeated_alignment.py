@@ -29,7 +29,7 @@ def sources_table(angles: Sequence[AngleErrors]) -> Table:
 
 
 def alignments_table(alignments: Sequence[Alignment]) -> Table:
-    """A row an alignment [deg]."""
+    """Table of alignments, one a row [deg]."""
     rows = tuple(
         (a.label, a.launch, *a.attitude_deg, *a.error_deg, *a.expected_sd_deg, a.duration_s) for a in alignments
     )

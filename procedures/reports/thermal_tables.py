@@ -87,7 +87,7 @@ def coefficient_table(cycle: ThermalCycle) -> Table:
 
 
 def order_table(cycle: ThermalCycle) -> Table:
-    """Why the second order."""
+    """Table of the tests for the polynomial order."""
     rows = tuple((axis, *_order(found)) for axis, found in zip(AXES, cycle.axes, strict=True))
     columns = (
         *("axis", "BIC 1", "BIC 2", "BIC 3", "F test 2 against 1, p", "3 against 2, p", "preferred"),
@@ -170,7 +170,7 @@ def _noise(g: GyroNoise, process: int, size: float) -> tuple[Cell, Cell]:
 
 
 def magnitude_table(cycle: ThermalCycle) -> Table:
-    """|ĝ| over each run."""
+    """Table of |ĝ| over each run."""
     rows = tuple(
         (run.name, before, after, *run.force_m_s2)
         for run, (before, after) in zip(cycle.runs, cycle.magnitude_m_s2, strict=True)

@@ -65,7 +65,7 @@ class TriadFit:
 
     @property
     def matrix(self) -> Array:
-        """K, shape (3, 3)."""
+        """Matrix K of the triad, shape (3, 3)."""
         return self.coefficients.reshape(3, 4)[:, 1:]
 
     @property

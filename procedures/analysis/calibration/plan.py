@@ -1,4 +1,4 @@
-"""A calibration before it runs: the uncertainty of every coefficient, and the limits that it cannot resolve."""
+"""Prediction of a calibration: the uncertainty of every coefficient, and the limits that it cannot resolve."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -81,7 +81,7 @@ def triad_plan(
     uncertainty: TableUncertainty,
     weighting: Weighting = "noise_and_table",
 ) -> TriadPlan:
-    """A triad's plan at stations that all carry table angles."""
+    """Plan of a triad at stations that all carry table angles."""
     angles = [s.angles for s in stations if s.angles is not None]
     vectors = reference_vectors(triad, angles, site)
     table = table_errors(angles, vectors, uncertainty, of_gravity=triad == "accelerometer")
@@ -134,7 +134,7 @@ def run_to_run_requirements(
 
 
 def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
-    """A sentence where the plan is coarser than a limit: what is expected, and the dwell that would do, if any would.
+    """Warning where the plan is coarser than a limit: the expected value, and a sufficient dwell, if there is one.
 
     Only the scatter from one calibration to the next counts: noise, and the table's pointing; constant flaws of
     the table do not. Only the noise falls with the dwell.
@@ -169,7 +169,7 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
 
 
 def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size: float) -> str | None:
-    """A sentence where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit [SI]."""
+    """Warning where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit [SI]."""
     noise = plan.noise_covariance()
     if noise is None:
         return None

@@ -42,7 +42,7 @@ SENSORS = ("temperature_case", "temperature_converter")
 CELLS = 12
 """Stretches of a dwell that its temperatures' line is fitted to."""
 LEAST_CELL_S = 1.0
-"""A unit sends its temperatures once a second."""
+"""Interval at which a unit sends its temperatures: once a second."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class ThermalShare:
     """Case temperature at each station."""
     converter_c: tuple[float, ...]
     change_m_s2: tuple[tuple[float, ...], ...]
-    """Added to the outputs x, y, z of each station."""
+    """Correction added to the outputs x, y, z of each station."""
     from_correction: dict[str, float]
     """Standard uncertainty that the correction's coefficients leave in each calibration coefficient; it is part of
     theirs."""

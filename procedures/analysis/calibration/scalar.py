@@ -235,7 +235,7 @@ def _output_weights(parameters: Array, outputs: Array) -> Array:
 
 
 def _jacobian(parameters: Array, outputs: Array) -> Array:
-    """∂|v̂|/∂θ, shape (n, 9)."""
+    """Derivatives ∂|v̂|/∂θ of the magnitude, shape (n, 9)."""
     centred = outputs - parameters[:3]
     corrected = centred @ correction_matrix(parameters).T
     u = corrected / np.linalg.norm(corrected, axis=1)[:, None]

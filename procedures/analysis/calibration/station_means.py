@@ -24,7 +24,7 @@ BATCHES = 20
 """Stretches a dwell is cut into; the scatter of their means allows for noise correlated over less than a stretch."""
 
 RANGE_ENDS = tuple(float(2**bits - over) for bits in (15, 31) for over in (0, 1))
-"""Where counters of 16 and 32 bits end, up to the sign."""
+"""Full scale of counters of 16 and 32 bits, without the sign."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class StationMeans:
 
     triad: str
     output_unit: str
-    """"rad/s", "m/s^2" or "count"."""
+    """Unit of the outputs: "rad/s", "m/s^2" or "count"."""
     outputs: Array
     """Mean nominal outputs, shape (n, 3)."""
     scatter_sd: Array
@@ -96,7 +96,7 @@ def require_unit_of(calibration: TriadCalibration, means: StationMeans) -> None:
 
 
 def launch_warnings(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """A sentence where the recordings are of several launches of the unit, which an analysis takes for one."""
+    """Warning where the recordings are of several launches of the unit, which an analysis takes for one."""
     launches = {r.info.launched_s for r in recordings if r.info.launched_s is not None}
     if len(launches) < 2:
         return ()
@@ -164,7 +164,7 @@ def _in_units(
 
 
 def _batch_edges(seen: int, length: int, count: int) -> tuple[list[int], list[int]]:
-    """Where batches begin inside a block that starts at sample `seen`, and which batches they are."""
+    """Starts of the batches inside a block that begins at sample `seen`, and the batches' indices."""
     starts = np.ceil(np.arange(BATCHES) * count / BATCHES).astype(int) - seen
     current = int(np.searchsorted(starts, 0, side="right")) - 1
     batches = [current, *(b for b in range(current + 1, BATCHES) if starts[b] < length)]

@@ -85,7 +85,7 @@ def _slow(means: StationMeans, noise: Array, fit: TriadFit, known: bool) -> floa
 
 
 LEAST_SCATTER = 0.5
-"""A dwell's own scatter counts as no less than this part of the median of all."""
+"""Least scatter of a dwell that counts, as a part of the median of all."""
 
 
 @dataclass(frozen=True)

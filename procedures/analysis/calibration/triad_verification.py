@@ -1,4 +1,4 @@
-"""From a verification's recordings to what the calibration in use is worth: magnitudes, and whether they are as
+"""Verification of the calibration in use from recordings: magnitudes, and whether they are as
 predicted.
 """
 

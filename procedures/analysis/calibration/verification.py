@@ -24,7 +24,7 @@ class Magnitudes:
     reference: float
     labels: tuple[str, ...]
     before: tuple[float, ...] | None
-    """None where the outputs are in counts: they have no magnitude."""
+    """Magnitudes before correction; None where the outputs are in counts, which have none."""
     after: tuple[float, ...]
     expected_sd: tuple[float, ...]
     """Standard deviations of the errors after correction; empty where the noise is not known."""

@@ -23,7 +23,7 @@ from procedures.core.imu_model import TriadCalibration, triad_calibration
 _PASSES = 12
 """Gauss-Newton steps at the most; a tilt of 10° settles to rounding in six."""
 _SETTLED = 1e-12
-"""A step of this part of the unknowns' size [rad, relative, magnitude] is the last."""
+"""Relative step of the unknowns [rad, relative, magnitude] at which the iteration ends."""
 
 
 @dataclass(frozen=True)

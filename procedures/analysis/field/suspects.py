@@ -16,7 +16,7 @@ from procedures.core.arrays import Array
 
 BETTER = 5.0
 GOOD = 1e-3
-"""A root mean square residual of this part of the magnitude is a good fit of positions set by hand."""
+"""Largest rms residual, relative to the magnitude, of a good fit of positions set by hand."""
 FAIR = 0.03
 """Residual, relative to the magnitude, beyond which a line describes nothing."""
 POSITIONS_MAX = 60
@@ -24,7 +24,7 @@ POSITIONS_MAX = 60
 
 
 def suspected(outputs: Array, model: FieldModel) -> str:
-    """A sentence on the likeliest mistake, empty where none explains the outputs (n, 3)."""
+    """Warning about the likeliest mistake, empty where none explains the outputs (n, 3)."""
     declared, upright = _line(outputs, model, model.positions_rad)
     tried = [(*_line(seen, model, positions), name) for positions, seen, name in _hypotheses(outputs, model)]
     sound = sorted((rms, name) for rms, positive, name in tried if positive)

@@ -49,7 +49,7 @@ def mean_sd(noise: NoiseCoefficients, start_s: float, stop_s: float) -> float:
 
 
 def dwell_records(recordings: Sequence[Recording], stations: Sequence[Station], unit: Unit) -> tuple[DwellRecord, ...]:
-    """One record a station. Raises `UnfitRecording` where the recordings are not these stations', in order."""
+    """Records of the dwells, one a station. Raises `UnfitRecording` unless recordings match the stations in order."""
     told = [r.info.station for r in recordings]
     for i, station in enumerate(stations):
         if i >= len(told) or told[i] is None or told[i] != station:

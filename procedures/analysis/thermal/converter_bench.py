@@ -25,7 +25,7 @@ SENSOR = "temperature_converter"
 CHANNELS = tuple(f"converter_{axis}" for axis in AXES)
 PASSES = 3
 FOLLOWS = 0.5
-"""From one soak to the next the sensor must move by at least so much of what the chamber does."""
+"""Least change of the sensor from one soak to the next, relative to the chamber's."""
 
 
 @dataclass(frozen=True)
@@ -169,6 +169,6 @@ def _fitted(sensor_c: Array, values: Array, reference_c: float, order: int | Non
 
 
 def _criterion(residual_sd: float, count: int, order: int) -> float:
-    """``n·ln(rss/n) + k·ln n``."""
+    """Bayesian information criterion ``n·ln(rss/n) + k·ln n``."""
     rss = residual_sd**2 * (count - order - 1)
     return count * float(np.log(max(rss, 1e-300) / count)) + (order + 1) * float(np.log(count))

@@ -100,7 +100,7 @@ class Magnitude:
     errors_m_s2: Array
     """Errors of the magnitude, shape (n,)."""
     rms_static_m_s2: float
-    """About the run's mean; not a number where there is no such cell."""
+    """Rms about the run's mean; NaN where there is no such cell."""
     rms_dynamic_m_s2: float
 
 

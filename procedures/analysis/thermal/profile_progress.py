@@ -171,7 +171,7 @@ class ProfileProgress:
         return Standing.LATE if since_s >= leg.longest_s else Standing.UNDER_WAY
 
     def _hidden(self, t_s: float) -> str:
-        """A sentence where a drift beyond the limit may hide in the steps of a sensor's readings, else empty."""
+        """Warning where a drift beyond the limit may hide in the steps of a sensor's readings, else empty."""
         limit, window_s = self.profile.criterion.slope_c_min, self.profile.criterion.window_s
         for name, seen in zip(("case", "converter"), self._steps, strict=True):
             if seen.hidden_c_min(t_s, window_s) > limit:

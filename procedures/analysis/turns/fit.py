@@ -44,7 +44,7 @@ UNKNOWN_NOISE_SD = units.ARCSEC
 """Noise assumed in [rad] while it is not known, until the residuals scale it."""
 
 _CROSS = np.eye(9).reshape(9, 3, 3)[[1, 2, 3, 5, 6, 7]]
-"""A matrix of one for each cross-coupling, (6, 3, 3)."""
+"""Matrices with a single one in place of each cross-coupling, (6, 3, 3)."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 
 
@@ -69,7 +69,7 @@ class Turning:
 
     @property
     def turned_b(self) -> Array:
-        """``2πn·e``, (n, 3) [rad]."""
+        """Turn vector ``2πn·e`` of each station, (n, 3) [rad]."""
         return self.angle_rad[:, None] * self.axis_b
 
     @property
@@ -243,7 +243,7 @@ class TurnFit:
     residuals: Array
     """Integrated outputs minus model, (n, 3) [rad]."""
     output_sd: Array
-    """Expected of each integrated output by noise and table, (n, 3) [rad]."""
+    """Expected standard deviation of each integrated output by noise and table, (n, 3) [rad]."""
     chi_square: float
     degrees_of_freedom: int
     p_value: float | None

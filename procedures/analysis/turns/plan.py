@@ -61,7 +61,7 @@ class TurnProgram:
 
 @dataclass(frozen=True)
 class TurnPlan:
-    """A program on a unit and a bench."""
+    """Plan of a program on a unit and a bench."""
 
     program: TurnProgram
     unit: Unit
@@ -140,7 +140,7 @@ def bench_time_s(plan: TurnPlan) -> tuple[float, tuple[float, ...]]:
 
 
 def too_coarse(plan: TurnPlan, made: TurnEstimator, limit_ppm: float) -> str | None:
-    """A sentence where 3σ of a scale factor passes its limit [ppm]: what is expected, of what, and what would do.
+    """Warning where 3σ of a scale factor passes its limit [ppm]: expected value, its noise part, a sufficient plan.
 
     `made` is the plan's estimator.
     """

@@ -116,7 +116,7 @@ def _first_stage(known: KnownOfUnit, judge_current: bool) -> ConverterTriad | No
 
 
 def _two_references(converter: ConverterTriad | None, settings: CycleSettings) -> list[str]:
-    """A sentence where the two stages refer to different readings of the converter's sensor."""
+    """Warning where the two stages refer to different readings of the converter's sensor."""
     if converter is None:
         return []
     first, second = converter[0].scale.reference_c, settings.reference_c[1]
@@ -144,7 +144,7 @@ def _unknowns(known: KnownOfUnit, converter: ConverterTriad | None) -> list[str]
 
 
 def _plain(correction: ThermalCorrection) -> ThermalCorrection:
-    """K0 and B0 alone."""
+    """The correction with K0 and B0 alone."""
     none = (0.0, 0.0, 0.0, 0.0)
     x, y, z = (replace(a, alpha=none, beta=none, form=Form.BOTH, dynamic_offset=(0.0, 0.0)) for a in correction.axes)
     return ThermalCorrection(correction.triad, (x, y, z))

@@ -1,4 +1,4 @@
-"""A thermal cycle against its limits."""
+"""Checks of a thermal cycle against its limits."""
 
 from dataclasses import dataclass
 

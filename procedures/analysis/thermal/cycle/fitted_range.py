@@ -15,7 +15,7 @@ def range_of(cells: Sequence[ThermalRun]) -> TemperatureRange:
 
 
 def extrapolated(cells: Sequence[ThermalRun], judged: ThermalCorrection) -> list[str]:
-    """A sentence where the judged correction was not fitted at the cycle's temperatures."""
+    """Warning where the judged correction was not fitted at the cycle's temperatures."""
     if judged.fitted_range is None:
         return ["the judged correction does not say at which temperatures it was fitted: it may be extrapolated"]
     beyond = max(float(judged.fitted_range.beyond_c(c.case_c, c.converter_c).max()) for c in cells)

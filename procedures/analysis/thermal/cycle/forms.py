@@ -31,7 +31,7 @@ class RunSoaks:
 
 
 def soaks_of(run: PreparedRun, reference_c: float) -> RunSoaks:
-    """Raises `UnfitRecording` where the run has no soak at all."""
+    """Find the soaks of a run and its reference soak. Raises `UnfitRecording` where it has no soak at all."""
     found = soaks(run.cells)
     if not found:
         raise UnfitRecording(
@@ -97,7 +97,7 @@ class NormalisedTriad:
     zeros: tuple[Normalised, Normalised, Normalised]
     """Output at zero force, V0 + Fs(t) [m/s²]."""
     gains: tuple[Normalised, Normalised, Normalised]
-    """Output a force, K·Fc(t)."""
+    """Scale K·Fc(t), output per force."""
 
     @property
     def scales(self) -> Array:

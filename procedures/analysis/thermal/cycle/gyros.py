@@ -29,7 +29,7 @@ def in_cells(values: Array, sample_s: float, cell_s: float) -> Array:
 
 
 def found(run: str, axis: str, c: Correlation) -> CorrelationFound:
-    """A correlation as a value of the result."""
+    """Convert a correlation to a value of the result."""
     return CorrelationFound(run, axis, c.r, c.effective_samples, c.slope, c.slope_sd, c.p_value)
 
 

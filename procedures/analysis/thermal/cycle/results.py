@@ -21,7 +21,7 @@ class Trace:
     air_c: tuple[float, ...]
     set_point_c: tuple[float, ...]
     acceleration_c_s2: tuple[float, ...]
-    """The indicator's second derivative."""
+    """Second derivative of the case temperature by the indicator [°C/s²]."""
     before_m_s2: tuple[tuple[float, ...], ...]
     """Outputs over K0 less those of the reference soak, x, y, z: the error of an uncorrected unit."""
     after_m_s2: tuple[tuple[float, ...], ...]
@@ -83,7 +83,7 @@ class AxisFound:
 
 @dataclass(frozen=True)
 class SoakFound:
-    """One soak over the runs, root mean square over them (thesis table 4.5)."""
+    """Errors of one soak, root mean square over the runs (thesis table 4.5)."""
 
     leg: int
     target_c: float

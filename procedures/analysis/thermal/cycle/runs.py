@@ -1,4 +1,4 @@
-"""From second means to what the fits see: stage one, lags, regimes, and the force that each accelerometer felt.
+"""Preparation of second means for the fits: stage one, lags, regimes, and the force along each accelerometer.
 
 Stage one takes the converter's own drift out of nominal outputs first (paper C; `core.converter.at_reference`).
 """

@@ -1,4 +1,4 @@
-"""A recording of one thermal run, read once, block by block: second means of everything, and the profile's evidence.
+"""Reduction of a thermal run's recording, block by block, to second means and the profile's evidence.
 
 Twelve hours at 100 samples/s of thirteen channels become 43 200 rows; what is kept does not grow with the sample rate.
 """
