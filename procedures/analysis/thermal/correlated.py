@@ -32,7 +32,7 @@ class Spectrum:
     """Noise of the residuals, weighted where the fit weighted them."""
     variances: tuple[Array, ...]
     """Variances of the cosines k = 0 … n − 1 of each run, (n,). The mean's is unknown and takes that of k = 1: each run
-    has an intercept of its own, so no slope feels it."""
+    has an intercept of its own, so no slope is affected."""
 
     @property
     def inflation(self) -> float:
