@@ -1,4 +1,4 @@
-"""THE DOMAIN: what we know about testing an inertial unit. No HTTP, SQL, MuJoCo, files, wall clock or dice.
+"""The domain of testing inertial units. No HTTP, SQL, MuJoCo, files, wall clock or dice.
 
 Conventions
 -----------
@@ -25,7 +25,7 @@ Shapes: one vector is (3,), many are (n, 3); samples are (n, channels), time fir
 Glossary
 --------
 procedure (the recipe), station (one orientation and/or temperature in it), job (one execution of a procedure on one
-unit on one bench), recording (raw samples of one stretch), result (what the analysis says), check (one value against
+unit on one bench), recording (raw samples of one stretch), result (outcome of the analysis), check (one value against
 one limit), verdict (all checks), unit (the device under test, by serial), bench (table + chamber + supply + data
 link), calibration (a set of coefficients of a unit with its lineage), launch (one power-up of the unit).
 

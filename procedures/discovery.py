@@ -1,4 +1,4 @@
-"""Reading a catalogue folder, one entry a file; a file that cannot be read is named, and the others stand."""
+"""Import of a catalogue folder, one entry a file; a broken file is named, and the others are kept."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,13 +11,13 @@ E = TypeVar("E")
 
 @dataclass
 class Discovered(Generic[E]):
-    """What a folder gives: its entries by name, and of each file that gives none, why."""
+    """Entries found in a folder by name, and the error of each file that gives none."""
 
     entries: dict[str, E] = field(default_factory=dict[str, E])
     broken: dict[str, Exception] = field(default_factory=dict[str, Exception])
 
     def complete(self) -> dict[str, E]:
-        """All entries. Raises the error of the first file that is broken."""
+        """All entries of the folder. Raises the error of the first file that is broken."""
         for error in self.broken.values():
             raise error
         return self.entries

@@ -21,7 +21,7 @@ def analyse_procedure(procedure: Procedure[P, R], recordings: Sequence[Recording
 
 
 def analyse_method(method: Method[P, R], evidence: Evidence, params: P, unit: Unit | None) -> R:
-    """`Method.analyse` on inspected recordings, or on the stretch of them that is asked for. Raises `DomainError`."""
+    """Run `Method.analyse` on inspected recordings, or on the requested stretch of them. Raises `DomainError`."""
     recordings = _stretches(evidence.recordings, params)
 
     def analyse(watched: Sequence[Recording]) -> R:
@@ -43,8 +43,8 @@ def _inspected(
 
 
 def _explained(watch: Watch, analyse: Callable[[Sequence[Recording]], R]) -> R:
-    """The outcome. Where an analysis fails on a recording that is to be refused, the refusal is the reason; how many
-    samples it needs the analysis knows better."""
+    """Run the analysis. Where it fails on a recording that is to be refused, the refusal is raised instead, except for
+    too few samples: the analysis knows better how many it needs."""
     try:
         return analyse(watch.recordings)
     except (BadParameter, MissingChannel):
@@ -65,7 +65,7 @@ def _stretches(recordings: Sequence[Recording], params: object) -> tuple[Recordi
 def _each(
     recordings: Sequence[Recording], field: str, given: float | tuple[float, ...] | None
 ) -> tuple[float | None, ...]:
-    """One value for each recording. Raises `BadParameter`."""
+    """Expand to one value for each recording. Raises `BadParameter`."""
     if not isinstance(given, tuple):
         return (given,) * len(recordings)
     if len(given) != len(recordings):

@@ -1,6 +1,6 @@
 """Recordings at rest, one a launch: parameters, result and analysis that `static_run` and `noise_analysis` share.
 
-Knows how the answers are asked for and judged. The numerics are in `procedures.analysis.launch`, the report is in
+Defines the parameters and the checks. The numerics are in `procedures.analysis.launch`, the report is in
 `procedures.reports.launch`.
 """
 
@@ -20,7 +20,7 @@ from procedures.core.recording import Recording
 from procedures.procedure import Outcome, Parameters
 
 LAUNCH = INSPECTION
-"""How launches are inspected: each by itself, at rest throughout."""
+"""Inspection of launches: each by itself, at rest throughout."""
 Part = Literal["gyros", "accelerometers", "all", "none"]
 
 
@@ -54,7 +54,7 @@ class NoiseParameters(Parameters):
     noise_limits: NoiseLimits = Field(default_factory=lambda: NoiseLimits.model_validate({}))
 
     def settings(self) -> LaunchSettings:
-        """The same for the numerics."""
+        """Convert to the settings of the numerics."""
         return LaunchSettings(
             cell_s=self.cell_s,
             fast=self.full_rate,
@@ -72,7 +72,7 @@ class NoiseParameters(Parameters):
 
 
 class NoiseResult(Outcome):
-    """Every launch with its channels, and what they say together."""
+    """Result of every launch with its channels, and the summary over all launches."""
 
     launches: tuple[LaunchNoise, ...]
     channels: tuple[ChannelSummary, ...]
@@ -84,7 +84,7 @@ R = TypeVar("R", bound=NoiseResult)
 
 
 def analyse_launches(result: type[R], recordings: Sequence[Recording], params: NoiseParameters) -> R:
-    """Each recording as a launch of its own, block by block, then all of them together, judged.
+    """Analyse each recording as a launch of its own, block by block, then all of them together, with checks.
 
     Raises `UnfitRecording`, `MissingChannel`, `BadParameter`.
     """
@@ -109,7 +109,7 @@ def analyse_launches(result: type[R], recordings: Sequence[Recording], params: N
 
 
 def _warnings(launches: Sequence[LaunchNoise]) -> tuple[str, ...]:
-    """What the noise model says of each channel, each sentence once; what the inspection says is added elsewhere."""
+    """Warnings of the noise model for each channel, each sentence once; those of the inspection are added elsewhere."""
     several = len(launches) > 1
     found: list[str] = []
     for launch in launches:

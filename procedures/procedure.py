@@ -1,4 +1,4 @@
-"""What a catalogue file provides: a procedure is three functions and a little around them."""
+"""Interface of a catalogue file: a procedure is three functions and a little around them."""
 
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class Parameters(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def filled(self, defaults: Mapping[str, Any]) -> Self:
-        """The same parameters with each None replaced by its default, where there is one."""
+        """Copy the parameters with each None replaced by its default, where there is one."""
         return self.model_copy(update={name: value for name, value in defaults.items() if getattr(self, name) is None})
 
 
@@ -32,7 +32,7 @@ Second = Annotated[float, Field(ge=0.0, le=1e9)]
 
 
 class RecordedParameters(Parameters):
-    """Base of the parameters of methods that work on recordings: a stretch of them may be asked for."""
+    """Base of the parameters of methods that work on recordings, or on a stretch of them."""
 
     start_s: Second | tuple[Second, ...] | None = Field(
         None, description="from this second of each recording; a list: one for each"
@@ -54,7 +54,7 @@ class Outcome(BaseModel):
 
 @dataclass(frozen=True)
 class Estimate:
-    """A named number of a result. Limits and trends of campaigns may be about it, as about a check."""
+    """Named number of a result. Limits and trends of campaigns may be about it, as about a check."""
 
     name: str
     unit: str
@@ -68,7 +68,7 @@ R = TypeVar("R", bound=Outcome)
 
 @dataclass(frozen=True)
 class Context:
-    """What is known when a job is planned or its recordings are analysed: kept with the job as part of its lineage."""
+    """Known facts when a job is planned or its recordings are analysed: kept with the job as part of its lineage."""
 
     unit: Unit
     bench: BenchDescription
@@ -76,7 +76,7 @@ class Context:
 
 @dataclass(frozen=True)
 class PredictedUncertainty:
-    """A coefficient's standard uncertainty before the job, and the parts it is made of."""
+    """Predicted standard uncertainty of a coefficient, and its contributions."""
 
     name: str
     unit: str
@@ -87,24 +87,24 @@ class PredictedUncertainty:
     """The check or named estimate of the result that this is about, where its name is not `name`; kept out of JSON."""
 
     def about(self, quantity: str) -> bool:
-        """Whether this is the uncertainty of a quantity of the result."""
+        """True if this is the uncertainty of a quantity of the result."""
         return quantity == (self.quantity or self.name)
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a plan can be expected to give."""
+    """Prediction of a plan: its duration, the uncertainties, and warnings."""
 
     duration_s: float = 0.0
     uncertainties: tuple[PredictedUncertainty, ...] = ()
     warnings: tuple[str, ...] = ()
     basis: str = ""
-    """What the prediction rests on, in words: which calibration, or nominal scale factors where there is none."""
+    """Basis of the prediction, as text: which calibration, or nominal scale factors where there is none."""
 
 
 @dataclass(frozen=True)
 class DatedCalibration:
-    """A stored calibration of a unit: its id, when it was made (ISO 8601), and its triads."""
+    """Stored calibration of a unit: its id, when it was made (ISO 8601), and its triads."""
 
     id: str
     made_at: str
@@ -113,7 +113,7 @@ class DatedCalibration:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a method is given to work on."""
+    """Input of a method: recordings and calibrations."""
 
     recordings: tuple[Recording, ...] = ()
     calibrations: tuple[DatedCalibration, ...] = ()
@@ -134,7 +134,7 @@ def _uses_none(_: Any) -> tuple[CorrectionKind, ...]:
 STATIONS = Inspection(
     FitnessSettings(least_samples=1, counters_may_rest=True, beside_others=True, means_only=True, seeks_scale=True)
 )
-"""Stations at rest of which means are taken: what most procedures record. A station that turns says so itself."""
+"""Stations at rest whose means are taken, as most procedures record them. Turning stations need another one."""
 
 
 def _stations(_: Any) -> Inspection:
@@ -151,11 +151,11 @@ def _nothing_learnt(_: Any, unit: Unit, _origin: str) -> Unit:
 
 @dataclass(frozen=True)
 class Procedure(Generic[P, R]):
-    """A recipe: what to do on the bench, and what the recordings then say.
+    """A test procedure: the actions on the bench, and the analysis of the recordings.
 
     `resolve` fills defaults that depend on the unit or the bench (the dwell from the averaging time);
-    `schedule` is pure and gives the stations; `predict` says what the plan will be worth, or raises `DomainError` where
-    it is worth nothing; `acquire` may begin at any station and yields one stream per station, in order; `analyse` is
+    `schedule` is pure and gives the stations; `predict` gives the plan's uncertainties, or raises `DomainError` where
+    the plan is useless; `acquire` may begin at any station and yields one stream per station, in order; `analyse` is
     pure and can be run again on stored recordings. Storage, progress, cancelling and making safe are the executor's.
     """
 
@@ -172,22 +172,22 @@ class Procedure(Generic[P, R]):
     report: Callable[[R], Report]
     calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
     uses_calibration: bool = False
-    """Whether the result rests on the unit's current calibration, which then belongs to its lineage."""
+    """True if the result rests on the unit's current calibration, which then belongs to its lineage."""
     corrections: Callable[[R], tuple[UnitCorrection, ...]] = _no_corrections
     """The correction sets that a result gives: at most one of a kind."""
     uses_corrections: Callable[[P], tuple[CorrectionKind, ...]] = _uses_none
     """Kinds of the unit's current corrections that the result rests on; those it has then belong to its lineage."""
     learns: Callable[[R, Unit, str], Unit] = _nothing_learnt
-    """The unit's record with what a job's result found of it; the text names that result as its origin."""
+    """Function that updates the unit's record from a job's result; the text names that result as its origin."""
     quantities: Callable[[P, Context], tuple[str, ...]] | None = None
     """Names of the checks and of the named estimates that a result will have; None: not known before the job."""
     inspection: Callable[[P], Inspection] = _stations
-    """How its recordings are inspected before anything is judged; see `procedures.inspection`."""
+    """Inspection of the recordings before the analysis; see `procedures.inspection`."""
 
 
 @dataclass(frozen=True)
 class Method(Generic[P, R]):
-    """A question asked of recordings or calibrations that exist already; needs no bench."""
+    """A method of analysing existing recordings or calibrations; needs no bench."""
 
     name: str
     title: str
@@ -200,4 +200,4 @@ class Method(Generic[P, R]):
     corrections: Callable[[R], tuple[UnitCorrection, ...]] = _no_corrections
     """The correction sets that a result gives: at most one of a kind."""
     inspection: Callable[[P, int], Inspection] = _at_rest
-    """How so many recordings are inspected before anything is judged; see `procedures.inspection`."""
+    """Inspection of a number of recordings before the analysis; see `procedures.inspection`."""

@@ -1,4 +1,4 @@
-"""Where a bench stands and how well its table is known, as parameters that several procedures share.
+"""Site of a bench and accuracy of its table, as parameters that several procedures share.
 
 None takes what the bench declares.
 """
@@ -16,7 +16,7 @@ Arcsec = Annotated[float, Field(ge=0.0, le=3600.0)]
 
 
 class SiteParameters(Parameters):
-    """The site."""
+    """Overrides of the bench's site."""
 
     latitude_deg: float | None = Field(None, ge=-90.0, le=90.0)
     gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9)
@@ -24,7 +24,7 @@ class SiteParameters(Parameters):
     azimuth_sd_arcsec: Arcsec | None = None
 
     def site(self, context: Context) -> Site:
-        """The bench's site with what is said otherwise here."""
+        """The bench's site with the values that these parameters override."""
         return site_with(
             context.bench.site, self.latitude_deg, self.gravity_m_s2, self.azimuth_deg, self.azimuth_sd_arcsec
         )
@@ -38,7 +38,7 @@ class TableParameters(SiteParameters):
     level_sd_arcsec: Arcsec | None = Field(None, description="of the outer axis about each horizontal direction")
 
     def table(self, site: Site) -> TableUncertainty:
-        """What table and site leave uncertain of the reference; what neither bench nor parameters declare is none."""
+        """Uncertainty of the reference due to table and site; zero for what neither bench nor parameters declare."""
         return TableUncertainty(
             self.orthogonality_sd_arcsec or 0.0,
             self.pointing_sd_arcsec or 0.0,
@@ -49,7 +49,7 @@ class TableParameters(SiteParameters):
 
 
 def declared_site(context: Context) -> dict[str, float]:
-    """What the bench declares of its site, for `Parameters.filled`."""
+    """Site values declared by the bench, for `Parameters.filled`."""
     site = context.bench.site
     return {
         "latitude_deg": site.latitude_deg,
@@ -60,7 +60,7 @@ def declared_site(context: Context) -> dict[str, float]:
 
 
 def declared_table(context: Context) -> dict[str, float]:
-    """What the bench declares of its site and its table, for `Parameters.filled`."""
+    """Site and table values declared by the bench, for `Parameters.filled`."""
     accuracy = context.bench.accuracy
     return {
         **declared_site(context),

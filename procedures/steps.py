@@ -1,4 +1,4 @@
-"""Shared verbs over a bench: what several procedures do in the same way."""
+"""Steps on a bench that several procedures share."""
 
 from collections.abc import AsyncGenerator, AsyncIterator, Sequence
 from contextlib import aclosing
@@ -33,12 +33,12 @@ from procedures.core.turn import Turn
 Blocks = AsyncIterator[NDArray[np.int32]]
 
 CHAMBER_SCALE_C = 0.001
-"""Of the channels that tell what the chamber said [°C a count]."""
+"""Scale of the channels of the chamber's own readings [°C a count]."""
 CHAMBER_CHANNELS = tuple(Channel(name, Quantity.TEMPERATURE, "degC", CHAMBER_SCALE_C) for name in (AIR, SET_POINT))
 
 
 async def record_station(bench: Bench, station: Station) -> Stream:
-    """Power off for as long as the station wants, on (no-op where it is on), move, settle, begin its recording."""
+    """Switch off for the station's `power_off_s`, on (no-op where it is on), move, settle, begin its recording."""
     if station.power_off_s > 0.0:
         await bench.supply.switch_off()
         await bench.clock.sleep(station.power_off_s)
@@ -50,7 +50,7 @@ async def record_station(bench: Bench, station: Station) -> Stream:
 
 
 async def record_turn(bench: Bench, station: Station) -> Stream:
-    """As `record_station`; the station's turn begins with the first reading of the stream and is over before its end.
+    """Record as `record_station`; the station's turn begins with the stream's first reading and ends before the stream.
 
     When the stream has ended the table is at rest and locked, so that the bench can be left there. Reading it may also
     raise `OutOfRange`, before anything turns, `NotSettled` and `DeviceFault`.
@@ -69,16 +69,16 @@ async def _turning(bench: Bench, turn: Turn, blocks: Blocks) -> Blocks:
 
 
 async def record_profile(bench: Bench, station: Station, request: str) -> Stream:
-    """One launch in the chamber: off, set by hand as `request` says, off for `power_off_s`, on, record the profile.
+    """Record one launch in the chamber: off, set by hand by `request`, off for `power_off_s`, on, record the profile.
 
     While the unit is off the chamber goes to the profile's first temperature. While the stream is read the profile is
-    driven: each leg is commanded, and left when the *unit's* temperatures say that it has soaked. What the chamber says
-    of itself, asked once a block, stands in two more channels, `CHAMBER_CHANNELS`, so that every soak can be judged
+    driven: each leg is commanded, and left when the *unit's* temperatures show that it has soaked. The chamber's own
+    readings, taken once a block, stand in two more channels, `CHAMBER_CHANNELS`, so that every soak can be judged
     again from the recording. The stream ends with the last soak, at the latest after `record_s`.
 
     Reading it may raise `SoakNotReached`, `DeviceFault` (chamber tripped or open, a temperature sensor disconnected or
     stuck, the unit too hot or too cold), `OutOfRange`, `Disconnected`. Raises `DeviceFault` where the bench has no
-    chamber or nobody to set the unit, and as the devices do.
+    chamber or no operator, and as the devices do.
     """
     chamber, profile = bench.chamber, station.profile
     if chamber is None or bench.operator is None or station.angles is None or profile is None:
@@ -96,7 +96,7 @@ async def record_profile(bench: Bench, station: Station, request: str) -> Stream
 
 
 def _columns(channels: Sequence[Channel]) -> list[int]:
-    """Of the unit's temperature sensors. Raises `MissingChannel`."""
+    """Columns of the unit's temperature sensors. Raises `MissingChannel`."""
     names = [channel.name for channel in channels]
     for name in SENSORS:
         if name not in names:
@@ -109,7 +109,7 @@ async def _command(chamber: Chamber, leg: ProfileLeg) -> None:
 
 
 async def _driven(chamber: Chamber, profile: TemperatureProfile, stream: Stream, columns: list[int]) -> Blocks:
-    """The stream's blocks with what the chamber says beside them; each leg is commanded when the one before is done."""
+    """The stream's blocks with the chamber's readings appended; each leg is commanded when the one before is done."""
     progress, watch = ProfileProgress(profile), SensorWatch(profile)
     sensors = [stream.channels[c] for c in columns]
     checked = CheckedSamples(stream.rate_hz)
@@ -159,9 +159,9 @@ def _require_working(reading: ChamberReading) -> None:
 
 
 async def record_current(bench: Bench, station: Station) -> Stream:
-    """A converter alone: on, the station's current on its inputs, soak at its temperature, settle, begin the recording.
+    """Record a converter alone: on, the station's current on its inputs, soak at its temperature, settle, record.
 
-    The soak is over when the converter's *own* sensor says so, by the criterion of the station's profile, whose last
+    The soak is over by the converter's *own* sensor and the criterion of the station's profile, whose last
     leg is the temperature. The current flows meanwhile, so that what it heats is steady too. Raises `SoakNotReached`,
     `DeviceFault` (no such devices, chamber tripped or open, sensor disconnected), and as the devices do.
     """

@@ -1,4 +1,4 @@
-"""PORTS: what a bench must be able to do. A driver or a simulator implements them; a procedure sees only these."""
+"""PORTS, the interfaces of a bench. A driver or a simulator implements them; a procedure sees only these."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 SAFE_ORDER = ("turntable", "chamber", "current_source", "supply")
-"""The order in which devices are made safe: what moves first, what only wastes energy last. Written here alone."""
+"""Order in which devices are made safe: what moves first, what only wastes energy last. Defined nowhere else."""
 
 
 @dataclass
@@ -60,7 +60,7 @@ class Bench:
             raise ExceptionGroup("the bench could not be made safe", failures)
 
     def checkpoint(self) -> dict[str, Any] | None:
-        """What a simulated world needs to go on from here after a restart; a real bench has None: it never stops."""
+        """State from which a simulated bench can resume after a restart; None for a real bench, which never stops."""
         return None
 
     def close(self) -> None:

@@ -1,10 +1,10 @@
-"""The one way for time to pass."""
+"""The clock of a bench, the only way for a procedure to let time pass."""
 
 from typing import Protocol
 
 
 class Clock(Protocol):
-    """Bench time. On a simulated bench sleeping moves the world, on a real one it waits."""
+    """Clock of the bench. On a simulated bench sleeping moves the world, on a real one it waits."""
 
     def now_s(self) -> float:
         """Seconds since the bench was opened for the job's first launch."""

@@ -6,10 +6,10 @@ from typing import Protocol
 
 @dataclass(frozen=True)
 class CurrentSourceLimits:
-    """What the source can give, and how well its certificate says that it does."""
+    """Limits of the source and the accuracy by its certificate."""
 
     maximum_ma: float
-    """Of either sign."""
+    """Largest current of either sign."""
     gain_sd_ppm: float = 0.0
     """Standard uncertainty of its gain; constant over a job."""
     zero_sd_ma: float = 0.0
@@ -17,7 +17,7 @@ class CurrentSourceLimits:
 
 
 class CurrentSource(Protocol):
-    """Stands outside the chamber; both verbs return at once."""
+    """Current source outside the chamber; both verbs return at once."""
 
     @property
     def limits(self) -> CurrentSourceLimits: ...
@@ -27,5 +27,5 @@ class CurrentSource(Protocol):
         ...
 
     async def make_safe(self) -> None:
-        """No current."""
+        """Switch the current off."""
         ...

@@ -1,4 +1,4 @@
-"""What a laboratory declares of its bench: site, axis limits, and how well the table is known to point."""
+"""Declaration of a bench by its laboratory: site, axis limits, and accuracy of the table."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ class AxisLimits:
     rate_deg_s: float
     acceleration_deg_s2: float
     continuous: bool = False
-    """Whether slip rings let it turn without end; then the range limits position demands alone."""
+    """True if slip rings allow endless turning; then the range limits position demands alone."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,8 @@ class TableAccuracy:
     """Standard uncertainties of the table, from its acceptance test. All zero: the table is taken as ideal.
 
     `orthogonality` holds for each of the two right angles (outer to middle, middle to inner), constant over a
-    job; `pointing` for each axis anew at each station; `level` for the tilt of the outer axis about each horizontal
-    direction. The unit's seat on the table is not among them: a unit's axes *are* those of its mounting plate.
+    job; `pointing` for each axis, independently at each station; `level` for the tilt of the outer axis about each
+    horizontal direction. The unit's seat is not among them: a unit's axes *are* those of its mounting plate.
     """
 
     orthogonality_sd_arcsec: float = 0.0
@@ -49,9 +49,9 @@ class BenchDescription:
     simulated: bool
     title: str = ""
     chamber: ChamberLimits | None = None
-    """None: the bench has no thermal chamber."""
+    """Limits of the thermal chamber; None: the bench has none."""
     current_source: CurrentSourceLimits | None = None
-    """None: the bench has no precision current source."""
+    """Limits of the precision current source; None: the bench has none."""
 
     @property
     def axis_motion(self) -> tuple[tuple[float, float], ...]:
@@ -65,7 +65,7 @@ class BenchDescription:
     def violations(
         self, angles: TableAngles, turn: Turn | None = None, profile: TemperatureProfile | None = None
     ) -> tuple[str, ...]:
-        """One sentence for each limit that the angles pass, or whole turns that begin at them, or a profile."""
+        """Violations of the limits by angles, by whole turns that begin at them, or by a profile; a sentence each."""
         demands = (
             ("outer", self.outer, angles.outer_deg),
             ("middle", self.middle, angles.middle_deg),
@@ -81,7 +81,7 @@ class BenchDescription:
         return beyond if profile is None else beyond + self._profile_violations(profile)
 
     def current_violations(self, current_ma: float, profile: TemperatureProfile | None) -> tuple[str, ...]:
-        """The same for a converter alone: a current on its inputs, a profile that it soaks by."""
+        """Violations by a converter alone: of a current on its inputs, and of a profile that it soaks by."""
         found: tuple[str, ...] = () if profile is None else self._profile_violations(profile)
         if self.current_source is None:
             return (*found, f"bench {self.id} has no precision current source")

@@ -1,4 +1,4 @@
-"""What can go wrong on a bench.
+"""Errors that a bench can raise.
 
 BenchError
 ├── OutOfRange      a demand beyond a limit: refused before anything moves, never clamped
@@ -14,7 +14,7 @@ BenchError
 
 
 class BenchError(Exception):
-    """Something on the bench went wrong; the message is fit for a person."""
+    """Base of all bench errors; the message is fit for a person."""
 
 
 class OutOfRange(BenchError):

@@ -1,4 +1,4 @@
-"""The unit's data link."""
+"""Port of the unit's data link."""
 
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from procedures.core.recording import Channel, Station
 
 @dataclass(frozen=True)
 class Stream:
-    """A recording that is being made: its description, and its raw blocks as they arrive, each (n, channels) int32."""
+    """Recording in progress: its description, and its raw blocks as they arrive, each (n, channels) int32."""
 
     channels: tuple[Channel, ...]
     rate_hz: float
@@ -24,7 +24,7 @@ class Stream:
 
 
 class Imu(Protocol):
-    """What the unit sends."""
+    """Data link of the unit, from which recordings are read."""
 
     @property
     def channels(self) -> tuple[Channel, ...]: ...

@@ -1,4 +1,4 @@
-"""What a job asks of a bench before it is opened."""
+"""Requirements of a job on its bench, before the bench is opened."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,18 +9,18 @@ from procedures.core.recording import Station
 
 @dataclass(frozen=True)
 class BenchNeeds:
-    """How the unit is to send, and whether temperature matters to the job."""
+    """Required sample rate, and the optional sensors and sources that a job uses."""
 
     sample_rate_hz: float | None = None
-    """None: the unit's own."""
+    """Sample rate of the unit; None: its own rate."""
     temperatures: bool = False
-    """Whether the unit's temperature sensors are read. A simulated unit then feels its temperature too."""
+    """True if the unit's temperature sensors are read. A simulated unit then senses its temperature too."""
     currents: bool = False
-    """Whether what is tested is a converter alone, a current source on its inputs, instead of a whole unit."""
+    """True if a converter alone is tested, with a current source on its inputs, instead of a whole unit."""
 
     @classmethod
     def of(cls, stations: Sequence[Station]) -> "BenchNeeds":
-        """What all stations of a job need together. Raises `BadParameter` where they disagree."""
+        """Requirements of all stations of a job together. Raises `BadParameter` where they disagree."""
         rates = {station.sample_rate_hz for station in stations}
         if len(rates) > 1:
             raise BadParameter("stations", sorted(map(str, rates)), "one sample_rate_hz for all stations of a job")

@@ -1,4 +1,4 @@
-"""The person at the bench: what no device can do."""
+"""The person at the bench, for work that no device can do."""
 
 from typing import Protocol
 
@@ -6,12 +6,12 @@ from procedures.core.table_angles import TableAngles
 
 
 class Operator(Protocol):
-    """Asked in words; the answer comes when the work is done. A simulated bench answers itself."""
+    """Operator at the bench. A request returns when the work is done; a simulated bench does it itself."""
 
     async def set_by_hand(self, angles: TableAngles, request: str) -> None:
-        """Set the unit by hand so that it stands as it would at these table angles; returns when a person says so.
+        """Set the unit by hand in the attitude of these table angles; returns when the operator confirms it.
 
-        `request` says it in words for the person's screen. The unit is off meanwhile. Raises `Stopped` where the
-        person refuses.
+        `request` is the instruction on the operator's screen. The unit is off meanwhile. Raises `Stopped` where the
+        operator refuses.
         """
         ...

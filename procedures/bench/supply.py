@@ -1,10 +1,10 @@
-"""The unit's power supply."""
+"""Port of the unit's power supply."""
 
 from typing import Protocol
 
 
 class Supply(Protocol):
-    """Switches the unit. Both verbs are idempotent: switching on what is on is no new launch."""
+    """Power switch of the unit. Both verbs are idempotent: switching on what is on is no new launch."""
 
     async def switch_on(self) -> None: ...
 
@@ -13,5 +13,5 @@ class Supply(Protocol):
     def is_on(self) -> bool: ...
 
     async def make_safe(self) -> None:
-        """Switch the unit off."""
+        """Switch the unit's power off."""
         ...

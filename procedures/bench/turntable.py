@@ -1,4 +1,4 @@
-"""The three-axis turntable."""
+"""Port of the three-axis turntable."""
 
 from typing import Protocol
 
@@ -7,8 +7,8 @@ from procedures.core.turn import Turn
 
 
 class Turntable(Protocol):
-    """Verbs tell time: `move_to` returns when the axes are at rest and locked, `command_turn` and `read_angles` at
-    once.
+    """Port of the turntable. `move_to` returns when all axes are at rest and locked, `command_turn` and `read_angles`
+    at once.
     """
 
     async def move_to(self, angles: TableAngles) -> None:
@@ -23,20 +23,20 @@ class Turntable(Protocol):
         ...
 
     async def settle(self) -> None:
-        """Return when what was commanded is done and the axes are at rest and locked; at once where they are.
+        """Wait until the commanded motion is done and the axes are at rest and locked; at once where they are.
 
         Raises `NotSettled`, `DeviceFault`, `Stopped` where another demand took over.
         """
         ...
 
     def read_angles(self) -> TableAngles:
-        """Where the encoders say the axes are."""
+        """Read the present angles of the axes from the encoders."""
         ...
 
     def is_moving(self) -> bool:
-        """Whether the axes follow a demand, or settle after it; asked at any time, it disturbs nothing."""
+        """True while the axes follow a demand or settle after it; safe to ask at any time."""
         ...
 
     async def make_safe(self) -> None:
-        """Ramp down to rest and lock, whatever it was doing."""
+        """Ramp down to rest and lock, from any motion."""
         ...

@@ -1,4 +1,4 @@
-"""ONE FILE = ONE PROCEDURE. A file put here is found, listed by the service with its schema, and tested for form."""
+"""Catalogue of procedures, one file each. A file put in this folder is found, listed with its schema, and tested."""
 
 from typing import Any
 
@@ -12,5 +12,5 @@ def find() -> Discovered[Procedure[Any, Any]]:
 
 
 def discover() -> dict[str, Procedure[Any, Any]]:
-    """Every PROCEDURE of this folder by name, which is the file's. Raises what is wrong with the first broken file."""
+    """All procedures of this folder by name, which is the file's. Raises the error of the first broken file."""
     return find().complete()

@@ -48,7 +48,7 @@ from procedures.site_parameters import TableParameters, declared_table
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 Lag = Annotated[float, Field(ge=0.0, le=600.0)]
 LEAST_DWELL_S = 10.0
-"""What the temperatures of a station need: means, slopes, and their scatter."""
+"""Least dwell for the temperatures of a station: means, slopes, and their scatter [s]."""
 
 
 _NOT_PREDICTED = (
@@ -57,7 +57,7 @@ _NOT_PREDICTED = (
 
 
 class Limits(Parameters):
-    """Requirements on the unit (thesis 4.3, 5.6) and on the calibration itself (ours)."""
+    """Requirements on the unit (thesis 4.3, 5.6) and on the calibration itself (this program's own)."""
 
     gyro_bias_in_run_deg_h: float = Field(0.015, gt=0.0, le=1e6)
     gyro_bias_run_to_run_deg_h: float = Field(0.015, gt=0.0, le=1e6)
@@ -70,7 +70,7 @@ class Limits(Parameters):
 
 
 class Params(TableParameters):
-    """What to do, where, and what to hold the unit to. None takes the unit's or the bench's value."""
+    """Orientations, dwell, site and limits of the calibration. None takes the unit's or the bench's value."""
 
     orientations: tuple[tuple[Angle, Angle], ...] = Field(
         THESIS_ORIENTATIONS, min_length=1, max_length=200, description="(β, γ) [deg], in order"
@@ -95,7 +95,7 @@ class Params(TableParameters):
 
 
 class Result(Outcome):
-    """Both triads' coefficients, how well they describe the stations, and the verdict."""
+    """Coefficients of both triads, their goodness of fit at the stations, and the verdict."""
 
     triads: tuple[TriadSummary, ...]
     thermal: ThermalShare | None = Field(
@@ -117,7 +117,7 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """One station an orientation, in the order given."""
+    """Stations of the calibration, one an orientation, in the order given."""
     turn = orientation_beta_gamma if params.rotation_order == "x_after_z" else orientation_gamma_beta
     if params.dwell_s is None:
         raise BadParameter("dwell_s", None, "resolve the parameters first: the dwell comes from the unit")
@@ -174,12 +174,12 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """One a triad."""
+    """Calibrations that the result gives, one a triad."""
     return tuple(t.calibration for t in result.triads)
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """Its checks and its coefficients."""
+    """Checks and coefficients that a result will have."""
     checks = (" bias in run, δ/√3", " condition number", " residuals, p-value of chi-square")
     return tuple(f"{triad}{n}" for triad in TRIAD_NAMES for n in (*checks, *(f".{c}" for c in COEFFICIENT_NAMES)))
 
@@ -205,7 +205,7 @@ def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
 
 
 def _require_scalar(params: Params, accelerometer: TriadPlan) -> None:
-    """Refuse a set that the cross-check cannot use, and say how to go on without it."""
+    """Refuse a set that the cross-check cannot use; the error names the way without it."""
     if not params.scalar_check:
         return
     directions = accelerometer.vectors / np.linalg.norm(accelerometer.vectors, axis=1)[:, None]
@@ -229,7 +229,7 @@ def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
 
 
 def _warnings(params: Params, plans: Sequence[TriadPlan]) -> tuple[str, ...]:
-    """Limits that the plan cannot resolve, and triads whose noise is not known."""
+    """Warnings of limits that the plan cannot resolve, and of triads with unknown noise."""
     limits = params.limits
     requirements = run_to_run_requirements(
         limits.gyro_bias_run_to_run_deg_h,

@@ -2,7 +2,7 @@
 
 A precision source gives equal and opposite currents to all three channels at every soak of a chamber; mean codes give
 zero and scale (T 3.10–3.13), and these the normalised functions Fs and Fc that are the first stage of a thermal
-compensation. A soak is over when the converter's own sensor says so. Currents, temperatures and times are ours.
+compensation. A soak is over by the converter's own sensor. Currents, temperatures and times are this program's own.
 """
 
 from collections.abc import AsyncIterator, Sequence
@@ -30,7 +30,7 @@ TEMPERATURES_C = tuple(float(t) for t in range(-40, 61, 10))
 
 
 class Limits(Parameters):
-    """Requirements on the converter (ours) and on how well the functions describe it (ours)."""
+    """Requirements on the converter and on the residuals of its functions (all this program's own)."""
 
     zero_codes: float = Field(100.0, gt=0.0, le=1e6, description="|zero| at the reference")
     zero_change_codes: float = Field(20.0, gt=0.0, le=1e6, description="largest change of zero in the range (C's Δmax)")
@@ -40,7 +40,7 @@ class Limits(Parameters):
 
 
 class Params(Parameters):
-    """Currents, soaks, and what to hold the converter to."""
+    """Currents, soaks, and limits of the converter."""
 
     current_ma: float = Field(10.0, gt=0.0, le=1000.0, description="given with either sign")
     temperatures_c: tuple[float, ...] = Field(TEMPERATURES_C, min_length=5, max_length=100)
@@ -61,7 +61,7 @@ class Params(Parameters):
 
 @dataclass(frozen=True)
 class ChannelResult:
-    """One channel: its model, what it was fitted to, and how the orders were chosen."""
+    """Result of one channel: its model, the fitted data, and how the orders were chosen."""
 
     name: str
     model: ConverterModel
@@ -70,7 +70,7 @@ class ChannelResult:
     scale_code_per_ma: tuple[float, ...]
     zero_code: tuple[float, ...]
     zero_ma: tuple[float, ...]
-    """T 3.13."""
+    """Zero at the input of T 3.13."""
     scale_bic: tuple[float, ...]
     zero_bic: tuple[float, ...]
 
@@ -116,12 +116,12 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 SOAK_GUESS_S = 5400.0
-"""How long a converter in its case takes to drift by no more than the default criterion: case and board follow with
+"""Time that a converter in its case takes to drift by no more than the default criterion: case and board follow with
 some ten minutes each. Only for previews."""
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration, roughly; what the functions will be worth depends on noise that nobody declares."""
+    """Predict the duration, roughly; the uncertainty of the functions depends on noise that is not declared."""
     params = resolve(params, context)
     reach = np.abs(
         np.diff([context.bench.chamber.ambient_c if context.bench.chamber else 20.0, *params.temperatures_c])
@@ -153,7 +153,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def corrections(result: Result) -> tuple[UnitCorrection, ...]:
-    """The first stage."""
+    """Correction of the first stage that the result gives."""
     x, y, z = (channel.model for channel in result.channels)
     triad: ConverterTriad = (x, y, z)
     return (UnitCorrection("converter", triad),)
@@ -208,7 +208,7 @@ def _checks(channel: ChannelResult, limits: Limits) -> list[Check]:
 
 
 def report(result: Result) -> Report:
-    """Coefficients, soaks, and the normalised functions with what they were fitted to."""
+    """Report of coefficients, soaks, and the normalised functions with the data that they were fitted to."""
     rows: list[tuple[str | float | None, ...]] = []
     for channel in result.channels:
         for title, part in (("Fc, K0 in codes/mA", channel.model.scale), ("Fs, N0 in codes", channel.model.zero)):

@@ -2,7 +2,7 @@
 
 The unit rests at known attitudes, aligns itself from its corrected means, is switched off and does it again. The
 errors against the table and its azimuth are judged by what calibration, launches, noise and table let expect; the
-azimuth error of thesis 1.1, in which only the noise within a launch is, stands beside it.
+azimuth error of thesis 1.1, which covers only the noise within a launch, is reported as well.
 """
 
 from collections.abc import AsyncIterator, Sequence
@@ -49,14 +49,14 @@ Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 
 
 class Limits(Parameters):
-    """Requirements on the alignment and on its agreement with the prediction (ours; the thesis prints none)."""
+    """Requirements on the alignment and its agreement with the prediction (this program's own, none in the thesis)."""
 
     heading_sd_max_deg: float = Field(0.1, gt=0.0, le=180.0, description="expected of one alignment's heading")
     prediction_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the errors' chi-square")
 
 
 class Params(TableParameters):
-    """Where, how long, how often. None takes the bench's value."""
+    """Attitudes, durations and number of the alignments. None takes the bench's value."""
 
     orientations: tuple[tuple[Angle, Angle, Angle], ...] = Field(
         ((0.0, 0.0, 0.0),),
@@ -75,12 +75,12 @@ class Params(TableParameters):
 
 
 class Result(Outcome):
-    """Every alignment, and each angle's errors beside their prediction."""
+    """Result of every alignment, and each angle's errors with their prediction."""
 
     basis: str
     alignments: tuple[Alignment, ...]
     angles: tuple[AngleErrors, AngleErrors, AngleErrors]
-    """Heading, pitch, roll."""
+    """Errors of heading, pitch and roll."""
     thesis: ThesisPrediction | None
 
 
@@ -155,7 +155,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def report(result: Result) -> Report:
-    """Found beside predicted, where the prediction comes from, and every alignment."""
+    """Report of found and predicted errors, the source of the prediction, and every alignment."""
     sections = (
         pictures.errors_table(result.angles),
         pictures.sources_table(result.angles),

@@ -11,11 +11,11 @@ from procedures.procedure import Context, Outcome, Parameters, Prediction, Proce
 
 
 class Params(Parameters):
-    """Nothing to choose."""
+    """No parameters to be chosen."""
 
 
 class Result(Outcome):
-    """Nothing was measured."""
+    """Result without any measurement."""
 
 
 def resolve(params: Params, context: Context) -> Params:
@@ -31,7 +31,7 @@ def predict(params: Params, context: Context) -> Prediction:
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
-    """Records nothing, whatever it is given."""
+    """Record nothing, for any stations."""
     for _ in ():
         yield _
 
@@ -46,7 +46,7 @@ def report(result: Result) -> Report:
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """None: nothing is measured."""
+    """No quantities of a result: nothing is measured."""
     return ()
 
 

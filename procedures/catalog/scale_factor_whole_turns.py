@@ -38,11 +38,11 @@ from procedures.site_parameters import Arcsec
 Rate = Annotated[float, Field(ge=0.1, le=3600.0)]
 
 ACCELERATION_SHARE = 0.9
-"""Of the outer axis' acceleration, for ramps that are not told; the rest is for the servo."""
+"""Share of the outer axis' acceleration for ramps without a given length; the rest is for the servo."""
 
 
 class Limits(Parameters):
-    """Requirements, ours: on the measurement, and on the unit by the limit on the scale factor of thesis 4.3."""
+    """Requirements on the measurement (this program's own), and on the unit by thesis 4.3 (scale factor)."""
 
     scale_factor_3_sigma_ppm: float = Field(1.0, gt=0.0, le=1e6, description="three standard uncertainties")
     asymmetry_ppm: float = Field(10.0, gt=0.0, le=1e6)
@@ -51,7 +51,7 @@ class Limits(Parameters):
 
 
 class Params(Parameters):
-    """How to turn, and what to hold the unit to. None takes the bench's value."""
+    """Rates and durations of the turns, and limits of the unit. None takes the bench's value."""
 
     rates_deg_s: tuple[Rate, ...] = Field(
         (10.0, 20.0, 30.0, 40.0, 50.0), min_length=1, max_length=50, description="each forth and back, about each axis"
@@ -111,9 +111,9 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration, every coefficient's uncertainty, and whether 3σ of the scale factor comes within its limit.
+    """Predict the duration, every coefficient's uncertainty, and if 3σ of the scale factor comes within its limit.
 
-    Raises `Undetermined` where the rates cannot tell the terms apart, `BadParameter` where the table cannot turn so.
+    Raises `Undetermined` where the rates cannot separate the terms, `BadParameter` where the table cannot turn so.
     """
     params = resolve(params, context)
     _require_possible(params, context.bench)
@@ -204,7 +204,7 @@ def _site(params: Params, context: Context) -> Site:
 
 
 def _require_possible(params: Params, bench: BenchDescription) -> None:
-    """Refuse what the table cannot do, before anything moves."""
+    """Refuse turns that the table cannot make, before anything moves."""
     for station in schedule(params):
         if station.angles is not None and (found := bench.violations(station.angles, station.turn)):
             raise BadParameter("rates_deg_s", params.rates_deg_s, f"station {station.label}: {'; '.join(found)}")

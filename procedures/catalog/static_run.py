@@ -28,7 +28,7 @@ DWELL_STEP_S = 5.0
 
 
 class Params(NoiseParameters):
-    """How many launches, how long, and how to analyse them."""
+    """Number and duration of the launches, and settings of their analysis."""
 
     launches: int = Field(4, ge=1, le=100)
     duration_s: float = Field(21_600.0, ge=600.0, le=1_209_600.0, description="of each launch")
@@ -52,7 +52,7 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """One station a launch."""
+    """Stations of the run, one a launch."""
     angles = TableAngles(params.outer_deg, params.middle_deg, params.inner_deg)
     return tuple(
         Station(
@@ -70,7 +70,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration, and how well each coefficient that is expected will be known after all launches."""
+    """Predict the duration, and the uncertainty of each expected coefficient after all launches."""
     stations = schedule(params)
     duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1])
     found: list[PredictedUncertainty] = []
@@ -103,7 +103,7 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Each launch on its own, then all of them together."""
+    """Analyse each launch on its own, then all of them together."""
     return analyse_launches(Result, recordings, params)
 
 
@@ -113,7 +113,7 @@ def report(result: Result) -> Report:
 
 
 def learns(result: Result, unit: Unit, origin: str) -> Unit:
-    """The unit with the noise and the averaging time that were found: what later previews and dwells rest on."""
+    """Update the unit's record with the noise and the averaging time found, for later previews and dwells."""
     records: dict[str, TriadRecord | None] = {"gyro": unit.gyro, "accelerometer": unit.accelerometer}
     known = {
         name: noise
@@ -133,7 +133,7 @@ def learns(result: Result, unit: Unit, origin: str) -> Unit:
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """Its checks: of channels in counts only that there is a noise."""
+    """Checks that a result will have; for channels in counts only that there is noise."""
     rates = [(c.name, c.rate_unit) for c in context.unit.channels if c.rate_unit in ("rad/s", "m/s^2")]
     walks = [f"{name} random walk" for name, unit in rates if unit == "rad/s"]
     return (*walks, *(f"{name} bias instability" for name, _ in rates)) if rates else ("noise processes observed",)

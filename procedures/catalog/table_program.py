@@ -1,7 +1,7 @@
 """A position program of the table's controller, run as it is written, with a recording at every dwell (thesis, app. Д).
 
 The program is text in the controller's language, or a list of positions that is written as one. Nothing is judged but
-that every dwell was recorded whole: what the means say, an analysis or a person says.
+that every dwell was recorded whole: the meaning of the means is left to an analysis or a person.
 """
 
 from collections.abc import AsyncIterator, Sequence
@@ -37,7 +37,7 @@ Rate = Annotated[float, Field(gt=0.0, le=1e5)]
 
 
 class Params(Parameters):
-    """The program, as text or as positions, and what its delays count from. Neither: the thesis's own program."""
+    """Program as text or as positions, and the timing of its delays. Neither: the thesis's own program."""
 
     program: str | None = Field(
         None,
@@ -63,7 +63,7 @@ class Params(Parameters):
 
 
 class Result(Outcome):
-    """The program as it was understood, and what every dwell's recording holds."""
+    """Program as it was read, and the means of every dwell's recording."""
 
     program: str
     dwells: tuple[DwellRecord, ...]
@@ -80,7 +80,7 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """One station a dwell, in order, its label naming the program's line. The table starts from its zero.
+    """Stations of the program, one a dwell, in order, labelled by the program's line. The table starts from its zero.
 
     Raises `BadParameter` "program" for a line outside the dialect, and for a delay that moving and settling use up.
     """
@@ -133,7 +133,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def report(result: Result) -> Report:
-    """A row a dwell with every channel's mean, and the standard uncertainties in a table of their own."""
+    """Table of every channel's mean, a row a dwell, and one of the standard uncertainties."""
     names = [(m.channel, *units.DISPLAY.get(m.unit, (m.unit, 1.0))) for m in result.dwells[0].means]
     columns = ("dwell", *(f"{name}, {unit}" for name, unit, _ in names))
     means = tuple(
@@ -173,14 +173,14 @@ def _dwells(params: Params) -> tuple[Dwell, ...]:
 
 
 def _used_s(dwell: Dwell, at: TableAngles, params: Params) -> float:
-    """What of a delay is gone before the recording: the least time to move, and the settling [s]."""
+    """Time of a delay used before the recording: the least time to move, and the settling [s]."""
     if params.axis_motion is None:
         raise BadParameter("axis_motion", None, "resolve the parameters first: how fast the axes move the bench says")
     return move_time_s(at, dwell.angles, params.axis_motion) + params.settle_s
 
 
 def _recorded_s(dwell: Dwell, used_s: float) -> float:
-    """What of a delay is recorded [s]. Raises `BadParameter` where hardly anything is left."""
+    """Time of a delay left for the recording [s]. Raises `BadParameter` where hardly anything is left."""
     left = GRAIN_S * floor((dwell.delay_s - used_s) / GRAIN_S + 1e-6) if used_s > 0.0 else dwell.delay_s
     if left < SHORTEST_S:
         expected = f"a delay of at least {used_s + SHORTEST_S:.3g} s, of which moving and settling take {used_s:.3g} s"

@@ -2,7 +2,7 @@
 
 Thesis 3.2 and 4.2, paper C. Each run is one launch of about twelve hours: the unit is set by hand, rests switched off,
 and is recorded with all its temperature sensors while the chamber goes through soaks and ramps. A leg ends when the
-*unit* has soaked, by the slopes of its own sensors. The profile, its times and its criterion are ours: the thesis shows
+*unit* has soaked, by the slopes of its own sensors. Profile, times and criterion are this program's own: the thesis has
 its profile in a figure only.
 """
 
@@ -36,9 +36,9 @@ from procedures.procedure import STATIONS, Context, Outcome, Parameters, Predict
 from procedures.reports import thermal_figures, thermal_tables
 
 LEAST_OFF_S = 3.0 * units.HOUR
-"""Thesis 4.2.1: at least three hours off between runs."""
+"""Least time switched off between runs, three hours (thesis 4.2.1)."""
 UPRIGHT_SHARE = 0.99
-"""Of gravity that an axis which is up feels at least."""
+"""Least share of gravity along an axis that counts as up."""
 
 
 class Leg(Parameters):
@@ -61,11 +61,11 @@ DEFAULT_LEGS = (
     *(_leg(target, 5100.0) for target in (-20.0, 0.0, 20.0, 40.0, 60.0)),
     _leg(20.0, 7080.0),
 )
-"""Twelve hours: by these least times a unit whose case takes some twenty minutes has soaked at every temperature."""
+"""Twelve hours: within these least times a unit with a case time constant of some twenty minutes soaks at every leg."""
 
 
 class Soak(Parameters):
-    """When the unit counts as soaked: judged from its own case and converter sensors every ten seconds."""
+    """Soak criterion of the unit, judged from its own case and converter sensors every ten seconds."""
 
     slope_c_min: float = Field(0.1, ge=1e-4, le=100.0, description="most that either sensor may drift")
     window_s: float = Field(300.0, ge=60.0, le=86_400.0, description="of the straight line whose slope that is")
@@ -73,7 +73,7 @@ class Soak(Parameters):
 
 
 class Regime(Parameters):
-    """The indicator of T 3.18."""
+    """Settings of the regime indicator of T 3.18."""
 
     memory_s: float = Field(120.0, ge=3.0, le=86_400.0)
     enter_c_s2: float = Field(4.0e-6, gt=0.0, le=1.0)
@@ -83,7 +83,7 @@ class Regime(Parameters):
 
 
 class Limits(Parameters):
-    """Requirements (thesis 4.3, 5.6; tests at the level of significance are ours)."""
+    """Requirements (thesis 4.3, 5.6; tests at the level of significance are this program's own)."""
 
     three_sigma_m_s2: float = Field(0.0005, gt=0.0, le=100.0, description="of each axis after correction, worst soak")
     magnitude_rms_m_s2: float = Field(0.0005, gt=0.0, le=100.0, description="of |ĝ| about its mean, worst run")
@@ -95,7 +95,7 @@ class Limits(Parameters):
 
 
 class Params(Parameters):
-    """The profile, the analysis, and what to hold the unit to."""
+    """Profile, analysis and limits of the cycle."""
 
     legs: tuple[Leg, ...] = Field(DEFAULT_LEGS, min_length=1, max_length=100)
     soak: Soak = Field(default_factory=lambda: Soak.model_validate({}))
@@ -129,12 +129,12 @@ class Params(Parameters):
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
     def profile(self) -> TemperatureProfile:
-        """The same for the bench. Raises `BadParameter`."""
+        """Convert to the profile of the bench. Raises `BadParameter`."""
         legs = tuple(ProfileLeg(**leg.model_dump()) for leg in self.legs)
         return TemperatureProfile(legs, SoakCriterion(**self.soak.model_dump()), self.unit_margin_c)
 
     def settings(self) -> CycleSettings:
-        """The same for the numerics. Raises `BadParameter`."""
+        """Convert to the settings of the numerics. Raises `BadParameter`."""
         return CycleSettings(
             cell_s=self.cell_s,
             case_lag_s=self.case_lag_s,
@@ -149,18 +149,18 @@ class Params(Parameters):
 
 
 class Result(Outcome):
-    """The correction, and what it and the gyros are worth over temperature."""
+    """Thermal correction, and the performance of it and of the gyros over temperature."""
 
     cycle: ThermalCycle
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Gravity of the site."""
+    """Gravity at the site of the bench."""
     return params.filled({"gravity_m_s2": context.bench.site.gravity_m_s2})
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """One station a run, x, y and z up; `record_s` is the longest that it may take."""
+    """Stations of the cycle, one a run, x, y and z up; `record_s` is the longest that it may take."""
     profile = params.profile()
     return tuple(
         Station(
@@ -178,7 +178,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration and what is known to be missing. Raises `BadParameter` where the cycle could give nothing."""
+    """Predict the duration and name what is missing. Raises `BadParameter` where the cycle could give nothing."""
     profile = params.profile()
     params.settings()
     _require_possible(params, context)
@@ -200,7 +200,7 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Each run read once, block by block; then one fit over all of them, and the judgement."""
+    """Read each run once, block by block; then fit all of them together, and judge the correction."""
     params = resolve(params, context)
     _require_correction(params, context)
     site = site_with(context.bench.site, None, params.gravity_m_s2, None, None)
@@ -232,12 +232,12 @@ def corrections(result: Result) -> tuple[UnitCorrection, ...]:
 
 
 def uses_corrections(params: Params) -> tuple[CorrectionKind, ...]:
-    """Stage one rests on the converter's models; the unit's own correction is judged, or shown beside the new one."""
+    """Kinds of corrections used: the converter's models in stage one; the unit's own as judged or for comparison."""
     return "converter", "thermal"
 
 
 def report(result: Result) -> Report:
-    """Tables 4.3 to 4.7 and figures 3.15 to 3.17 and 4.11 to 4.16 of the thesis, in our words."""
+    """Report with Tables 4.3 to 4.7 and figures 3.15 to 3.17 and 4.11 to 4.16 of the thesis, reworded."""
     cycle = result.cycle
     return Report(thermal_tables.summary(cycle), (*thermal_tables.tables(cycle), *thermal_figures.figures(cycle)))
 

@@ -43,7 +43,7 @@ ORIENTATIONS = tuple((40.0 * i, 10.0 * i, 20.0 * i) for i in range(9))
 
 
 class Limits(Parameters):
-    """Requirements on the unit (thesis 4.3, 5.6) and on its agreement with the prediction (ours)."""
+    """Requirements on the unit (thesis 4.3, 5.6) and on its agreement with the prediction (this program's own)."""
 
     gyro_bias_in_run_deg_h: float = Field(0.015, gt=0.0, le=1e6)
     accelerometer_bias_in_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
@@ -51,7 +51,7 @@ class Limits(Parameters):
 
 
 class Params(SiteParameters):
-    """Where to look and what to hold the unit to. None takes the unit's or the bench's value."""
+    """Orientations of the verification and limits of the unit. None takes the unit's or the bench's value."""
 
     orientations: tuple[tuple[Angle, Angle, Angle], ...] = Field(
         ORIENTATIONS, min_length=2, max_length=200, description="(inner, middle, outer) [deg], in order"
@@ -63,7 +63,7 @@ class Params(SiteParameters):
 
 
 class Result(Outcome):
-    """Both triads' magnitudes before and after correction, and whether they are as predicted."""
+    """Magnitudes of both triads before and after correction, and their agreement with the prediction."""
 
     triads: tuple[TriadVerification, ...]
 
@@ -74,7 +74,7 @@ def resolve(params: Params, context: Context) -> Params:
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
-    """One station an orientation, in the order given."""
+    """Stations of the verification, one an orientation, in the order given."""
     if params.dwell_s is None:
         raise BadParameter("dwell_s", None, "resolve the parameters first: the dwell comes from the unit")
     return tuple(
@@ -118,7 +118,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
-    """Its checks."""
+    """Names of the checks that a result will have."""
     checks = ("bias in run, δ/√3", "errors as predicted, p-value of chi-square")
     return tuple(f"{triad} {c}" for triad in TRIAD_NAMES for c in checks)
 
@@ -132,7 +132,7 @@ def report(result: Result) -> Report:
 
 
 def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
-    """Magnitudes do not see where the table really stands, so its uncertainty stays out."""
+    """Plan of a triad without the table's uncertainty, because magnitudes do not depend on the table's attitude."""
     calibration_of(context.unit, triad)
     site = params.site(context)
     return triad_plan(triad, context.unit, schedule(params), context.bench.axis_motion, site, TableUncertainty())

@@ -1,4 +1,4 @@
-"""The one array type of the numerics; shapes stand in the docstrings."""
+"""The one array type of the numerics; docstrings give the shapes."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,6 +1,6 @@
 """Name of a triad's coefficient: triad and symbol inside, the dotted text "gyro.b_x" at the edges only.
 
-The text is what results, limits and trends show. It is made and read in this file and nowhere else.
+The text appears in results, limits and trends. It is made and parsed in this file and nowhere else.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ class CoefficientName(str):
 
     __slots__ = ("symbol", "triad")
     triad: str
-    """"gyro" or "accelerometer"."""
+    """Triad by its name, either "gyro" or "accelerometer"."""
     symbol: str
     """"b_x", "K11", "asymmetry_x", …"""
 

@@ -12,21 +12,21 @@ from procedures.core import units
 from procedures.core.arrays import Array
 
 CURRENT_MA_PER_M_S2 = 1.1 / units.STANDARD_GRAVITY
-"""Of an accelerometer's nominal output: 1.1 mA a standard g (thesis table 1.3)."""
+"""Current of an accelerometer's nominal output: 1.1 mA a standard g (thesis table 1.3)."""
 
 
 @dataclass(frozen=True)
 class Normalised:
-    """``value(t) = value_0·F(t)`` with F(t_0) = 1, or ``value_0 + F(t)`` with F(t_0) = 0: the kind says which."""
+    """Normalised function: ``value_0·F(t)`` with F(t_0) = 1 if `relative`, else ``value_0 + F(t)`` with F(t_0) = 0."""
 
     relative: bool
     reference_c: float
     at_reference: float
-    """value_0, in the unit of the values."""
+    """Value at the reference value_0, in the unit of the values."""
     coefficients: tuple[float, ...]
     """a_1 … a_q of F, in 1/°C^k, or in the unit of the values a °C^k."""
     covariance: tuple[tuple[float, ...], ...]
-    """Of value_0, a_1 … a_q, (q + 1, q + 1)."""
+    """Covariance of value_0, a_1 … a_q, (q + 1, q + 1)."""
     residual_sd: float
 
     def function(self, temperature_c: Array) -> Array:
@@ -41,7 +41,7 @@ class Normalised:
         return self.at_reference * f if self.relative else self.at_reference + f
 
     def largest_change(self, low_c: float, high_c: float) -> float:
-        """C's Δmax: the largest change from the reference within a range [°C], in the unit of the values."""
+        """Largest change from the reference within a range [°C], in the unit of the values (Δmax of paper C)."""
         grid = np.linspace(low_c, high_c, 1001)
         return float(np.max(np.abs(self.value(grid) - self.at_reference)))
 
@@ -51,16 +51,16 @@ class ConverterModel:
     """``N(I, t) = K0·Fc(t)·I + N0 + Fs(t)`` of one channel, t its own sensor's reading."""
 
     scale: Normalised
-    """K0 [codes a mA] and Fc."""
+    """Scale K0 [codes a mA] and Fc."""
     zero: Normalised
-    """N0 [codes] and Fs."""
+    """Zero N0 [codes] and Fs, the change."""
 
     def code(self, current_ma: ArrayLike, temperature_c: Array) -> Array:
-        """What the channel would send, before it is a whole number, at temperatures (n,) [°C]."""
+        """Output code of the channel before rounding, at temperatures (n,) [°C]."""
         return self.scale.value(temperature_c) * np.asarray(current_ma) + self.zero.value(temperature_c)
 
     def current_ma(self, code: Array, temperature_c: Array) -> Array:
-        """Input current of codes (n,) at temperatures (n,): what stage two is given."""
+        """Input current of codes (n,) at temperatures (n,), for stage two."""
         return (code - self.zero.value(temperature_c)) / self.scale.value(temperature_c)
 
 

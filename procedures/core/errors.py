@@ -1,4 +1,4 @@
-"""What an analysis or a plan can refuse. No status codes here: the service has one table for them.
+"""Errors by which an analysis or a plan refuses. They carry no status codes: the service has one table for them.
 
 DomainError
 ├── BadParameter    a parameter's value is not allowed: names the field, the value and what is allowed

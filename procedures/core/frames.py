@@ -1,4 +1,4 @@
-"""Attitudes of the unit on the table, and what gravity and the Earth's rotation are in its axes.
+"""Attitudes of the unit on the table, and gravity and the Earth's rotation in its axes.
 
 This is the *judge's* geometry: commanded angles through ideal, orthogonal axes. The simulated table
 has its own kinematics (MuJoCo bodies) and shares nothing with this file.
@@ -37,7 +37,7 @@ def orientation_gamma_beta(beta_deg: float, gamma_deg: float) -> TableAngles:
 
 
 def reference_rotation(azimuth_deg: float) -> Rotation:
-    """``rot_nr``: reference axes in local level; azimuth clockwise from north is a turn of −azimuth about up."""
+    """Rotation ``rot_nr`` from reference axes to local level: a clockwise azimuth is a turn of −azimuth about up."""
     return Rotation.from_euler("y", -azimuth_deg, degrees=True)
 
 

@@ -1,7 +1,7 @@
 """Error-model coefficients of a triad and the correction they give.
 
 The model is ``U = b + K·v + n`` (thesis 3.30, 3.34): U the unit's nominal output, v the specific force or
-angular rate in its orthogonal axes. Here live the *type* and the inverse; the forward model that makes data
+angular rate in its orthogonal axes. This module has the *type* and the inverse; the forward model that makes data
 is written a second time, independently, in the simulator.
 """
 
@@ -29,11 +29,11 @@ class TriadCalibration:
     """
 
     triad: str
-    """"gyro" or "accelerometer"."""
+    """Triad by its name, either "gyro" or "accelerometer"."""
     output_unit: str
     """Unit of the output U and of b: "rad/s", "m/s^2" or "count"."""
     input_unit: str
-    """Unit of v: "rad/s" or "m/s^2"."""
+    """Unit of the input v, "rad/s" or "m/s^2"."""
     bias: Vector
     matrix: Matrix
     covariance: Matrix = field(repr=False)
@@ -52,12 +52,12 @@ class TriadCalibration:
 
     @property
     def bias_array(self) -> Array:
-        """b, shape (3,)."""
+        """Bias b as an array, shape (3,)."""
         return np.array(self.bias, dtype=np.float64)
 
     @property
     def matrix_array(self) -> Array:
-        """K, shape (3, 3)."""
+        """Matrix K as an array, shape (3, 3)."""
         return np.array(self.matrix, dtype=np.float64)
 
     @property

@@ -1,4 +1,4 @@
-"""A measured value against a requirement, and what all of them say together."""
+"""Measured values against requirements, and the verdict over all checks."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from math import isfinite
 
 
 class Verdict(StrEnum):
-    """What a finished job says of its unit."""
+    """Verdict of a finished job on its unit."""
 
     PASS = "pass"
     FAIL = "fail"
@@ -25,7 +25,7 @@ class Limit:
 
 
 def bounds(minimum: float | None, maximum: float | None, unit: str) -> str:
-    """A requirement as a person reads it: ≥ 1 and ≤ 2 deg/h."""
+    """Format the requirement for a reader: ≥ 1 and ≤ 2 deg/h."""
     found = [f"≥ {minimum:g}"] if minimum is not None else []
     found += [f"≤ {maximum:g}"] if maximum is not None else []
     return f"{' and '.join(found)} {unit}"
@@ -33,7 +33,7 @@ def bounds(minimum: float | None, maximum: float | None, unit: str) -> str:
 
 @dataclass(frozen=True)
 class Check:
-    """One value against one limit."""
+    """Check of one value against one limit."""
 
     name: str
     value: float

@@ -1,4 +1,4 @@
-"""What is known of a channel's noise: the coefficients of IEEE Std 952 in SI units."""
+"""Noise model of a channel: the coefficients of IEEE Std 952 in SI units."""
 
 from dataclasses import dataclass, fields
 
@@ -15,16 +15,16 @@ class NoiseCoefficients:
     """
 
     quantization: float = 0.0
-    """Q [rate·s]: standard deviation of the whole error of one reading of the integrated output: LSB/√12 of a plain
-    counter, LSB/2 of one with a triangular dither of ±1 pulse."""
+    """Quantization noise Q [rate·s]: standard deviation of the whole error of one reading of the integrated output:
+    LSB/√12 of a plain counter, LSB/2 of one with a triangular dither of ±1 pulse."""
     random_walk: float = 0.0
-    """N [rate·√s]: angle (velocity) random walk."""
+    """Angle (velocity) random walk N [rate·√s]."""
     bias_instability: float = 0.0
-    """B [rate]."""
+    """Bias instability coefficient B [rate]."""
     rate_random_walk: float = 0.0
-    """K [rate/√s]."""
+    """Rate random walk K [rate/√s]."""
     rate_ramp: float = 0.0
-    """R [rate/s]."""
+    """Rate ramp coefficient R [rate/s]."""
     flicker_band_s: tuple[float, float] = (0.5, 1.0e5)
     """Shortest and longest relaxation time of the bias instability [s]."""
 

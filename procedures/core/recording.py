@@ -1,4 +1,4 @@
-"""Raw samples and what they mean: channels, stations, recordings.
+"""Raw samples and their meaning: channels, stations, recordings.
 
 A recording keeps what the unit sent, integer counts for a real or simulated one. `scale` and `offset` are the data
 sheet's nominal conversion, not the calibration: ``value = scale·(raw − offset)`` in the channel's unit, an increment
@@ -29,7 +29,7 @@ TRIADS = {"gyro": GYRO, "accelerometer": ACCELEROMETER}
 
 
 class Quantity(StrEnum):
-    """What a channel measures."""
+    """Physical quantity that a channel measures."""
 
     ANGLE_INCREMENT = "angle_increment"
     VELOCITY_INCREMENT = "velocity_increment"
@@ -46,12 +46,12 @@ UNITS: dict[Quantity, tuple[str, ...]] = {
     Quantity.SPECIFIC_FORCE: ("m/s^2", "count"),
     Quantity.TEMPERATURE: ("degC", "count"),
 }
-"""The units a channel of each quantity may have; "count" says that its scale is not known yet."""
+"""Permitted units of a channel of each quantity; "count" marks a scale that is not known yet."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One column of a recording. `unit` is that of ``scale·(raw − offset)``."""
+    """Channel of a recording. `unit` is that of ``scale·(raw − offset)``."""
 
     name: str
     quantity: Quantity
@@ -88,7 +88,7 @@ class NominalScale:
     gain: Array
     """The channels' scales, times the sample rate where a channel gives increments, (channels,)."""
     offset: Array
-    """(channels,)"""
+    """Offsets of the raw samples, (channels,)."""
 
     @classmethod
     def of(cls, channels: Sequence[Channel], rate_hz: float) -> "NominalScale":
@@ -102,7 +102,7 @@ class NominalScale:
         return (raw - self.offset) * self.gain
 
     def convert_rows(self, rows: Array) -> None:
-        """The same in place for raw values channel by channel, (channels, n)."""
+        """Convert raw values to nominal rates in place, (channels, n)."""
         if np.any(self.offset):
             rows -= self.offset[:, None]
         rows *= self.gain[:, None]
@@ -110,7 +110,7 @@ class NominalScale:
 
 @dataclass(frozen=True)
 class Station:
-    """One orientation and/or temperature of a procedure: move there, let settle, record."""
+    """Station of a procedure, one orientation and/or temperature: move there, let settle, record."""
 
     index: int
     label: str
@@ -119,22 +119,22 @@ class Station:
     settle_s: float = 0.0
     record_s: float = 0.0
     power_off_s: float = 0.0
-    """Above zero: the unit is switched off for so long before, so that the station is a launch of its own."""
+    """Time for which the unit is switched off first [s]; above zero the station is a launch of its own."""
     turn: Turn | None = None
     """Whole turns of one axis that begin with the recording and are over, at rest again, before its end; None: none."""
     temperatures: bool = False
-    """Whether the unit's temperature sensors are recorded beside its triads."""
+    """True if the unit's temperature sensors are recorded with its triads."""
     sample_rate_hz: float | None = None
-    """How often the unit is to send; None: its own rate. The same for all stations of a job."""
+    """Sample rate of the unit; None: its own rate. The same for all stations of a job."""
     current_ma: float | None = None
-    """What a current source gives to the inputs of all three channels of a converter; None: there is a whole unit."""
+    """Current of the source into all three inputs of a lone converter; None: a whole unit is tested."""
     profile: TemperatureProfile | None = None
-    """What the chamber goes through meanwhile; the recording ends with the last soak, `record_s` being the longest."""
+    """Temperature profile of the chamber meanwhile; the recording ends with the last soak, at most after `record_s`."""
 
 
 @dataclass(frozen=True)
 class RecordingInfo:
-    """What a recording is, apart from its samples."""
+    """Description of a recording, without its samples."""
 
     id: str
     unit: str
@@ -147,7 +147,7 @@ class RecordingInfo:
     content_hash: str = ""
     simulated: bool = False
     launched_s: float | None = None
-    """Bench time at which the unit was switched on for this launch [s]; None where nobody knows."""
+    """Bench time at which the unit was switched on for this launch [s]; None where it is not known."""
 
     @property
     def duration_s(self) -> float:
@@ -166,7 +166,7 @@ class RecordingInfo:
         raise MissingChannel(name, tuple(c.name for c in self.channels))
 
     def nominal_scale(self, names: Sequence[str]) -> NominalScale:
-        """How raw samples of some channels become nominal rates. Raises `MissingChannel`."""
+        """Conversion of raw samples of some channels to nominal rates. Raises `MissingChannel`."""
         return NominalScale.of([self.channels[self.column(name)] for name in names], self.rate_hz)
 
 
@@ -250,6 +250,6 @@ def require_finite(info: RecordingInfo, names: Sequence[str], samples: Array) ->
 
 
 def require_complete(info: RecordingInfo, seen: int) -> None:
-    """Refuse a recording whose blocks held another number of samples than it announces. Raises `UnfitRecording`."""
+    """Refuse a recording if its blocks held another number of samples than it announces. Raises `UnfitRecording`."""
     if seen != info.count or not seen:
         raise UnfitRecording(f"recording {info.id}: {seen} samples where {info.count} are announced")

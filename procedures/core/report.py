@@ -1,4 +1,4 @@
-"""What a person is shown of a result: tables and figures as plain data, drawn by the service."""
+"""Report of a result for a reader: tables and figures as plain data, drawn by the service."""
 
 from dataclasses import dataclass, field
 
@@ -7,7 +7,7 @@ Cell = str | float | int | None
 
 @dataclass(frozen=True)
 class Table:
-    """A table; a float is printed with six significant digits, None as a dash."""
+    """Table of a report; a float is printed with six significant digits, None as a dash."""
 
     title: str
     columns: tuple[str, ...]
@@ -17,7 +17,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Series:
-    """One line or set of marks. `error` are half-lengths of error bars; it and `upper` are as long as `y`, or empty."""
+    """Line or set of marks. `error` are half-lengths of error bars; it and `upper` are as long as `y`, or empty."""
 
     name: str
     x: tuple[float, ...]
@@ -30,7 +30,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Figure:
-    """A plot. `note` is its caption."""
+    """Plot of a report; `note` is its caption."""
 
     title: str
     x_label: str

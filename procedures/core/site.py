@@ -1,4 +1,4 @@
-"""Where the bench stands: gravity, latitude, and the azimuth of its zero, with what is known of their errors."""
+"""Site of a bench: gravity, latitude, and the azimuth of its zero, with their uncertainties."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from procedures.core import units
 
 @dataclass(frozen=True)
 class Site:
-    """A laboratory's site.
+    """Site of a laboratory: its latitude, gravity and azimuth.
 
     `azimuth_deg` is the heading of the unit's x axis at zero table angles, clockwise from north, as
     measured by theodolite to the laboratory's prism (thesis 3.3.5); `azimuth_sd_arcsec` its standard uncertainty.

@@ -1,4 +1,4 @@
-"""Where the table is told to be: a value, without geometry. Maker and judge of data share it, and nothing around it."""
+"""Commanded angles of the table: a value, without geometry. Simulators and analyses share it, and nothing around it."""
 
 from dataclasses import dataclass
 

@@ -1,6 +1,6 @@
-"""What a thermal chamber is to go through while a unit is recorded: legs of a ramp and a soak, as plain values.
+"""Temperature profile of a thermal chamber during a recording: legs of a ramp and a soak, as plain values.
 
-Whether a soak is over the unit's own temperatures say (`procedures.analysis.thermal.profile_progress`), within the
+The unit's own temperatures decide when a soak is over (`procedures.analysis.thermal.profile_progress`), within the
 times that a leg allows. Temperatures in °C, ramps and slopes in °C/min as chambers and people speak of them.
 """
 
@@ -19,14 +19,14 @@ def _within(name: str, value: float, low: float, high: float) -> None:
 
 @dataclass(frozen=True)
 class SoakCriterion:
-    """When a unit counts as soaked: its case and its converter both drift slowly, and the chamber is where it was sent.
+    """Soak criterion: case and converter of the unit both drift slowly, and the chamber's air is at its target.
 
     Judged from readings every `profile_progress.CHECK_S`; the slope is that of a straight line through the readings of
     the last `window_s`.
     """
 
     slope_c_min: float = 0.1
-    """Most that either sensor may drift [°C/min]."""
+    """Largest drift of either sensor [°C/min]."""
     window_s: float = 300.0
     air_within_c: float = 1.5
     """Chamber's air about the leg's target: with a plant that fails the unit may well be steady elsewhere."""
@@ -44,11 +44,11 @@ class ProfileLeg:
     target_c: float
     ramp_c_min: float
     least_soak_s: float
-    """So long the criterion must hold without a break."""
+    """Time for which the criterion must hold without a break [s]."""
     longest_s: float
-    """From setting out; with no soak by then the run ends with an error."""
+    """Longest duration from the leg's start [s]; with no soak by then the run ends with an error."""
     least_s: float = 0.0
-    """From setting out; the leg is no shorter, however soon the unit has soaked."""
+    """Shortest duration from the leg's start [s], however soon the unit has soaked."""
 
     def __post_init__(self) -> None:
         _within("target_c", self.target_c, -273.0, 500.0)
@@ -60,7 +60,7 @@ class ProfileLeg:
 
 @dataclass(frozen=True)
 class TemperatureProfile:
-    """Legs in their order, and what makes a soak."""
+    """Legs of the profile in order, and the soak criterion."""
 
     legs: tuple[ProfileLeg, ...]
     criterion: SoakCriterion = field(default_factory=SoakCriterion)
@@ -80,12 +80,12 @@ class TemperatureProfile:
 
     @property
     def span_c(self) -> tuple[float, float]:
-        """Least and greatest target."""
+        """Least and greatest target temperature."""
         targets = [leg.target_c for leg in self.legs]
         return min(targets), max(targets)
 
     def expected_s(self) -> float:
-        """How long a run takes where each soak begins with the end of its ramp; the first leg begins at its target."""
+        """Duration of a run in which each soak begins with the end of its ramp; the first leg begins at its target."""
         total, at = 0.0, self.legs[0].target_c
         for leg in self.legs:
             ramp_s = abs(leg.target_c - at) / leg.ramp_c_min * MINUTE_S
@@ -94,7 +94,7 @@ class TemperatureProfile:
         return total
 
     def violations(self, minimum_c: float, maximum_c: float, ramp_c_min: float) -> tuple[str, ...]:
-        """One sentence for each limit of a chamber that a leg passes."""
+        """Violations of a chamber's limits, one sentence for each limit that a leg passes."""
         found: list[str] = []
         for number, leg in enumerate(self.legs, start=1):
             if not minimum_c <= leg.target_c <= maximum_c:

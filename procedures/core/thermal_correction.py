@@ -1,4 +1,4 @@
-"""What takes the temperature out of an accelerometer triad: thesis 4.1, and its older single model as a case of it.
+"""Thermal correction of an accelerometer triad: thesis 4.1, and its older single model as a case of it.
 
 ``Ṽ = [K0 + α1·Δt² + α2·Δt + α3·Δb² + α4·Δb]·(V + B0 + β1·Δt + β2·Δt² + β3·Δb + β4·Δb²)``,
 Δt the case (or gyro) sensor and Δb the converter's, both from the temperatures of the standard calibration. Which of
@@ -7,11 +7,11 @@ the terms act, and when, is the *form*:
 * ``both``: all of them always, T 4.1 as it is printed. In a soak both sensors go together and only their sum matters;
   on a ramp the converter lags behind the case, and the difference carries the dynamic error.
 * ``switched``: T 3.19: those of Δt in the static regime, those of Δb in the dynamic one, which is a function of its
-  own and so has constants of its own beside K0 and B0.
-* ``single``: T 3.15: those of Δb alone, whatever the regime.
+  own and so has constants of its own in addition to K0 and B0.
+* ``single``: T 3.15: those of Δb alone, in either regime.
 
 T Table 4.4 prints α3 four thousand times larger than α4, though T 4.1 gives α3 to Δb²: there the two names are
-swapped. Here they are as in T 4.1.
+swapped. This module names them as T 4.1 does.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ POWERS_OF_BETA = ((0, 1), (0, 2), (1, 1), (1, 2))
 
 
 class Form(StrEnum):
-    """Which terms of T 4.1 act in which regime."""
+    """Form of the correction: the terms of T 4.1 that act in each regime."""
 
     BOTH = "both"
     SWITCHED = "switched"
@@ -63,7 +63,7 @@ class AxisCorrection:
     scale: float
     """K0, m/s² a m/s² of nominal output."""
     bias_m_s2: float
-    """B0, what is *added*: minus the output at zero input, at the reference temperatures."""
+    """Offset B0, which is *added*: minus the output at zero input, at the reference temperatures."""
     alpha: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     beta: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     case_reference_c: float = 20.0
@@ -71,9 +71,9 @@ class AxisCorrection:
     converter_reference_c: float = 20.0
     form: Form = Form.BOTH
     dynamic_offset: tuple[float, float] = (0.0, 0.0)
-    """Of the form ``switched`` alone: what K0 and B0 are more in the dynamic regime."""
+    """Change of K0 and B0 in the dynamic regime, for the form ``switched`` alone."""
     covariance: tuple[tuple[float, ...], ...] = ()
-    """Of α1 … α4, β1 … β4, (8, 8); rows of what the form does not use are zero. Empty: not known."""
+    """Covariance of α1 … α4, β1 … β4, (8, 8); rows of what the form does not use are zero. Empty: not known."""
 
     def __post_init__(self) -> None:
         numbers = np.array([self.scale, self.bias_m_s2, *self.alpha, *self.beta, *self.dynamic_offset])
@@ -86,7 +86,7 @@ class AxisCorrection:
             raise BadParameter("covariance", np.shape(self.covariance), "(8, 8)")
 
     def standard_uncertainties(self) -> Array:
-        """Of α1 … α4, β1 … β4, (8,). Raises `BadParameter` where no covariance is known."""
+        """Standard uncertainties of α1 … α4, β1 … β4, (8,). Raises `BadParameter` where no covariance is known."""
         if not self.covariance:
             raise BadParameter("covariance", self.covariance, "known, (8, 8)")
         return np.sqrt(np.diagonal(np.array(self.covariance)))
@@ -121,7 +121,7 @@ class TemperatureRange:
                 raise BadParameter(name, (low, high), "two finite temperatures, the lower one first")
 
     def beyond_c(self, case_c: ArrayLike, converter_c: ArrayLike) -> Array:
-        """How far readings lie outside, the farther sensor's distance, zero inside, shape of the readings [°C]."""
+        """Distance of readings outside the range, of the farther sensor; zero inside; shape of the readings [°C]."""
         found = [
             np.maximum(low - np.asarray(t, dtype=np.float64), np.asarray(t, dtype=np.float64) - high)
             for t, (low, high) in ((case_c, self.case_c), (converter_c, self.converter_c))
@@ -144,7 +144,7 @@ class ThermalCorrection:
     must be wherever the correction is used; None: it is for outputs as they are. The reference of the whole is
     then these models' for the converter's own drift, and the axes' for the rest: best the same."""
     fitted_range: TemperatureRange | None = None
-    """Where it was fitted; beyond that it is extrapolated. None: not known (corrections of older versions)."""
+    """Temperature range of the fit; beyond it the correction extrapolates. None: not known (older versions)."""
 
     @property
     def scales(self) -> Array:

@@ -12,7 +12,7 @@ PEAK_ACCELERATION = 1.5
 
 @dataclass(frozen=True)
 class Turn:
-    """From rest through whole turns at a constant rate to rest at the angle where it began.
+    """Whole turns of one axis from rest, at a constant rate, to rest at the angle where they began.
 
     Rate over a ramp: ``rate·(3s² − 2s³)``, s = t/ramp, and the same backwards at the end, so that the motion is
     symmetric about its middle and a ramp covers half of rate·ramp.
@@ -20,11 +20,11 @@ class Turn:
 
     axis: AxisName
     turns: int
-    """Whole turns, signed: positive by the right-hand rule about the axis."""
+    """Number of whole turns, signed: positive by the right-hand rule about the axis."""
     rate_deg_s: float
-    """Size of the constant rate, above zero."""
+    """Magnitude of the constant rate, above zero."""
     ramp_s: float
-    """How long the rate takes to build up, and again to vanish."""
+    """Duration of the ramp at the beginning, and again at the end."""
 
     def __post_init__(self) -> None:
         if self.turns == 0 or not 0.0 < self.rate_deg_s < float("inf") or not 0.0 < self.ramp_s < float("inf"):
@@ -41,7 +41,7 @@ class Turn:
 
     @property
     def duration_s(self) -> float:
-        """From rest to rest: ``|angle|/rate + ramp`` [s]."""
+        """Duration from rest to rest: ``|angle|/rate + ramp`` [s]."""
         return abs(self.angle_deg) / self.rate_deg_s + self.ramp_s
 
     @property

@@ -1,4 +1,4 @@
-"""What is known of a unit before a job: its channels, its noise, its stability from launch to launch."""
+"""Record of a unit before a job: its channels, its noise, its stability from launch to launch."""
 
 from dataclasses import dataclass, field
 
@@ -14,23 +14,23 @@ from procedures.core.thermal_correction import ThermalCorrection
 from procedures.core.unit_correction import CorrectionKind
 
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
-"""Form of a serial: what can stand in an address and in a file name."""
+"""Pattern of a serial that is safe in an address and in a file name."""
 
 
 @dataclass(frozen=True)
 class TriadRecord:
-    """One triad: noise of its channels x, y, z, and how much it changes from one power-up to the next."""
+    """Record of one triad: noise of its channels x, y, z, and its stability from one power-up to the next."""
 
     noise: tuple[NoiseCoefficients, NoiseCoefficients, NoiseCoefficients]
     bias_run_to_run_sd: float = 0.0
-    """[rad/s] or [m/s²]."""
+    """Standard deviation of the bias from run to run [rad/s] or [m/s²]."""
     scale_factor_run_to_run_sd: float = 0.0
-    """Relative, dimensionless."""
+    """Standard deviation of the scale factor from run to run, relative."""
     noise_origin: str = "data sheet"
-    """Where the coefficients come from: a data sheet, or the result that found them."""
+    """Origin of the coefficients: a data sheet, or the result that found them."""
 
     def launch_covariance(self, outputs: Array) -> Array:
-        """How much outputs K·v (n, 3) of one launch depart from the unit's mean, for each channel, (3, n, n).
+        """Covariance by which outputs K·v (n, 3) of one launch depart from the unit's mean, per channel, (3, n, n).
 
         ``σ_b² + σ_s²·a_i·a_j``: the bias is common to all of them, and a scale factor carries its whole row of K.
         """
@@ -48,16 +48,16 @@ class Unit:
     gyro: TriadRecord | None = None
     accelerometer: TriadRecord | None = None
     averaging_time_s: float = 70.0
-    """Where quantization falls below the rest of the noise (thesis 4.1.3: 70 s); a static run updates it."""
+    """Averaging time at which quantization falls below the rest of the noise (thesis 4.1.3: 70 s)."""
     calibrations: tuple[TriadCalibration, ...] = field(default=(), repr=False)
     """The current calibration, one entry a triad; empty before the first."""
     calibration_id: str | None = None
-    """Which stored calibration that is."""
+    """Id of the stored calibration in use."""
     thermal_correction: ThermalCorrection | None = field(default=None, repr=False)
     """The current correction of the kind "thermal", or None."""
     thermal_correction_id: str | None = None
     converter: ConverterTriad | None = field(default=None, repr=False)
-    """The current models of the signal converter, x, y, z, or None."""
+    """Current models of the signal converter, x, y, z, or None."""
     converter_id: str | None = None
 
     def calibration(self, triad: str) -> TriadCalibration | None:
@@ -86,7 +86,7 @@ class Unit:
         return None if calibration is None or calibration.output_unit == "count" else calibration.matrix_array
 
     def required_calibration(self, triad: str, purpose: str) -> TriadCalibration:
-        """The current calibration of a triad for a purpose ("verify"). Raises `DomainError` that says what to do."""
+        """The current calibration of a triad for a purpose ("verify"). Raises `DomainError` with the remedy."""
         calibration = self.calibration(triad)
         if calibration is None:
             raise DomainError(

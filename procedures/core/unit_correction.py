@@ -1,6 +1,6 @@
-"""A correction set of a unit, as it is kept in the unit's history: which kind it is, and its value.
+"""A correction set of a unit, as it is kept in the unit's history: its kind and its value.
 
-A calibration says what a unit is at one temperature; a correction says how it departs from that.
+A calibration describes a unit at one temperature; a correction describes its departure from that.
 """
 
 from dataclasses import dataclass
@@ -15,10 +15,10 @@ CorrectionKind = Literal["thermal", "converter"]
 
 @dataclass(frozen=True)
 class UnitCorrection:
-    """What the temperature does to a unit, found by one job. Raises `BadParameter` where kind and value disagree."""
+    """Temperature correction of a unit, found by one job. Raises `BadParameter` where kind and value disagree."""
 
     kind: CorrectionKind
-    """"thermal": the accelerometer triad as a whole (T 4.1); "converter": the signal converter alone (T 3.8-3.13)."""
+    """Kind "thermal" for the accelerometer triad as a whole (T 4.1), "converter" for the converter (T 3.8-3.13)."""
     value: ThermalCorrection | ConverterTriad
     """A `ThermalCorrection`, or three `ConverterModel`s, x, y, z."""
 

@@ -62,11 +62,11 @@ _SIZES: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "h": HOUR},
     "rad/√s": {"rad/√s": 1.0, "deg/√h": DEG_PER_SQRT_HOUR},
 }
-"""SI unit -> the units of the same kind and their size in it; a unit that is not here is only of its own kind."""
+"""SI unit -> the units of the same kind and their size in it; a unit without an entry is only of its own kind."""
 
 
 def converted(value: float, unit: str, wanted: str) -> float:
-    """A value in another unit of the same kind. Raises `ValueError` naming the units that would do."""
+    """Convert a value to another unit of the same kind. Raises `ValueError` naming the units that would do."""
     if unit == wanted:
         return value
     for sizes in _SIZES.values():
@@ -76,5 +76,5 @@ def converted(value: float, unit: str, wanted: str) -> float:
 
 
 def units_like(unit: str) -> tuple[str, ...]:
-    """The units that a value in this one can be said in."""
+    """Units in which a value of this unit can be expressed."""
     return next((tuple(sizes) for sizes in _SIZES.values() if unit in sizes), (unit,))

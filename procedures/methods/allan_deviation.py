@@ -1,4 +1,4 @@
-"""Allan deviation and its relatives of the channels of a recording, with intervals, whatever its length.
+"""Allan deviation and its relatives of the channels of a recording of any length, with intervals.
 
 Overlapping and non-overlapping Allan, modified Allan, time and Hadamard deviation (NIST SP 1065); 68 % or another
 confidence from equivalent degrees of freedom. Samples are taken in nominal units, before any calibration.
@@ -38,7 +38,7 @@ Tau = Annotated[float, Field(gt=0.0, le=1e9)]
 
 
 class Params(RecordedParameters):
-    """Which statistic of which channels."""
+    """Statistic, channels and averaging times of the deviation."""
 
     statistic: Literal["allan", "overlapping_allan", "modified_allan", "time", "hadamard", "overlapping_hadamard"] = (
         "overlapping_allan"
@@ -67,7 +67,7 @@ class Curve:
     recording: str
     channel: str
     unit: str
-    """Of the deviation: of the channel's nominal rate, or of that times s for the time deviation."""
+    """Unit of the deviation: that of the channel's nominal rate, times s for the time deviation."""
     tau_s: tuple[float, ...]
     deviation: tuple[float, ...]
     lower: tuple[float, ...]
@@ -89,7 +89,7 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Block by block: memory does not grow with a recording's length. Raises `MissingChannel`, `UnfitRecording`."""
+    """Analyse block by block, in constant memory. Raises `MissingChannel`, `UnfitRecording`."""
     if not evidence.recordings:
         raise UnfitRecording("there is no recording to take a deviation of")
     statistic = STATISTICS[params.statistic]
@@ -107,7 +107,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """A plot for each curve, and a table with three of its points."""
+    """Report with a plot for each curve, and a table with three of its points."""
     name = result.statistic.replace("_", " ")
     figures = tuple(_figure(curve, name, result.confidence) for curve in result.curves)
     rows = tuple(
@@ -148,7 +148,7 @@ def _curves(recording: Recording, statistic: Statistic, params: Params) -> tuple
 def _deviations(
     recording: Recording, names: tuple[str, ...], statistic: Statistic, params: Params, *, correlate: bool
 ) -> list[Deviation]:
-    """One pass over the recording for all its channels."""
+    """Process all channels of a recording in one pass."""
     info = recording.info
     columns = [info.column(name) for name in names]
     channels = [info.channels[c] for c in columns]
@@ -175,7 +175,7 @@ def _deviations(
 
 
 def _sizes(params: Params, largest: int, rate_hz: float) -> Sizes:
-    """The cluster sizes that are asked for. Raises `BadParameter` naming the times that the recording has."""
+    """Cluster sizes requested by the parameters. Raises `BadParameter` naming the times that the recording has."""
     if isinstance(params.taus, tuple):
         for tau_s in params.taus:
             if not 0.5 <= tau_s * rate_hz < largest + 0.5:
@@ -200,7 +200,7 @@ def _finished(stream: DeviationStream, recording: str, channel: str) -> Deviatio
 
 @contextmanager
 def _naming(recording: str, channel: str = "") -> Generator[None]:
-    """A refusal says which recording and channel it is about."""
+    """Prefix a refusal with the recording and channel that it concerns."""
     try:
         yield
     except Uncorrelatable:
@@ -211,7 +211,7 @@ def _naming(recording: str, channel: str = "") -> Generator[None]:
 
 
 def _shown(curve: Curve) -> tuple[str, float]:
-    """The unit that people read a curve in, and its size in SI."""
+    """Display unit of a curve, and its size in SI."""
     known = {"rad/s": ("deg/h", units.DEG_PER_HOUR), "rad/s·s": ("arcsec", units.ARCSEC)}
     return known.get(curve.unit, (curve.unit, 1.0))
 
@@ -229,7 +229,7 @@ def _figure(curve: Curve, name: str, confidence: float) -> Figure:
 
 
 def inspection(params: Params, count: int) -> Inspection:
-    """Each recording by itself, the channels that are asked for."""
+    """Requested channels of each recording by itself."""
     gaps = "refuse" if params.gaps == "refuse" else "aware"
     return Inspection(FitnessSettings(least_samples=1, gaps=gaps), params.channels)
 

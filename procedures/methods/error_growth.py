@@ -1,4 +1,4 @@
-"""What a calibration is worth in metres: growth of a parked navigator's errors (textbook S 4, equations 4.119).
+"""Position error due to a calibration: growth of a parked navigator's errors (textbook S 4, equations 4.119).
 
 The residual errors of a unit after calibration, with the noise and the launch-to-launch change of its record, or errors
 that are merely declared, carried through the linear error equations of a navigator that does not move.
@@ -33,7 +33,7 @@ HEADING_MAX_RAD = 0.1
 
 
 class Declared(Parameters):
-    """Errors of a unit of which nothing is measured: standard uncertainties, alike on all axes."""
+    """Declared errors of a unit without a calibration: standard uncertainties, alike on all axes."""
 
     gyro_bias_deg_h: float = Field(0.01, ge=0.0, le=1e4)
     gyro_scale_ppm: float = Field(10.0, ge=0.0, le=1e5)
@@ -48,7 +48,7 @@ class Declared(Parameters):
 
 
 class Params(Parameters):
-    """Where the navigator stands and how it begins. The latitude has no default: it depends on the place."""
+    """Position, attitude and initial errors of the navigator. The latitude has no default: it depends on the place."""
 
     latitude_deg: float = Field(ge=-90.0, le=90.0)
     gravity_m_s2: float = Field(units.STANDARD_GRAVITY, ge=9.7, le=9.9)
@@ -71,7 +71,7 @@ class Params(Parameters):
 
 @dataclass(frozen=True)
 class Share:
-    """What one source does alone: radii that hold the position with 95 %, in m."""
+    """Contribution of one source alone: radii that hold the position with 95 %, in m."""
 
     source: str
     after_1h_m: float
@@ -79,10 +79,10 @@ class Share:
 
 
 class Result(Outcome):
-    """Growth of position, velocity and attitude, and what it is made of."""
+    """Growth of position, velocity and attitude errors, and the contributions to it."""
 
     basis: str
-    """What the errors come from."""
+    """Basis of the errors: a calibration, or declared values."""
     sentence: str
     schuler_period_s: float
     time_s: tuple[float, ...]
@@ -90,12 +90,12 @@ class Result(Outcome):
     radius_95_m: tuple[float, ...]
     """Circle about the true place that holds the navigator's with 95 %, at `time_s`."""
     shares: tuple[Share, ...]
-    """By source, the greatest first; at the time of one hour even where `hours` is less."""
+    """Contributions by source, the greatest first; at one hour even where `hours` is less."""
     radius_95_1h_m: float
     calibration_radius_95_1h_m: float | None
-    """Of the calibration's own uncertainty alone, launch and noise left out."""
+    """Radius of the calibration's own uncertainty alone, launch and noise left out."""
     uncalibrated_1h_m: float | None
-    """How far nominal outputs would have taken it in an hour, where the equations still hold."""
+    """Position error of nominal outputs after an hour, where the equations still hold."""
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:

@@ -1,8 +1,8 @@
-"""Field calibration: bias and scale of a unit turned by hand through a few positions, without a bench (F).
+"""Field calibration, without a bench: bias and scale of a unit turned by hand through a few positions (F).
 
 Accelerometers from two positions, zero and (α, β), or from more with the tilt of the base found along (F 11-34); gyros'
 bias alone where they cannot feel the Earth's rate, bias and scale where they can (F 36, 45-48). Cross-couplings are
-neglected, and what that costs is in the uncertainty. Errata of F: `procedures.analysis.field.positions`.
+neglected, and their effect is in the uncertainty. Errata of F: `procedures.analysis.field.positions`.
 """
 
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 
 
 class Params(RecordedParameters):
-    """Where and how the unit was turned, and how well that is known. Latitude and gravity depend on the place."""
+    """Positions of the unit, and their uncertainties. Latitude and gravity depend on the place and have no default."""
 
     latitude_deg: float = Field(ge=-90.0, le=90.0)
     gravity_m_s2: float = Field(ge=9.7, le=9.9)
@@ -78,13 +78,13 @@ class Result(Outcome):
 
     triads: tuple[FieldTriad, ...]
     tilt_deg: tuple[float, float] | None
-    """(α₀, β₀)."""
+    """Tilt of the base (α₀, β₀)."""
     tilt_sd_deg: tuple[float, float] | None
     tilt_model: str
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """One recording a position. Raises `Undetermined` where the positions do not show what is asked, with the reason.
+    """Calibrate from one recording a position. Raises `Undetermined` where the positions are not sufficient.
 
     Also `UnfitRecording` and `BadParameter` where positions are missing or too few.
     """
@@ -111,7 +111,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """Diagonal K, model "field"."""
+    """Calibration with diagonal K, model "field"."""
     return tuple(t.calibration for t in result.triads)
 
 
@@ -174,7 +174,7 @@ def _gyro(
     unit: Unit | None,
     accelerometer: FieldFit,
 ) -> FittedTriad:
-    """On the base as the accelerometers found it."""
+    """Calibrate the gyros on the base as the accelerometers found it."""
     level = (params.level_sd_arcsec * units.ARCSEC) ** 2
     tilt = accelerometer.covariance[6:, 6:] if params.tilt != "level" else level * np.eye(2)
     uncertainty = FieldUncertainty(

@@ -21,13 +21,13 @@ from procedures.core.unit import Unit
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
 
 CONFIDENCE = 0.999
-"""Of the interval within which the rate must agree with the latitude's: fails by chance once in a thousand."""
+"""Confidence of the interval in which the rate must agree with the latitude's: fails by chance once in a thousand."""
 WANDERS = 2.0
 """Scatter of the pairs over that of the noise within the dwells, beyond which the bias wanders."""
 
 
 class Params(RecordedParameters):
-    """How the unit was turned, and where."""
+    """Headings of the unit, site and limits."""
 
     up: Literal["x", "y", "z"] = Field("y", description="axis of the unit that points upwards; it is turned about it")
     turned: tuple[bool, ...] | None = Field(
@@ -47,26 +47,26 @@ class Params(RecordedParameters):
 
 @dataclass(frozen=True)
 class GyroChannel:
-    """One gyro [rad/s]."""
+    """Result of one gyro [rad/s]."""
 
     channel: str
     horizontal: bool
     half_difference: float
-    """What it feels of the Earth's rate at the unturned heading."""
+    """Component of the Earth's rate along the channel at the unturned heading."""
     standard_uncertainty: float
-    """From the scatter of the pairs."""
+    """Standard uncertainty from the scatter of the pairs."""
     lower: float
     upper: float
-    """95 %, Student's factor for the number of pairs."""
+    """Interval of 95 %, Student's factor for the number of pairs."""
     within_sd: float
-    """What the noise within the recordings alone would leave."""
+    """Standard uncertainty expected from the noise within the recordings alone."""
     half_sum: float
-    """The bias; of the vertical channel with the Earth's vertical rate, where no latitude is given."""
+    """Bias of the channel; that of the vertical one includes the Earth's vertical rate, where no latitude is given."""
     half_sum_sd: float
 
 
 class Result(Outcome):
-    """Three channels and the rate that the two horizontal ones feel together."""
+    """Results of three channels and the rate that the two horizontal ones measure together."""
 
     channels: tuple[GyroChannel, ...]
     pairs: int
@@ -76,7 +76,7 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """One recording a heading, in their order. Raises `UnfitRecording`, `MissingChannel`, `BadParameter`."""
+    """Analyse one recording a heading, in order. Raises `UnfitRecording`, `MissingChannel`, `BadParameter`."""
     means = station_means(evidence.recordings, "gyro")
     if means.output_unit != "rad/s":
         raise UnfitRecording(f"the gyro channels are in {means.output_unit}: give their scale, to rad/s")
@@ -101,7 +101,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """A row a channel, and the rate."""
+    """Report with a row a channel, and the rate."""
     unit, size = units.DISPLAY["rad/s"]
     columns = ("gyro", "unit", "half difference", "±", "± by noise within", "half sum", "±")
     rows = tuple(
@@ -170,7 +170,7 @@ def _warnings(found: HalfTurns, level: list[int]) -> tuple[str, ...]:
 
 
 def inspection(_params: Params, _count: int) -> Inspection:
-    """Headings at rest beside one another, the gyros alone."""
+    """Inspection of headings at rest against each other, the gyros alone."""
     return replace(STATIONS, channels=GYRO)
 
 

@@ -1,7 +1,7 @@
 """Heading, pitch and roll of a unit that rested, from its corrected mean outputs (textbook S 3.163-3.166, thesis 1.1).
 
 Each recording is an alignment of its own. The uncertainty has the calibration's covariance, the change from launch to
-launch and the noise of the recording; beside it stands the azimuth error of thesis 1.1, from the unit's noise.
+launch and the noise of the recording; the azimuth error of thesis 1.1, from the unit's noise, is given as well.
 """
 
 from dataclasses import dataclass, replace
@@ -38,7 +38,7 @@ the calibration or the uncertainty is wrong: one in 16 000 by chance."""
 
 
 class Params(RecordedParameters):
-    """Where the unit rested; neither latitude nor gravity has a default, they depend on the place."""
+    """Site of the recordings; neither latitude nor gravity has a default, they depend on the place."""
 
     latitude_deg: float = Field(ge=-90.0, le=90.0)
     gravity_m_s2: float = Field(ge=9.7, le=9.9)
@@ -53,7 +53,7 @@ class Params(RecordedParameters):
 
 @dataclass(frozen=True)
 class AlignedAttitude:
-    """One recording's attitude [deg]; heading clockwise from north, 0 … 360."""
+    """Attitude from one recording [deg]; heading clockwise from north, 0 … 360."""
 
     recording: str
     heading_deg: float
@@ -66,18 +66,18 @@ class AlignedAttitude:
     predicted_azimuth_error_deg: float | None
     """Thesis 1.1, magnitudes added; None where the unit's noise is not known."""
     predicted_azimuth_sd_deg: float | None
-    """The same with the parts as independent standard uncertainties."""
+    """Predicted azimuth error with the parts as independent standard uncertainties."""
     magnitude_errors: tuple[float, float, float]
     """|f| − g [m/s²], |ω| − Ω and ω upwards − Ω·sin L [rad/s]."""
     magnitude_sd: tuple[float, float, float]
     step_deg: float | None = None
-    """Size of a step of the attitude within the recording; zero: none was seen; None: too few samples to look."""
+    """Step of the attitude within the recording; zero: none was seen; None: too few samples to look."""
     step_at_s: float | None = None
-    """When, since the recording's beginning; None: none was seen."""
+    """Time of the step since the recording's beginning; None: none was seen."""
     step_by: str = ""
-    """"accelerometers" or "gyros"."""
+    """Sensors that saw the step: "accelerometers" or "gyros"."""
     step_visible_deg: float | None = None
-    """A tilt by less than this within the recording would not have been seen."""
+    """Smallest tilt within the recording that would have been seen."""
 
 
 class Result(Outcome):
@@ -107,7 +107,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """A row a recording."""
+    """Report with a row a recording."""
     columns = ("recording", "heading, deg", "±", "pitch, deg", "±", "roll, deg", "±", "time, s", "thesis 1.1, deg")
     rows = tuple(
         (

@@ -1,8 +1,8 @@
-"""Kalman calibration: a constant bias from recordings at rest, sample by sample, with the moment it was sure enough.
+"""Kalman calibration of a constant bias from recordings at rest, sample by sample, with the time it took to be sure.
 
-Textbook S 5.4.3 and 6.2 take the noise for white. Ours is not: quantization ties neighbouring means (with opposite
+Textbook S 5.4.3 and 6.2 take the noise for white. The unit's is not: quantization ties neighbouring means (of opposite
 signs, so that it falls faster than white noise), flicker ties all of them (so that a longer dwell hardly helps). The
-filter has the whole covariance of the unit's record; what the white filter would have claimed stands beside it.
+filter has the whole covariance of the unit's record; the claim of the white filter is given for comparison.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ P_VALUE_MIN = 0.001
 
 
 class Params(RecordedParameters):
-    """Which channels, what is known beforehand, and how sure is sure enough."""
+    """Channels, prior knowledge and target uncertainty of the filter."""
 
     channels: tuple[str, ...] | None = Field(None, min_length=1, max_length=64, description="None: both triads")
     window_s: float = Field(1.0, gt=0.0, le=3600.0, description="of one measurement; lengthened for long recordings")
@@ -44,28 +44,28 @@ class Params(RecordedParameters):
 
 @dataclass(frozen=True)
 class ChannelBias:
-    """One channel of one recording. Lists go with `time_s`, since the recording's beginning; SI, or counts."""
+    """Bias of one channel of one recording. Lists go with `time_s`, since the recording's beginning; SI, or counts."""
 
     recording: str
     channel: str
     unit: str
     noise: str
-    """"record": the unit's coefficients; "observed": those that the spectrum of the means themselves shows."""
+    """Noise model: "record" is the unit's coefficients; "observed" those that the spectrum of the means shows."""
     bias: float
     standard_uncertainty: float
     white_standard_uncertainty: float
-    """What S's filter claims, with the variance of one measurement and no covariance."""
+    """Standard uncertainty by S's filter, with the variance of one measurement and no covariance."""
     batch_mean: float
     target_sd: float | None
-    """None for a channel in counts."""
+    """Target uncertainty; None for a channel in counts."""
     enough_after_s: float | None
-    """When the filter was as sure as asked for, which is when the dwell might have ended; None if it never was."""
+    """Time at which the filter reached its target, at which the dwell might have ended; None if it never did."""
     dwell_needed_s: float | None
-    """From the record alone, before the first sample; None where no dwell is long enough or the record is empty."""
+    """Dwell predicted from the record alone; None where no dwell is long enough or the record is empty."""
     innovations_p_value: float
-    """Of the innovations' squares: small where the noise is larger than declared."""
+    """P-value of the innovations' squares: small where the noise is larger than declared."""
     slow_noise_p_value: float
-    """Of the scatter of ten parts of the recording: small where the channel wanders more than claimed."""
+    """P-value of the scatter of ten parts of the recording: small where the channel wanders more than claimed."""
     time_s: tuple[float, ...]
     estimates: tuple[float, ...]
     sds: tuple[float, ...]
@@ -78,7 +78,7 @@ class Result(Outcome):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Each recording alone: another orientation has another constant. Raises `MissingChannel`, `UnfitRecording`."""
+    """Estimate each recording alone: each orientation has its constant. Raises `MissingChannel`, `UnfitRecording`."""
     if not evidence.recordings:
         raise UnfitRecording("there is no recording to estimate a bias from")
     biases = tuple(b for r in evidence.recordings for b in _of_recording(r, params, unit))
@@ -87,7 +87,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """A row a channel, and how each estimate settles."""
+    """Report with a row a channel, and the convergence of each estimate."""
     columns = ("channel", "recording", "unit", "bias", "±", "± if white", "enough after, s", "dwell needed, s")
     rows = tuple(
         (
@@ -213,7 +213,7 @@ def _warnings(biases: Sequence[ChannelBias]) -> list[str]:
 
 
 def inspection(params: Params, count: int) -> Inspection:
-    """Each recording by itself, the channels that are asked for."""
+    """Requested channels of each recording by itself."""
     return Inspection(FitnessSettings(least_samples=1, counters_may_rest=True), params.channels or GYRO + ACCELEROMETER)
 
 

@@ -1,4 +1,4 @@
-"""Noise of recordings of a unit at rest, each a launch: what a static run says, of any recording (thesis 3.1, 4.1).
+"""Noise of recordings of a unit at rest, each a launch: the analysis of a static run (thesis 3.1, 4.1).
 
 Channels may be angle or velocity increments, rates or specific forces, in SI or in counts.
 """
@@ -11,7 +11,7 @@ from procedures.reports.launch import noise_report
 
 
 class Params(RecordedParameters, NoiseParameters):
-    """How to analyse, and what to hold the noise to."""
+    """Settings of the analysis, and limits of the noise."""
 
 
 class Result(NoiseResult):
@@ -19,7 +19,7 @@ class Result(NoiseResult):
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
-    """Raises `UnfitRecording`, `MissingChannel`, `BadParameter`."""
+    """Analyse the recordings as launches. Raises `UnfitRecording`, `MissingChannel`, `BadParameter`."""
     return analyse_launches(Result, evidence.recordings, params)
 
 

@@ -1,4 +1,4 @@
-"""Better orientations: the table angles that make a unit's calibration surest in the bench time of the thesis's twelve.
+"""Plan of better orientations: table angles of least uncertainty in the bench time of the thesis's twelve.
 
 A search over what the table can do, for the linear model on an ideal table, for the one that estimates the table's
 errors along, or for the scalar one; measured by the worst coefficient's predicted standard uncertainty over its limit,
@@ -33,11 +33,11 @@ Arcsec = Annotated[float, Field(ge=0.0, le=3600.0)]
 Triad = Literal["gyro", "accelerometer"]
 SCALAR_MIN = 9
 WORSE_MAX = 1.05
-"""A plan may cost a triad so much of its worst uncertainty and still be recommended for what it gains in another."""
+"""Greatest loss of a triad's worst uncertainty for which a plan is still recommended by its gain in another."""
 
 
 class Params(Parameters):
-    """The place, the table, what to calibrate and what to measure it by. Latitude and gravity depend on the place."""
+    """Site, table and model of the calibration, and its limits. Latitude and gravity depend on the place."""
 
     latitude_deg: float = Field(ge=-90.0, le=90.0)
     gravity_m_s2: float = Field(ge=9.7, le=9.9)
@@ -75,28 +75,28 @@ class Params(Parameters):
 
 @dataclass(frozen=True)
 class TriadWorth:
-    """One triad under one plan."""
+    """Performance of one triad under one plan."""
 
     triad: str
     worst: float
     """Greatest standard uncertainty over its limit."""
     improvement: float
-    """The reference's worst over this."""
+    """Ratio of the reference's worst to this."""
     bound: float
-    """No plan of so many stations in this time has a lesser worst."""
+    """Lower bound of the worst for any plan of as many stations in this time."""
     standard_uncertainties: tuple[float, ...]
-    """Of the twelve (b, K_i1, K_i2, K_i3 by channel) or the scalar nine (b, s, t), SI."""
+    """Standard uncertainties of the twelve (b, K_i1, K_i2, K_i3 by channel) or the scalar nine (b, s, t), SI."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Orientations in order; (outer, middle, inner) in degrees."""
+    """Plan of orientations in order; (outer, middle, inner) in degrees."""
 
     name: str
     orientations_deg: tuple[tuple[float, float, float], ...]
     dwell_s: float
     improvement: float
-    """Of the worst over all triads."""
+    """Improvement of the worst coefficient over all triads."""
     triads: tuple[TriadWorth, ...]
 
 
@@ -107,7 +107,7 @@ class Result(Outcome):
     total_s: float
     plans: tuple[Plan, ...]
     recommended: int
-    """Place in `plans`."""
+    """Index of the recommended plan in `plans`."""
     sentence: str
 
 
@@ -149,7 +149,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """Plans beside one another, then the recommended orientations."""
+    """Report comparing the plans, then the recommended orientations."""
     rows = tuple(
         (p.name, len(p.orientations_deg), p.dwell_s, t.triad, t.worst, t.improvement, t.bound)
         for p in result.plans
@@ -240,7 +240,7 @@ def _sentence(best: Plan, reference: Plan, params: Params) -> str:
 
 
 def _reach(plan: Plan, reference: Plan) -> float:
-    """The most that so many stations could gain."""
+    """Upper bound of the improvement by a number of stations."""
     return max(t.worst for t in reference.triads) / max(t.bound for t in plan.triads)
 
 

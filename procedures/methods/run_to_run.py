@@ -26,7 +26,7 @@ class Params(Parameters):
 
 
 class Result(Outcome):
-    """Sample standard deviations (n − 1) with their intervals, and what the calibrations could resolve at all."""
+    """Sample standard deviations (n − 1) with their intervals, and the resolution of the calibrations."""
 
     scatters: tuple[Scatter, ...]
 
@@ -90,7 +90,7 @@ def _show(s: Scatter, value: float) -> str:
 
 
 def _limit(s: Scatter, params: Params) -> Limit | None:
-    """In the unit that people read; None for a bias in counts."""
+    """Limit in a display unit; None for a bias in counts."""
     if s.unit == "count":
         return None
     gyro, bias = s.triad == "gyro", s.name.startswith("bias")
@@ -113,7 +113,7 @@ def _check(s: Scatter, limit: Limit) -> Check:
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
-    """None: calibrations are what went in."""
+    """No calibrations to store: they are the input of this method."""
     return ()
 
 

@@ -1,4 +1,4 @@
-"""Scalar calibration: nine parameters of a triad from the magnitude alone (thesis 3.3.1, 3.21-3.24).
+"""Scalar calibration of a triad: nine parameters from the magnitude alone (thesis 3.3.1, 3.21-3.24).
 
 For recordings at several stations, or for one long recording of a unit turned by hand from pose to pose.
 """
@@ -37,11 +37,11 @@ from procedures.procedure import STATIONS, Evidence, Method, Outcome, Parameters
 TURNED = replace(STATIONS.settings, at_rest=False, beside_others=False)
 """One recording of a unit that is turned by hand from pose to pose."""
 LEAST_TO_JUDGE = 6
-"""Poses from which on a channel that none of them changes is dead, or not turned; of fewer the rank says enough."""
+"""Least number of poses to judge a channel that none of them changes as dead or not turned; below it the rank does."""
 
 
 class Still(Parameters):
-    """How poses are found in one long recording."""
+    """Criteria by which poses are found in one long recording."""
 
     initial_s: float = Field(20.0, gt=0.0, le=3600.0, description="the unit rests for this long at the beginning")
     window_s: float = Field(1.0, gt=0.0, le=60.0, description="of the moving variance")
@@ -51,7 +51,7 @@ class Still(Parameters):
 
 
 class Params(RecordedParameters):
-    """Which triad, and the magnitude it is held against: gravity has no default, it depends on the place."""
+    """Triad, and the reference magnitude: gravity has no default, it depends on the place."""
 
     triad: Literal["accelerometer", "gyro"] = "accelerometer"
     gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9, description="needed for the accelerometers")
@@ -90,7 +90,7 @@ class Params(RecordedParameters):
 
 @dataclass(frozen=True)
 class Estimate:
-    """One of the nine."""
+    """Coefficient of the scalar model, one of nine."""
 
     name: str
     unit: str
@@ -237,7 +237,7 @@ def _checks(fit: ScalarFit, params: Params, misfit: Misfit) -> tuple[Check, ...]
 
 
 def _relative_sd(fit: ScalarFit, params: Params) -> Array:
-    """Standard uncertainties (9,): of b relative to the reference in the output's unit, of s relative, of t in rad."""
+    """Relative standard uncertainties (9,): of b by the reference in the output's unit, of s relative, of t in rad."""
     scale = np.abs(fit.parameters[3:6])
     return fit.standard_uncertainties / np.concatenate([_reference(params) / scale, scale, np.ones(3)])
 
@@ -256,7 +256,7 @@ def _warnings(fit: ScalarFit, params: Params, misfit: Misfit) -> tuple[str, ...]
 
 
 def inspection(params: Params, count: int) -> Inspection:
-    """Of the triad: poses at rest beside one another, or one recording of a unit that is turned by hand."""
+    """Inspection of the triad: poses at rest against each other, or one recording of a unit turned by hand."""
     return replace(STATIONS, channels=TRIADS[params.triad]) if count > 1 else Inspection(TURNED, TRIADS[params.triad])
 
 

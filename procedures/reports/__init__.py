@@ -1,1 +1,1 @@
-"""Tables and figures of results, for people: built from what `analysis` found, shown by procedures and methods."""
+"""Tables and figures of results for readers, built from the results of `analysis`, shown by procedures and methods."""

@@ -37,7 +37,7 @@ def _coefficient_row(c: Coefficient, sources: Sequence[str]) -> tuple[str | floa
 
 
 def triad_figures(t: TriadSummary) -> tuple[Figure, ...]:
-    """Everything that is drawn of a triad: its magnitudes, then its residuals."""
+    """Figures of a triad: its magnitudes, then its residuals."""
     return (*magnitude_figures(t.magnitudes), residual_figure(t))
 
 
@@ -110,7 +110,7 @@ def magnitude_table(all_magnitudes: Sequence[Magnitudes], title: str) -> Table:
 
 
 def station_table(m: Magnitudes) -> Table:
-    """Magnitude at every orientation."""
+    """Figure of the magnitude at every orientation."""
     unit, size = units.DISPLAY[m.unit]
     before = m.before or (None,) * len(m.after)
     expected = m.expected_sd or (None,) * len(m.after)
@@ -123,7 +123,7 @@ def station_table(m: Magnitudes) -> Table:
 
 
 def scalar_table(summary: TriadSummary) -> Table | None:
-    """The nine parameters from magnitudes alone beside those of the linear fit."""
+    """Compare the nine parameters from magnitudes alone with those of the linear fit."""
     if summary.scalar is None:
         return None
     rows = tuple(
@@ -136,7 +136,7 @@ def scalar_table(summary: TriadSummary) -> Table | None:
 
 
 def thermal_tables(share: ThermalShare, labels: Sequence[str]) -> list[Table]:
-    """What the thermal correction did to the accelerometers' station means, and what it leaves uncertain."""
+    """Tables of the thermal correction of the accelerometers' station means, and of its remaining uncertainty."""
     rows = zip(labels, share.case_c, share.converter_c, share.change_m_s2, strict=True)
     regime = f", regime taken as {share.regime}" if share.regime else ""
     parts = tuple((name, share.from_correction[name], share.from_sensors[name]) for name in COEFFICIENT_NAMES)

@@ -46,7 +46,7 @@ def _summary(launches: Sequence[LaunchNoise], averaging_time_s: float | None) ->
 
 
 def side_by_side(summaries: Sequence[ChannelSummary], launches: Sequence[LaunchNoise]) -> Table:
-    """The launches beside one another, by the likelihood fit (Tables 4.1 and 4.2)."""
+    """Compare the launches, by the likelihood fit (Tables 4.1 and 4.2)."""
     rows = [
         (
             s.channel,
@@ -99,7 +99,7 @@ def three_ways(launch: LaunchNoise) -> Table:
 
 
 def disagreements(launches: Sequence[LaunchNoise]) -> Table | None:
-    """Where the three ways contradict one another, and what the model leaves out."""
+    """Contradictions among the three ways, and effects outside the model."""
     rows = [
         (launch.label, channel.channel, sentence)
         for launch in launches
@@ -112,7 +112,7 @@ def disagreements(launches: Sequence[LaunchNoise]) -> Table | None:
 
 
 def steps_table(launches: Sequence[LaunchNoise]) -> Table:
-    """What trimming, removal of self-heating and the wavelet split change: graphical readings step by step."""
+    """Effect of trimming, removal of self-heating and the wavelet split: graphical readings step by step."""
     rows: list[tuple[Cell, ...]] = []
     for launch in launches:
         for channel in launch.channels:
@@ -127,7 +127,7 @@ def steps_table(launches: Sequence[LaunchNoise]) -> Table:
 
 
 def averaging_table(summaries: Sequence[ChannelSummary], launches: Sequence[LaunchNoise]) -> Table:
-    """Where quantization falls below the rest of the noise, channel by channel."""
+    """Averaging times at which quantization falls below the rest of the noise, channel by channel."""
     rows = tuple(
         (s.channel, *(_of(c.averaging.time_s, 1.0) for c in _channel_of(s.channel, launches)), s.averaging_time_s)
         for s in summaries
@@ -151,7 +151,7 @@ def launch_means_table(summaries: Sequence[ChannelSummary], launches: Sequence[L
 
 
 def channel_figures(name: str, launches: Sequence[LaunchNoise]) -> tuple[Figure, ...]:
-    """All plots of one channel: the Allan plot, its parts, and what came before the noise was clean."""
+    """Figures of one channel: the Allan plot, its parts, and the signal before removal of trends."""
     channels = _channel_of(name, launches)
     first = channels[0]
     figures = [allan_figure(channels, [launch.label for launch in launches])]
@@ -167,7 +167,7 @@ def channel_figures(name: str, launches: Sequence[LaunchNoise]) -> tuple[Figure,
 
 
 def allan_figure(channels: Sequence[ChannelNoise], labels: Sequence[str]) -> Figure:
-    """Deviation with intervals and band of the first launch, its slope lines and readings; the others beside it."""
+    """Deviation with intervals and band of the first launch, its slope lines and readings, with the other launches."""
     first = channels[0]
     unit, size = DEVIATION_DISPLAY[first.rate_unit]
     curve, band = first.analysed.curve, first.band

@@ -99,7 +99,7 @@ def _hours(trace: Trace) -> tuple[float, ...]:
 
 
 def _regime(trace: Trace, shown: Sequence[Sequence[float]]) -> Series:
-    """The dynamic stretches as a band from the least to the greatest of what is shown; of no height in between."""
+    """Dynamic stretches as a band from the least to the greatest shown value; of no height in between."""
     low, high = min(min(values) for values in shown), max(max(values) for values in shown)
     t = _hours(trace)
     half = 0.5 * (t[1] - t[0]) if len(t) > 1 else 0.0

@@ -8,11 +8,11 @@ from procedures.core.report import Cell, Table
 from procedures.core.thermal_correction import COEFFICIENTS, Form
 
 OF_COEFFICIENT = ("1/°C²", "1/°C", "1/°C²", "1/°C", "m/s²/°C", "m/s²/°C²", "m/s²/°C", "m/s²/°C²")
-"""In the order of `COEFFICIENTS`; T 4.1 does not print β in the order of α."""
+"""Units in the order of `COEFFICIENTS`; T 4.1 does not print β in the order of α."""
 
 
 def summary(cycle: ThermalCycle) -> str:
-    """What was done, in two sentences."""
+    """Summary of the cycle in two sentences."""
     hours = sum(run.duration_s for run in cycle.runs) / units.HOUR
     judged = "the correction that was fitted to them" if cycle.judged == "fit" else "the unit's current correction"
     seen = "" if cycle.judged == "fit" else ", which they had no part in"
@@ -20,7 +20,7 @@ def summary(cycle: ThermalCycle) -> str:
 
 
 def tables(cycle: ThermalCycle) -> tuple[Table, ...]:
-    """All of them, in the order a reader wants them."""
+    """Tables of a cycle in reading order."""
     return (
         soak_table(cycle),
         forms_table(cycle),
@@ -36,7 +36,7 @@ def tables(cycle: ThermalCycle) -> tuple[Table, ...]:
 
 
 def soak_table(cycle: ThermalCycle) -> Table:
-    """Table 4.5."""
+    """Soak errors as in Table 4.5."""
     rows = tuple(
         (s.leg + 1, s.target_c, s.case_c, s.runs, axis, s.before_m_s2[i], s.after_m_s2[i], s.spread_after_m_s2[i])
         for s in cycle.soaks
@@ -87,7 +87,7 @@ def coefficient_table(cycle: ThermalCycle) -> Table:
 
 
 def order_table(cycle: ThermalCycle) -> Table:
-    """Why the second order."""
+    """Table of the tests for the polynomial order."""
     rows = tuple((axis, *_order(found)) for axis, found in zip(AXES, cycle.axes, strict=True))
     columns = (
         *("axis", "BIC 1", "BIC 2", "BIC 3", "F test 2 against 1, p", "3 against 2, p", "preferred"),
@@ -130,7 +130,7 @@ def accelerometer_correlations(cycle: ThermalCycle) -> Table:
 
 
 def gyro_correlations(cycle: ThermalCycle) -> Table:
-    """Table 4.6."""
+    """Gyro correlations as in Table 4.6."""
     per_degree = units.DEG_PER_HOUR
     rows: list[tuple[Cell, ...]] = []
     for g in cycle.gyros:
@@ -148,7 +148,7 @@ def gyro_correlations(cycle: ThermalCycle) -> Table:
 
 
 def gyro_noise_table(cycle: ThermalCycle) -> Table:
-    """Table 4.7 beside what is known of the unit."""
+    """Gyro noise as in Table 4.7, with the unit's known noise."""
     shown = units.NOISE_DISPLAY["rad/s"]
     rows: list[tuple[Cell, ...]] = []
     for i, process in enumerate(("quantization", "random_walk", "bias_instability")):
@@ -170,7 +170,7 @@ def _noise(g: GyroNoise, process: int, size: float) -> tuple[Cell, Cell]:
 
 
 def magnitude_table(cycle: ThermalCycle) -> Table:
-    """|ĝ| over each run."""
+    """Table of |ĝ| over each run."""
     rows = tuple(
         (run.name, before, after, *run.force_m_s2)
         for run, (before, after) in zip(cycle.runs, cycle.magnitude_m_s2, strict=True)
@@ -183,7 +183,7 @@ def magnitude_table(cycle: ThermalCycle) -> Table:
 
 
 def evidence_table(cycle: ThermalCycle) -> Table:
-    """When each leg was reached and soaked."""
+    """Times at which each leg was reached and soaked."""
     rows = tuple((run.name, i, *_evidence(leg)) for run in cycle.runs for i, leg in enumerate(run.legs, start=1))
     columns = (
         *(
@@ -209,7 +209,7 @@ def _evidence(leg: LegEvidence) -> tuple[Cell, ...]:
 
 
 def regime_table(cycle: ThermalCycle) -> Table:
-    """Switching times of the indicator beside the commanded ramps."""
+    """Compare switching times of the indicator with the commanded ramps."""
     rows = tuple((run.name, i, *_regime(r)) for run in cycle.runs for i, r in enumerate(run.regimes, start=1))
     columns = (
         "run",

@@ -17,7 +17,7 @@ def turns_table(found: WholeTurns) -> Table:
 
 
 def rate_table(found: WholeTurns) -> Table:
-    """Every station's scale factor beside the model."""
+    """Compare every station's scale factor with the model."""
     ppm = units.PPM
     rows = tuple(
         (p.axis, p.rate_deg_s, p.turns, p.departure / ppm, p.standard_uncertainty / ppm, p.modelled / ppm)

@@ -1,4 +1,4 @@
-"""The linear estimator of a triad's coefficients and its weights, and what the table's flaws do to its answer.
+"""The linear estimator of a triad's coefficients, its weights, and the propagation of the table's flaws.
 
 Two weightings. "noise": the table is taken as it is commanded, and each channel is weighted by its noise alone (thesis
 3.3.6). "noise_and_table": the table's flaws are unknowns with declared spreads, so the outputs are weighted by
@@ -22,27 +22,27 @@ Weighting = Literal["noise_and_table", "noise"]
 
 @dataclass(frozen=True)
 class Estimator:
-    """The linear estimator of a plan: what it multiplies the outputs with, and what noise does to the answer."""
+    """The linear estimator of a plan: its gain on the outputs and the propagated noise covariance."""
 
     design: Array
-    """[1 v_x v_y v_z], shape (n, 4)."""
+    """Design matrix A of one channel, rows [1 v_x v_y v_z], shape (n, 4)."""
     gain: Array
-    """G: the twelve coefficients are ``Σ G[:, c, i]·U[i, c]`` over channels and stations, shape (12, 3, n)."""
+    """Gain G: the twelve coefficients are ``Σ G[:, c, i]·U[i, c]`` over channels and stations, shape (12, 3, n)."""
     noise_covariance: Array
-    """``G·C·Gᵀ`` of the twelve coefficients, channel by channel, shape (12, 12)."""
+    """Noise covariance ``G·C·Gᵀ`` of the twelve coefficients, channel by channel, shape (12, 12)."""
     condition: float
     """Condition number of the column-scaled design."""
 
     def coefficients(self, outputs: Array) -> Array:
-        """Of outputs (n, 3), shape (12,)."""
+        """Estimate the twelve coefficients from outputs (n, 3); shape (12,)."""
         return np.einsum("kcn,nc->k", self.gain, outputs)
 
     def modelled(self, coefficients: Array) -> Array:
-        """``b + K·v`` at the stations for twelve coefficients, shape (n, 3)."""
+        """Predict the outputs ``b + K·v`` at the stations from twelve coefficients, shape (n, 3)."""
         return self.design @ coefficients.reshape(3, 4).T
 
     def remaining(self) -> Array:
-        """``1 − A·G``: what the fit leaves of the outputs, both stacked channel by channel, shape (3n, 3n)."""
+        """Residual operator ``1 − A·G``: residuals from outputs, both stacked channel by channel, shape (3n, 3n)."""
         n = len(self.design)
         explained = np.einsum("ia,cadj->cidj", self.design, self.gain.reshape(3, 4, 3, n))
         return np.eye(3 * n) - explained.reshape(3 * n, 3 * n)
@@ -50,7 +50,7 @@ class Estimator:
 
 @dataclass(frozen=True)
 class TableShare:
-    """What the table's flaws add to the twelve coefficients."""
+    """Contribution of the table's flaws to the twelve coefficients."""
 
     per_sd: Array
     """Change of the coefficients per standard deviation of each flaw, shape (12, P)."""
@@ -58,11 +58,11 @@ class TableShare:
 
     @property
     def covariance(self) -> Array:
-        """Shape (12, 12)."""
+        """Covariance of the twelve coefficients from all flaws, shape (12, 12)."""
         return self.per_sd @ self.per_sd.T
 
     def standard_uncertainty(self, source: str) -> Array:
-        """Of the twelve coefficients from one source alone, shape (12,)."""
+        """Standard uncertainties of the twelve coefficients from one source alone, shape (12,)."""
         columns = np.array([s == source for s in self.source], dtype=bool)
         return np.sqrt(np.sum(self.per_sd[:, columns] ** 2, axis=1))
 
@@ -105,8 +105,8 @@ def _with_flaws(design: Array, whiteners: Array, flaws: Array) -> Array:
     """Gain (12, 3, n) where flaws (n, 3, P) at one standard deviation each are estimated together with the triad.
 
     With ``W·C·Wᵀ = 1`` the least squares of ``|W(U − A·x − F·p)|² + |p|²`` over x and p has the x of S = C + F·Fᵀ
-    (matrix inversion lemma), and S is never inverted: dwells so long that their noise vanishes beside the table do no
-    harm. The orthogonal factors of [W·F W·A; 1 0], flaws first, leave the coefficients' triangle R in the lower corner.
+    (matrix inversion lemma), and S is never inverted: dwells whose noise is negligible against the table's flaws stay
+    well conditioned. In the orthogonal factors of [W·F W·A; 1 0], flaws first, R of the coefficients is the last block.
     """
     n, p = len(design), flaws.shape[2]
     scale = np.linalg.norm(design, axis=0)

@@ -1,4 +1,4 @@
-"""How the magnitude of a corrected vector errs with the outputs that it was corrected from."""
+"""Error of a corrected vector's magnitude due to errors of the outputs that it was corrected from."""
 
 import numpy as np
 from numpy.typing import ArrayLike

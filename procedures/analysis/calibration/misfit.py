@@ -1,6 +1,6 @@
-"""How badly a fit describes its poses: residuals against the noise within the poses, and which pose is the worst.
+"""Misfit of a fit to its poses: residuals against the noise within the poses, and the worst pose.
 
-Noise that nobody knows is taken from the data, and a fit's uncertainty is scaled up to its residuals. That alone hides
+Unknown noise is taken from the data, and a fit's uncertainty is scaled up to its residuals. That alone hides
 a bad fit behind a wide interval. The scatter within the poses does not see the model, so the ratio of the two shows it:
 
 ``ratio = √(χ²/ν / (1 + κ))``
@@ -23,11 +23,11 @@ MISFIT_MAX = 5.0
 """Residuals so many times the scatter within the poses fail. One pose of real units has two to three: hands creep and
 sensors are not quite linear."""
 REMARKABLE = 2.0
-"""Beyond this a fit that passes says so."""
+"""Threshold of the ratio beyond which a passing fit carries a warning."""
 ALIKE = 0.75
-"""Channels that see a pose at least so much as the most concerned one are named with it."""
+"""Least sensitivity to a pose, relative to the most sensitive channel's, at which a channel is named with it."""
 DEAD = 0.02
-"""A channel whose means span less than this part of the triad's middle one does not feel the poses."""
+"""Least span of a live channel's means, relative to the median span of its triad."""
 SCALE_WITHIN = 2.5
 """Scale factors of nominal outputs beyond this, or under its inverse, are a wrong unit. A rate that is
 off by two leaves a scale factor of two, which the inspection names."""
@@ -37,18 +37,18 @@ SCALES_ALIKE = 20.0
 
 @dataclass(frozen=True)
 class Misfit:
-    """How far a fit's residuals are beyond what the noise within its poses allows."""
+    """Misfit of a fit: its residuals relative to the noise within its poses."""
 
     ratio: float | None
     """Root mean square of the residuals over what the scatter allows; None where no equation is spare."""
     spare: int
-    """Equations more than unknowns."""
+    """Degrees of freedom: equations more than unknowns."""
     worst: str
-    """The pose and the channels with the greatest residual; empty where none can be told."""
+    """The pose and the channels with the greatest residual; empty where the fit has none to name."""
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What to know of a fit that is not perfect, whether it passes or not."""
+        """Warnings about a fit that is not perfect, whether it passes or not."""
         if self.ratio is None and self.spare > 0:
             return (
                 "nothing of the poses' noise is in the data and none is given: a bad fit cannot be told from noise; "
@@ -80,7 +80,7 @@ def ratio_of(chi_square: float, spare: int, slow: float = 0.0) -> float | None:
 
 
 def scalar_misfit(fit: ScalarFit, outputs: Array, labels: tuple[str, ...], slow: float) -> Misfit:
-    """Of a scalar calibration of outputs (n, 3): a magnitude is off by those channels most that point along it."""
+    """Misfit of a scalar calibration of outputs (n, 3); names the channels with most weight in the worst magnitude."""
     ratio = ratio_of(fit.chi_square, fit.degrees_of_freedom, slow)
     if ratio is None:
         return Misfit(None, fit.degrees_of_freedom, "")
@@ -97,7 +97,7 @@ def scalar_misfit(fit: ScalarFit, outputs: Array, labels: tuple[str, ...], slow:
 def residual_misfit(
     residuals: Array, expected_sd: Array, chi_square: float, spare: int, labels: Sequence[str], slow: float = 0.0
 ) -> Misfit:
-    """Of residuals (n, 3) channel by channel with their expected standard deviations (n, 3)."""
+    """Misfit of residuals (n, 3), channel by channel, with their expected standard deviations (n, 3)."""
     ratio = ratio_of(chi_square, spare, slow)
     if ratio is None:
         return Misfit(None, spare, "")

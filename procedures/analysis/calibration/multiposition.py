@@ -1,7 +1,7 @@
 """Calibration of a triad from known vectors at many orientations: generalised least squares.
 
 ``[1 v_x v_y v_z]·[b K_i1 K_i2 K_i3]ᵀ = U_i`` (thesis 3.31, 3.35 and the solution of 3.3.6), weighted by the covariance
-of the station means and, unless told otherwise, of the table's flaws. The uncertainty has these two parts: the unit's
+of the station means and, by default, of the table's flaws. The uncertainty has these two parts: the unit's
 noise, and the table that set the vectors.
 """
 
@@ -21,7 +21,7 @@ from procedures.core.imu_model import TriadCalibration, triad_calibration
 
 @dataclass(frozen=True)
 class TriadFit:
-    """Coefficients of a triad, their uncertainty in two parts, and how well the model describes the stations."""
+    """Coefficients of a triad, their uncertainty in two parts, and the goodness of fit at the stations."""
 
     triad: str
     output_unit: str
@@ -30,7 +30,7 @@ class TriadFit:
     coefficients: Array
     """Shape (12,), in the order of `COEFFICIENT_NAMES`."""
     estimator: Estimator
-    """What made them of the outputs."""
+    """The linear estimator that gave the coefficients."""
     table: TableShare
     station_noise: Array
     """Covariance of the station means, scaled up where it was not known, (3, n, n)."""
@@ -43,14 +43,14 @@ class TriadFit:
     magnitude_sd: Array
     """Expected standard deviations of |v̂| − |v| at the same stations, SI, shape (n,)."""
     chi_square: float
-    """Of what no coefficient can explain, against noise and table together."""
+    """Chi-square of the part of the outputs that no coefficient can explain, against noise and table together."""
     degrees_of_freedom: int
     noise_known: bool
     """False where the noise was estimated from the recordings themselves: then chi-square proves nothing."""
 
     @property
     def noise_covariance(self) -> Array:
-        """What noise adds to the twelve coefficients, shape (12, 12)."""
+        """Covariance of the twelve coefficients from noise, shape (12, 12)."""
         return self.estimator.noise_covariance
 
     @property
@@ -65,7 +65,7 @@ class TriadFit:
 
     @property
     def matrix(self) -> Array:
-        """K, shape (3, 3)."""
+        """Matrix K of the triad, shape (3, 3)."""
         return self.coefficients.reshape(3, 4)[:, 1:]
 
     @property
@@ -130,7 +130,7 @@ def fit_triad(
 def _free_of_coefficients(
     design: Array, outputs: Array, noise_covariance: Array, of_table: Array
 ) -> tuple[Array, Array, Array]:
-    """What no coefficient can explain of all three channels, y (k,), and its covariances by noise and table, (k, k).
+    """Residual combinations y (k,) of all three channels, free of coefficients, and their (k, k) noise and table parts.
 
     ``y = ZᵀU`` with Z an orthonormal basis of the complement of the design, k = 3(n − 4). It does not depend on the
     weights.

@@ -1,4 +1,4 @@
-"""How far noise that nobody knows must be scaled up before the residuals of a fit are likely."""
+"""Factor by which unknown noise must be scaled up before the residuals of a fit are likely."""
 
 import numpy as np
 from scipy.linalg import eigh

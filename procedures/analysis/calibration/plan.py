@@ -1,4 +1,4 @@
-"""A calibration before it runs: the uncertainty of every coefficient, and the limits that it cannot resolve."""
+"""Prediction of a calibration: the uncertainty of every coefficient, and the limits that it cannot resolve."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ _TURNS = (
 
 @dataclass(frozen=True)
 class TriadPlan:
-    """One triad at the stations of a plan: what it will see, what is known of its noise, and the table's flaws."""
+    """One triad at the stations of a plan: its input vectors, its noise as far as known, and the table's flaws."""
 
     triad: str
     unit: Unit
@@ -39,13 +39,13 @@ class TriadPlan:
     vectors: Array
     table: TableErrors
     matrix: Array
-    """K as far as known: of the current calibration, else the identity (nominal outputs)."""
+    """Best known K: of the current calibration, else the identity (nominal outputs)."""
     calibrated: bool = False
-    """Whether K is of a calibration."""
+    """True if K comes from a calibration, not from nominal outputs."""
     weighting: Weighting = "noise_and_table"
 
     def noise_covariance(self, dwell_s: float | None = None) -> Array | None:
-        """Of the station means, (3, n, n), at the planned dwell or another; None where the noise is not known."""
+        """Covariance of the station means, (3, n, n), at the planned or another dwell; None for unknown noise."""
         stations = [s if dwell_s is None else replace(s, record_s=dwell_s) for s in self.stations]
         return triad_covariance(self.unit.triad(self.triad), windows(stations, self.axes))
 
@@ -55,7 +55,7 @@ class TriadPlan:
         return estimator(f"the {self.triad} coefficients", self.vectors, noise_covariance, flaws)
 
     def share(self, plan: Estimator) -> TableShare:
-        """What the table's flaws add."""
+        """Contribution of the table's flaws to the coefficients of this plan."""
         return table_share(plan, self.table.of_outputs(self.matrix), self.table)
 
 
@@ -67,7 +67,7 @@ class Requirement:
     name: str
     columns: tuple[int, ...]
     limit: float
-    """SI; relative for a scale factor."""
+    """Limit in SI units; relative for a scale factor."""
     display: str
     display_size: float
 
@@ -81,7 +81,7 @@ def triad_plan(
     uncertainty: TableUncertainty,
     weighting: Weighting = "noise_and_table",
 ) -> TriadPlan:
-    """A triad's plan at stations that all carry table angles."""
+    """Plan of a triad at stations that all carry table angles."""
     angles = [s.angles for s in stations if s.angles is not None]
     vectors = reference_vectors(triad, angles, site)
     table = table_errors(angles, vectors, uncertainty, of_gravity=triad == "accelerometer")
@@ -109,7 +109,7 @@ def parts_by_noise(plan: TriadPlan, noise_covariance: Array) -> tuple[Array, Arr
 
 
 def basis(plans: Sequence[TriadPlan]) -> str:
-    """What the predicted uncertainties of a unit rest on: its calibration, or its nominal scale factors."""
+    """Basis of a unit's predicted uncertainties: its calibration, or its nominal scale factors."""
     nominal = [plan.triad for plan in plans if not plan.calibrated]
     if len(nominal) == len(plans):
         return "nominal scale factors: the unit has no calibration yet; uncertainties scale with the true ones"
@@ -134,9 +134,9 @@ def run_to_run_requirements(
 
 
 def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
-    """A sentence where the plan is coarser than a limit: what is expected, and the dwell that would do, if any would.
+    """Warning where the plan is coarser than a limit: the expected value, and a sufficient dwell, if there is one.
 
-    What counts is what scatters from one calibration to the next: noise, and the table's pointing; constant flaws of
+    Only the scatter from one calibration to the next counts: noise, and the table's pointing; constant flaws of
     the table do not. Only the noise falls with the dwell.
     """
 
@@ -169,7 +169,7 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
 
 
 def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size: float) -> str | None:
-    """A sentence where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit [SI]."""
+    """Warning where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit [SI]."""
     noise = plan.noise_covariance()
     if noise is None:
         return None
@@ -184,7 +184,7 @@ def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size:
 
 
 def _length(dwell_s: float) -> str:
-    """A dwell in the unit that a person would plan it in."""
+    """Format a dwell in the unit that a person would plan it in."""
     hours = dwell_s / units.HOUR
     return f"{hours:.2g} h" if hours < 48.0 else f"{hours / 24.0:.0f} days"
 

@@ -1,4 +1,4 @@
-"""The poses of a scalar calibration with what is known of their noise: stations, or rows that are means already."""
+"""The poses of a scalar calibration with their noise as far as known: stations, or rows that are means already."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,19 +16,19 @@ from procedures.core.recording import TRIADS, Recording
 from procedures.core.unit import Unit
 
 _SMALLEST_SD = 1e-9
-"""Of the largest reading: the noise of pose means that nothing is known of, before it is scaled to the residuals."""
+"""Noise assumed for pose means of unknown noise, relative to the largest reading, before scaling to the residuals."""
 
 
 @dataclass(frozen=True)
 class Poses:
-    """Means of the poses and what is known of their noise."""
+    """Means of the poses with their noise as far as known."""
 
     outputs: Array
     """Shape (n, 3), in `output_unit`."""
     noise: Array
     """Covariance by channel, (3, n, n)."""
     known: bool
-    """Whether that comes from the unit's record."""
+    """True if the noise comes from the unit's record."""
     slow: float
     """Share of slow noise, of noise that is not known."""
     output_unit: str
@@ -38,7 +38,7 @@ class Poses:
 
 
 def station_poses(recordings: Sequence[Recording], triad: str, unit: Unit | None) -> Poses:
-    """One recording a pose."""
+    """Poses from recordings, one a pose."""
     means = station_means(recordings, triad)
     noise, known = noise_of_means(means, unit.triad(triad) if unit else None)
     slow = 0.0 if known else slow_share(means.slow_excess, noise)
@@ -47,7 +47,7 @@ def station_poses(recordings: Sequence[Recording], triad: str, unit: Unit | None
 
 
 def rows_as_poses(recording: Recording, samples: Array, triad: str, pose_sd: float | None, unit: Unit | None) -> Poses:
-    """Each row as the mean over a pose, in (n, 3); a row lasts as long as its sample period.
+    """Poses from rows (n, 3) that are means already; a row lasts as long as its sample period.
 
     The noise is what is given, else the unit's record over each row's time, else what the residuals show, for which
     more poses are needed than the nine that the parameters take. Raises `BadParameter`.

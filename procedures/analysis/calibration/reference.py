@@ -1,4 +1,4 @@
-"""What the two triads should see at a station: the reference vectors of a calibration and their magnitude."""
+"""Reference vectors of a calibration, the inputs of both triads at each station, and their magnitude."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -29,7 +29,7 @@ def site_with(
     azimuth_deg: float | None,
     azimuth_sd_arcsec: float | None,
 ) -> Site:
-    """The bench's site with what the parameters say instead; None keeps the bench's value."""
+    """The bench's site with the values that the parameters override; None keeps the bench's value."""
     given = {
         "latitude_deg": latitude_deg,
         "gravity_m_s2": gravity_m_s2,

@@ -5,7 +5,7 @@ at the reference A = B = 0 and ``f = K0·(V₀ + B0)``. So what the channel woul
 
 ``V₀ = [1 + A/K0]·(V + B0 + B) − B0 = Ṽ/K0 − B0``,
 
-whatever the constants K0 and B0 of this launch are: a calibration finds those anew. Cross-coupling stays as it is, for
+for any constants K0 and B0 of this launch, which a calibration estimates. Cross-coupling stays as it is, for
 A multiplies all that passes a torquer. An error δ of B0 leaves δ·A/K0, a thousandth of it. In the form ``switched`` the
 regime is taken as static: a dwell is too short for the indicator.
 
@@ -42,7 +42,7 @@ SENSORS = ("temperature_case", "temperature_converter")
 CELLS = 12
 """Stretches of a dwell that its temperatures' line is fitted to."""
 LEAST_CELL_S = 1.0
-"""A unit sends its temperatures once a second."""
+"""Interval at which a unit sends its temperatures: once a second."""
 
 
 @dataclass(frozen=True)
@@ -51,46 +51,46 @@ class StationTemperatures:
 
     mean_c: Array
     mean_sd_c: Array
-    """From the scatter about a straight line."""
+    """Standard uncertainty from the scatter about a straight line."""
     slope_c_s: Array
 
 
 @dataclass(frozen=True)
 class AtReference:
-    """Station means as they would have been at the reference temperatures, and what that leaves uncertain."""
+    """Station means corrected to the reference temperatures, with the uncertainty of that correction."""
 
     means: StationMeans
     temperatures: StationTemperatures
     change_m_s2: Array
-    """What was added to the outputs, (n, 3)."""
+    """Correction added to the outputs, (n, 3)."""
     of_correction: Array
-    """Covariance of the outputs from the correction's coefficients, alike at all stations, (3, n, n)."""
+    """Covariance of the outputs from the correction's coefficients, common to all stations, (3, n, n)."""
     of_sensors: Array
-    """The same from the sensors' noise, (3, n, n)."""
+    """Covariance of the outputs from the sensors' noise, (3, n, n)."""
 
     @property
     def covariance(self) -> Array:
-        """Both, (3, n, n) [(m/s²)²]."""
+        """Covariance from coefficients and sensors together, (3, n, n) [(m/s²)²]."""
         return self.of_correction + self.of_sensors
 
 
 @dataclass(frozen=True)
 class ThermalShare:
-    """What the correction did to a calibration, JSON-ready."""
+    """Effect of the thermal correction on a calibration, JSON-ready."""
 
     form: Form
     regime: str
-    """What the form ``switched`` was told: "static"; the other forms ask for none: ""."""
+    """Regime assumed by the form ``switched``: "static"; empty for the other forms, which need none."""
     case_c: tuple[float, ...]
-    """At each station."""
+    """Case temperature at each station."""
     converter_c: tuple[float, ...]
     change_m_s2: tuple[tuple[float, ...], ...]
-    """Added to the outputs x, y, z of each station."""
+    """Correction added to the outputs x, y, z of each station."""
     from_correction: dict[str, float]
     """Standard uncertainty that the correction's coefficients leave in each calibration coefficient; it is part of
     theirs."""
     from_sensors: dict[str, float]
-    """The same of the temperature sensors' noise."""
+    """Standard uncertainty due to the temperature sensors' noise."""
 
 
 def station_temperatures(recordings: Sequence[Recording], lag_s: tuple[float, float]) -> StationTemperatures:
@@ -162,11 +162,11 @@ def bring_to_reference(
 
 
 STEP_C = 0.01
-"""Of the differences by temperature."""
+"""Step of the differences by temperature [°C]."""
 
 
 def _of_correction(axis: AxisCorrection, v: Array, case: Array, converter: Array) -> Array:
-    """``J·Σ·Jᵀ`` (n, n): ``∂V₀/∂α = x·(V + B0 + B)/K0``, ``∂V₀/∂β = (1 + A/K0)·x``, x the powers of the departures."""
+    """Covariance ``J·Σ·Jᵀ`` (n, n): ``∂V₀/∂α = x·(V + B0 + B)/K0``, ``∂V₀/∂β = (1 + A/K0)·x``, x powers of Δ."""
     if not axis.covariance:
         return np.zeros((len(v), len(v)))
     dt, db = case - axis.case_reference_c, converter - axis.converter_reference_c
@@ -179,7 +179,7 @@ def _of_correction(axis: AxisCorrection, v: Array, case: Array, converter: Array
 
 
 def thermal_share(at: AtReference, correction: ThermalCorrection, fit: TriadFit) -> ThermalShare:
-    """What the correction did to a calibration of the accelerometers, through the estimator that made the fit."""
+    """Effect of the thermal correction on the accelerometers' calibration, through the estimator of the fit."""
 
     def share(covariance: Array) -> dict[str, float]:
         gain = fit.estimator.gain
@@ -199,7 +199,7 @@ def thermal_share(at: AtReference, correction: ThermalCorrection, fit: TriadFit)
 
 
 def thermal_warnings(at: AtReference, correction: ThermalCorrection) -> tuple[str, ...]:
-    """What the reader must know of a correction's use at these temperatures."""
+    """Warnings about the use of a correction at these temperatures."""
     warnings = _of_range(at.temperatures.mean_c, correction)
     unknown = [name for name, axis in zip("xyz", correction.axes, strict=True) if not axis.covariance]
     if unknown:
@@ -218,7 +218,7 @@ def thermal_warnings(at: AtReference, correction: ThermalCorrection) -> tuple[st
 
 
 def _of_range(mean_c: Array, correction: ThermalCorrection) -> list[str]:
-    """A sentence where stations (n, 2) [°C] are warmer or colder than the correction has seen, or nobody knows."""
+    """Warnings where stations (n, 2) [°C] lie outside the correction's fitted range, or where it has none."""
     if correction.fitted_range is None:
         return ["the thermal correction does not say at which temperatures it was fitted: it may be extrapolated here"]
     beyond = correction.fitted_range.beyond_c(mean_c[:, 0], mean_c[:, 1])

@@ -1,4 +1,4 @@
-"""How much bias and scale factor change from launch to launch, from several calibrations (thesis 5.2, 5.3)."""
+"""Change of bias and scale factor from launch to launch, from several calibrations (thesis 5.2, 5.3)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,14 +27,14 @@ class Scatter:
     high: float
     """95 % interval of the true standard deviation, from chi-square with n − 1 degrees of freedom."""
     expected_from_measurement: float
-    """What the calibrations' own uncertainties would give if the unit did not change at all; an upper figure, since the
+    """Standard deviation expected from the calibrations' uncertainties for a stable unit; an upper figure, since the
     constant flaws of one table repeat."""
     values: tuple[float, ...] = ()
     """The coefficient in each calibration, and its standard uncertainty."""
     value_sds: tuple[float, ...] = ()
 
     def resolves(self, limit: float) -> bool:
-        """Whether the measurement is finer than a limit on the standard deviation."""
+        """True if the measurement is finer than a limit on the standard deviation."""
         return self.expected_from_measurement < limit
 
 

@@ -43,10 +43,10 @@ class ScalarFit:
     """Nine parameters of a triad with their covariance. Shapes: parameters (9,), covariance (9, 9), residuals (n,)."""
 
     parameters: Array
-    """In the order of `PARAMETERS`."""
+    """Parameters in the order of `PARAMETERS`."""
     covariance: Array
     condition: float
-    """Of the linear system of thesis 3.23 at these stations, columns scaled."""
+    """Condition number of the linear system of thesis 3.23 at these stations, columns scaled."""
     residuals: Array
     """|v̂| − reference [SI], shape (n,)."""
     residual_sd: Array
@@ -59,7 +59,7 @@ class ScalarFit:
 
     @property
     def standard_uncertainties(self) -> Array:
-        """Shape (9,)."""
+        """Standard uncertainties of the nine parameters, shape (9,)."""
         return np.sqrt(np.diagonal(self.covariance))
 
     @property
@@ -73,7 +73,7 @@ class ScalarFit:
         return judged_p_value(self.chi_square, self.degrees_of_freedom, self.noise_known)
 
     def calibration(self, triad: str, output_unit: str, input_unit: str) -> TriadCalibration:
-        """As ``U = b + K·v`` with K upper triangular; its lower triangle is fixed and has no variance."""
+        """Convert to ``U = b + K·v`` with K upper triangular; its lower triangle is fixed and has no variance."""
         jacobian = _linear_derivative(self.parameters)
         covariance = jacobian @ self.covariance @ jacobian.T
         coefficients = linear_coefficients(self.parameters)
@@ -127,7 +127,7 @@ def observable_derivative(coefficients: Array) -> Array:
 
 
 def require_scalar_determined(what: str, directions: Array, tolerance: float = RANK_TOLERANCE) -> float:
-    """Condition of thesis 3.23 for unit vectors (n, 3), or `Undetermined` naming what is lost.
+    """Condition number of thesis 3.23 for unit vectors (n, 3), or `Undetermined` naming the lost combinations.
 
     Row: ``[g_x g_y g_z g_x² g_y² g_z² g_x·g_y g_x·g_z g_y·g_z]`` (thesis 3.21).
     """
@@ -210,7 +210,7 @@ def _solve(start: Array, outputs: Array, reference: float, weights: Array) -> Ar
 
 
 def _upright(parameters: Array) -> Array:
-    """The same magnitudes with positive scale factors: a row of T·S may be negated, no magnitude sees its sign."""
+    """Make the scale factors positive at the same magnitudes: negating a row of T·S leaves every magnitude."""
     signs = np.where(parameters[3:6] < 0.0, -1.0, 1.0)
     scale = parameters[3:6] * signs
     t_xy, t_xz, t_yz = parameters[6:]
@@ -235,7 +235,7 @@ def _output_weights(parameters: Array, outputs: Array) -> Array:
 
 
 def _jacobian(parameters: Array, outputs: Array) -> Array:
-    """∂|v̂|/∂θ, shape (n, 9)."""
+    """Derivatives ∂|v̂|/∂θ of the magnitude, shape (n, 9)."""
     centred = outputs - parameters[:3]
     corrected = centred @ correction_matrix(parameters).T
     u = corrected / np.linalg.norm(corrected, axis=1)[:, None]

@@ -11,11 +11,11 @@ from procedures.core.arrays import Array
 
 SLOW = 3.0
 GROUPS = 4
-"""Parts of a pose whose means show slow noise."""
+"""Number of parts of a pose from the means of which slow noise is estimated."""
 
 
 def slow_excess(batch_means: Array) -> Array:
-    """What slow noise adds to the variance of a pose's mean, by channel, of batch means (batches, channels).
+    """Excess variance of a pose's mean due to slow noise, by channel, from batch means (batches, channels).
 
     ``σ²_A(T/4) − σ²_A(T/batches)·4/batches``: zero on average for white noise, so it may come out negative; it is to be
     averaged over the poses before it is cut at zero.

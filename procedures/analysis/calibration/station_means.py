@@ -1,4 +1,4 @@
-"""One recording a station in, one mean output a channel out, with what the dwell itself says of its scatter."""
+"""Reduce one recording a station to one mean output a channel, with its scatter as observed within the dwell."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ BATCHES = 20
 """Stretches a dwell is cut into; the scatter of their means allows for noise correlated over less than a stretch."""
 
 RANGE_ENDS = tuple(float(2**bits - over) for bits in (15, 31) for over in (0, 1))
-"""Where counters of 16 and 32 bits end, up to the sign."""
+"""Full scale of counters of 16 and 32 bits, without the sign."""
 
 
 @dataclass(frozen=True)
@@ -33,15 +33,15 @@ class StationMeans:
 
     triad: str
     output_unit: str
-    """"rad/s", "m/s^2" or "count"."""
+    """Unit of the outputs: "rad/s", "m/s^2" or "count"."""
     outputs: Array
-    """Shape (n, 3)."""
+    """Mean nominal outputs, shape (n, 3)."""
     scatter_sd: Array
     """Standard deviation of single samples within the dwell, shape (n, 3)."""
     mean_sd: Array
     """Standard uncertainty of the mean from the scatter of batch means within the dwell, shape (n, 3)."""
     slow_excess: Array
-    """What slow noise adds to the variance of the mean (`slow_excess`), shape (n, 3)."""
+    """Excess variance of the mean due to slow noise (`slow_excess`), shape (n, 3)."""
     windows: Array
     """[start, stop] of each dwell since the first one's launch [s], shape (n, 2)."""
     counts: tuple[int, ...]
@@ -96,7 +96,7 @@ def require_unit_of(calibration: TriadCalibration, means: StationMeans) -> None:
 
 
 def launch_warnings(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """A sentence where the recordings are of several launches of the unit, which an analysis takes for one."""
+    """Warning where the recordings are of several launches of the unit, which an analysis takes for one."""
     launches = {r.info.launched_s for r in recordings if r.info.launched_s is not None}
     if len(launches) < 2:
         return ()
@@ -164,7 +164,7 @@ def _in_units(
 
 
 def _batch_edges(seen: int, length: int, count: int) -> tuple[list[int], list[int]]:
-    """Where batches begin inside a block that starts at sample `seen`, and which batches they are."""
+    """Starts of the batches inside a block that begins at sample `seen`, and the batches' indices."""
     starts = np.ceil(np.arange(BATCHES) * count / BATCHES).astype(int) - seen
     current = int(np.searchsorted(starts, 0, side="right")) - 1
     batches = [current, *(b for b in range(current + 1, BATCHES) if starts[b] < length)]
@@ -172,7 +172,7 @@ def _batch_edges(seen: int, length: int, count: int) -> tuple[list[int], list[in
 
 
 def _refuse_frozen(recordings: Sequence[Recording], summaries: Sequence[_Summary], triad: str) -> None:
-    """A channel that never changes is dead if it says the same at every one of several stations; it is stuck if it
+    """Refuse a frozen channel: dead if it gives the same value at every one of several stations; stuck if it
     stands at a whole number other than zero at some and moves at others.
 
     A counter proves less than a sample does: across the Earth's rate it gives no pulse for minutes, and a quiet input

@@ -1,4 +1,4 @@
-"""What a plan of stations will cost and what it can resolve, before anything moves."""
+"""Predicted duration and resolution of a plan of stations, before anything moves."""
 
 from collections.abc import Callable, Sequence
 

@@ -1,4 +1,4 @@
-"""Where a hand-turned unit stood still, found in a recording that carries no labels.
+"""Detection of the poses in which a hand-turned unit stood still, in a recording without labels.
 
 After Tedaldi, Pretto and Menegatti (ICRA 2014, imu_tk): the variance in a moving window against that of a stretch at
 the beginning which is known to be still.
@@ -15,7 +15,7 @@ from procedures.core.errors import BadParameter, UnfitRecording
 
 @dataclass(frozen=True)
 class StillSettings:
-    """How still a pose must be, and for how long."""
+    """Criteria for a still pose: largest motion and least duration."""
 
     initial_s: float = 20.0
     """The unit is known to rest for this long at the beginning."""
@@ -93,6 +93,6 @@ def pose_means(samples: Array, stretches: tuple[Stretch, ...], batches: int = 10
 
 
 def pose_excess(samples: Array, stretches: tuple[Stretch, ...], batches: int = 12) -> Array:
-    """What slow noise adds to the variance of every stretch's mean (`slow_excess`), shape (poses, 3)."""
+    """Excess variance of every stretch's mean due to slow noise (`slow_excess`), shape (poses, 3)."""
     parts = (np.array_split(samples[p.start : p.stop], batches) for p in stretches)
     return np.array([slow_excess(np.array([part.mean(axis=0) for part in pose])) for pose in parts]).reshape(-1, 3)

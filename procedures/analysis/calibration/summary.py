@@ -1,4 +1,4 @@
-"""What a calibration tells of one triad, as plain JSON-ready numbers."""
+"""Calibration results of one triad, as plain JSON-ready numbers."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One coefficient of ``U = b + K·v`` with its standard uncertainty and what that is made of."""
+    """Coefficient of ``U = b + K·v`` with its standard uncertainty and the contributions to it."""
 
     name: CoefficientName
     unit: str
@@ -39,7 +39,7 @@ class StationResidual:
 
 @dataclass(frozen=True)
 class ScalarParameter:
-    """One of the nine that magnitudes determine: from magnitudes alone, from the linear fit, and how far apart."""
+    """Cross-check of one of the nine parameters: from magnitudes alone, from the linear fit, and their difference."""
 
     name: str
     unit: str
@@ -47,7 +47,7 @@ class ScalarParameter:
     standard_uncertainty: float
     linear: float
     difference_sigmas: float
-    """In standard deviations of the difference, both estimates' common data allowed for."""
+    """Difference in standard deviations of the difference, both estimates' common data allowed for."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class ScalarCheck:
 
 @dataclass(frozen=True)
 class TriadSummary:
-    """Everything a calibration says of one triad."""
+    """Complete calibration results of one triad."""
 
     calibration: TriadCalibration
     coefficients: tuple[Coefficient, ...]
@@ -74,9 +74,9 @@ class TriadSummary:
     magnitudes: Magnitudes
     scalar: ScalarCheck | None = None
     weighting: Weighting = "noise"
-    """Results of procedure versions before 1.1.0 do not say: theirs is this."""
+    """Weights of the fit; results of procedure versions before 1.1.0 lack the field and were weighted by noise."""
     misfit: float | None = None
-    """Residuals over what noise and table allow; None where no equation is spare, or an older version did not say."""
+    """Residuals over what noise and table allow; None without a spare equation and in results of older versions."""
     worst: str = ""
     """Station and channel with the greatest residual."""
 
@@ -141,7 +141,7 @@ def scalar_check(fit: TriadFit, scalar: ScalarFit) -> ScalarCheck:
 
     Both are functions of the same outputs, so the difference has the covariance ``D·(C + F·Fᵀ)·Dᵀ`` with
     ``D = J·G_linear − G_scalar`` over all outputs of all channels, C noise and F the table's flaws; G_linear is the
-    estimator that made the fit, whatever its weights.
+    estimator that made the fit, with its own weights.
     """
     linear_gain = np.einsum("pk,kcn->pnc", observable_derivative(fit.coefficients), fit.estimator.gain)
     difference = linear_gain - scalar.gain

@@ -1,4 +1,4 @@
-"""What the table's own flaws do to the vectors that the unit really sees, to first order.
+"""First-order effect of the table's flaws on the vectors that the unit senses.
 
 A small turn ε about an axis e somewhere in the chain of gimbals changes a fixed vector, seen in the unit's axes, by
 ``δv_b = −ε·(e_b × v_b)``, with e_b that axis in the unit's axes (from ``rot_rb = P·R(ε)·S``, ``e_b = Sᵀ·e``).
@@ -24,15 +24,15 @@ class TableUncertainty:
     """Standard uncertainties of the reference that a table and a site provide; all zero is an ideal bench."""
 
     orthogonality_sd_arcsec: float = 0.0
-    """Of each of the two right angles, constant over a job."""
+    """Non-orthogonality of each of the two right angles, constant over a job."""
     pointing_sd_arcsec: float = 0.0
-    """Of each axis, anew at each station."""
+    """Pointing error of each axis, independent at each station."""
     level_sd_arcsec: float = 0.0
     """Tilt of the outer axis about each horizontal direction, constant."""
     azimuth_sd_arcsec: float = 0.0
     """Heading of the table's zero, constant."""
     gravity_relative_sd: float = 0.0
-    """Of the reference magnitude; concerns the accelerometers alone."""
+    """Relative uncertainty of the reference magnitude; concerns the accelerometers alone."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class TableErrors:
         return np.einsum("cj,njp->ncp", matrix, self.sensitivity * self.sd)
 
     def columns(self, source: str) -> Array:
-        """Which columns belong to a source, boolean of shape (P,)."""
+        """Mask of the columns that belong to a source, boolean of shape (P,)."""
         return np.array([s == source for s in self.source], dtype=bool)
 
 

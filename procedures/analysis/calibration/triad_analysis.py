@@ -1,4 +1,4 @@
-"""From the recordings of a multiposition calibration to the summary of a triad: means, fit, magnitudes, cross-check."""
+"""Analysis of a triad's multiposition calibration, from recordings to summary: means, fit, magnitudes, cross-check."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -58,7 +58,7 @@ def analyse_means(
     weighting: Weighting = "noise_and_table",
     more: Array | None = None,
 ) -> tuple[TriadSummary, TriadFit]:
-    """Calibrate one triad from its station means; `more` is what else makes them uncertain beside noise, (3, n, n).
+    """Calibrate one triad from its station means; `more` is their covariance from causes other than noise, (3, n, n).
 
     Raises `UnfitRecording`, `Undetermined`.
     """
@@ -77,7 +77,7 @@ def analyse_means(
 
 
 def _slow(means: StationMeans, noise: Array, fit: TriadFit, known: bool) -> float:
-    """Share of slow noise in what noise and table allow; none of noise that is known."""
+    """Share of slow noise in the variance of noise and table; zero where the noise is known."""
     if known:
         return 0.0
     own = float(np.sum(np.diagonal(noise, axis1=1, axis2=2)))
@@ -85,19 +85,19 @@ def _slow(means: StationMeans, noise: Array, fit: TriadFit, known: bool) -> floa
 
 
 LEAST_SCATTER = 0.5
-"""A dwell's own scatter counts as no less than this part of the median of all."""
+"""Least scatter of a dwell that counts, as a part of the median of all."""
 
 
 @dataclass(frozen=True)
 class AccelerometerSettings:
-    """How accelerometers are calibrated."""
+    """Settings of the accelerometers' calibration."""
 
     with_scalar: bool = False
     weighting: Weighting = "noise_and_table"
     correction: ThermalCorrection | None = None
     """Brings their means to its reference temperatures first; None: they are taken as they are."""
     lag_s: tuple[float, float] = (0.0, 0.0)
-    """Of case and converter sensor."""
+    """Time constants of case and converter sensor [s]."""
 
 
 def analyse_accelerometers(
@@ -107,7 +107,7 @@ def analyse_accelerometers(
     record: TriadRecord | None,
     settings: AccelerometerSettings,
 ) -> tuple[TriadSummary, ThermalShare | None, tuple[str, ...]]:
-    """The accelerometers' summary; with a correction what that did to them, and what to know of its use.
+    """Calibrate the accelerometers; with a correction also return its effect on them and warnings about its use.
 
     Raises as `analyse_triad` and `bring_to_reference`.
     """
@@ -121,7 +121,7 @@ def analyse_accelerometers(
 
 
 def noise_of_means(means: StationMeans, record: TriadRecord | None) -> tuple[Array, bool]:
-    """Covariance of the station means, (3, n, n), and whether it comes from the unit's record.
+    """Covariance of the station means, (3, n, n), and a flag that it comes from the unit's record.
 
     Outputs in counts have no record in their unit. Without one the scatter of batch means within each dwell stands in,
     for a dwell that hardly scatters (clipped, held) a part of the dwells' median.
@@ -134,7 +134,7 @@ def noise_of_means(means: StationMeans, record: TriadRecord | None) -> tuple[Arr
 
 
 def scatter_covariance(outputs: Array, sd: Array) -> Array:
-    """Covariance (3, n, n) of means (n, 3) whose noise nobody knows, from their scatter (n, 3).
+    """Covariance (3, n, n) of means (n, 3) of unknown noise, from their scatter (n, 3).
 
     Where nothing scatters, a part in 10⁹ of the greatest output stands in, so that it can be weighed.
     """

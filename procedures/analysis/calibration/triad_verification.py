@@ -1,4 +1,4 @@
-"""From a verification's recordings to what the calibration in use is worth: magnitudes, and whether they are as
+"""Verification of the calibration in use from recordings: magnitudes, and whether they are as
 predicted.
 """
 
@@ -22,11 +22,11 @@ from procedures.core.unit import Unit
 
 @dataclass(frozen=True)
 class TriadVerification:
-    """One triad's verification, JSON-ready."""
+    """Verification result of one triad, JSON-ready."""
 
     magnitudes: Magnitudes
     chi_square: float | None
-    """Of the errors after correction against their predicted covariance; None where the noise is not known."""
+    """Chi-square of the errors after correction against their predicted covariance; None for unknown noise."""
     p_value: float | None
     run_to_run_known: bool
     """False where the unit's record has no change from launch to launch: then the prediction holds in one launch

@@ -1,4 +1,4 @@
-"""Magnitudes before and after correction: what a calibration is worth at each orientation, and what it should be worth.
+"""Magnitudes before and after correction: errors of a calibration at each orientation, and their prediction.
 
 The magnitude of a corrected vector does not depend on where the table really stood, only on the unit and its
 coefficients (thesis 5.4, 5.5; Tables 5.3, 5.4).
@@ -24,17 +24,17 @@ class Magnitudes:
     reference: float
     labels: tuple[str, ...]
     before: tuple[float, ...] | None
-    """None where the outputs are in counts: they have no magnitude."""
+    """Magnitudes before correction; None where the outputs are in counts, which have none."""
     after: tuple[float, ...]
     expected_sd: tuple[float, ...]
-    """Of the errors after correction; empty where the noise is not known."""
+    """Standard deviations of the errors after correction; empty where the noise is not known."""
     mean_error_before: float | None
     sd_before: float | None
     mean_error_after: float
     sd_after: float
     """Sample standard deviation over the stations, n − 1 (Tables 5.3, 5.4)."""
     per_axis: float
-    """``δ/√3`` (thesis 5.1): one axis's share of it, all three taken as alike."""
+    """Error per axis ``δ/√3`` (thesis 5.1): one axis's share, all three taken as alike."""
     per_axis_sd: float
     """Standard uncertainty of that figure, ``δ/√(2(n − 1))/√3``: independent errors of n stations."""
 
@@ -77,7 +77,7 @@ def _sample_sd(values: Array) -> float:
 
 
 def magnitude_sensitivity(vectors: Array, matrix: Array) -> tuple[Array, Array]:
-    """How |v̂| errs with the outputs and with the coefficients: ∂|v̂|/∂U (n, 3) and ∂|v̂|/∂(twelve) (n, 12).
+    """Sensitivity of |v̂| to the outputs and the coefficients: ∂|v̂|/∂U (n, 3) and ∂|v̂|/∂(twelve) (n, 12).
 
     ``w = K⁻ᵀ·v/|v|``; an error of a coefficient of channel c acts as ``−w_c·[1 v_x v_y v_z]``.
     """
@@ -92,7 +92,7 @@ def error_covariance(
     noise_covariance: Array,
     record: TriadRecord | None,
 ) -> Array:
-    """Covariance (n, n) [SI²] of the errors of |v̂| to expect when the unit is switched on anew and verified.
+    """Covariance (n, n) [SI²] of the errors of |v̂| to expect when a unit is switched on again and verified.
 
     Three parts: the calibration's own covariance; the noise of the verification's dwells, `noise_covariance` (3, n, n);
     and the change of bias and scale factor between two launches by the unit's record, each of which departs from the

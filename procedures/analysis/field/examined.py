@@ -24,7 +24,7 @@ from procedures.core.recording import ACCELEROMETER, GYRO, Recording
 
 @dataclass(frozen=True)
 class FittedTriad:
-    """One triad's fit, of which means, and how well it describes them."""
+    """Fit of one triad with its means and its misfit."""
 
     fit: FieldFit
     means: StationMeans

@@ -1,4 +1,4 @@
-"""Bias and scale of a triad from a few positions: least squares with everything that the positions leave uncertain.
+"""Bias and scale of a triad from a few positions: least squares with all uncertainties of the positions.
 
 The model is ``U_i = b_i + k_i·v_i`` per channel (F 8, 42): cross-couplings are neglected, so their declared spread is a
 part of the uncertainty, as are the angles set by hand, the level, the heading and gravity. Weights are those of noise
@@ -23,7 +23,7 @@ from procedures.core.imu_model import TriadCalibration, triad_calibration
 _PASSES = 12
 """Gauss-Newton steps at the most; a tilt of 10° settles to rounding in six."""
 _SETTLED = 1e-12
-"""A step of this part of the unknowns' size [rad, relative, magnitude] is the last."""
+"""Relative step of the unknowns [rad, relative, magnitude] at which the iteration ends."""
 
 
 @dataclass(frozen=True)
@@ -31,20 +31,20 @@ class FieldUncertainty:
     """Standard deviations of what is taken as known [rad, relative]."""
 
     angle_sd_rad: float = 0.0
-    """Of each turn at each position, anew."""
+    """Setting error of each turn at each position, independent."""
     tilt_covariance_rad2: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 0.0), (0.0, 0.0))
-    """Of (α₀, β₀) where they are not estimated."""
+    """Covariance of (α₀, β₀) where they are not estimated."""
     azimuth_sd_rad: float = 0.0
     cross_coupling_sd: float = 0.0
-    """Of each of the six neglected ones, relative to its channel's scale factor."""
+    """Standard deviation of each of the six neglected cross-couplings, relative to its channel's scale factor."""
     magnitude_relative_sd: float = 0.0
     scale_relative_sd: float = 0.0
-    """Of the nominal scale factor, where it is not estimated."""
+    """Relative standard deviation of the nominal scale factor, where it is not estimated."""
 
 
 @dataclass(frozen=True)
 class FieldModel:
-    """What is asked of the positions."""
+    """Model fitted to the positions: which parameters are estimated."""
 
     positions_rad: Array
     """(α, β), shape (n, 2)."""
@@ -67,11 +67,11 @@ class FieldFit:
 
     bias: Array
     scale: Array
-    """Both (3,); the scale is one where it was not estimated."""
+    """Bias and scale of each channel, (3,) each; the scale is one where it was not estimated."""
     tilt_rad: Array
     """(α₀, β₀), estimated or as given, shape (2,)."""
     covariance: Array
-    """Of (b, k, α₀, β₀), shape (8, 8); zero for what was not estimated, but for a nominal scale."""
+    """Covariance of (b, k, α₀, β₀), shape (8, 8); zero for fixed parameters, but for a nominal scale."""
     residuals: Array
     """Shape (n, 3), in the output's unit."""
     residual_sd: Array
@@ -80,7 +80,7 @@ class FieldFit:
     degrees_of_freedom: int
     noise_known: bool
     noise_share: float
-    """Part of the outputs' variance that is noise; the rest is what is declared uncertain."""
+    """Noise part of the outputs' variance; the rest is the declared uncertainty."""
 
     @property
     def p_value(self) -> float | None:
@@ -93,7 +93,7 @@ class FieldFit:
         return np.sqrt(np.diagonal(self.covariance)[3:6]) / np.abs(self.scale)
 
     def calibration(self, triad: str, output_unit: str, input_unit: str, cross_sd: float) -> TriadCalibration:
-        """As ``U = b + K·v`` with K diagonal; the cross-couplings are zero with the spread declared."""
+        """Convert to ``U = b + K·v`` with K diagonal; the cross-couplings are zero with the spread declared."""
         coefficients = np.column_stack([self.bias, np.diag(self.scale)]).ravel()
         places = [0, 4, 8, 1, 6, 11]
         covariance = np.zeros((12, 12))

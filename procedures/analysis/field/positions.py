@@ -1,11 +1,11 @@
-"""What a unit sees in positions (α, β) set by hand: α about z, then β about the turned x (F 1-3).
+"""Inputs of a unit in positions (α, β) set by hand: α about z, then β about the turned x (F 1-3).
 
 ``v_b = R_x(β)ᵀ·R_z(α)ᵀ·v_r``, in table angles middle = α and inner = β. The base may lie wrong in two ways, both by two
 small angles. "base": it is tilted under both turns, ``v_r = R_x(β₀)ᵀ·R_z(α₀)ᵀ·v``. "turn_zeros": the zeros of the two
-turns are off, ``α + α₀`` and ``β + β₀``. F 15 is the second, whatever its words say, and so are the figures of its
+turns are off, ``α + α₀`` and ``β + β₀``. F 15 is the second, contrary to its wording, and so are the figures of its
 Table 2 (the tests recompute them).
 
-Errata of F beside those of the notes: its axes (east, up, north) are left-handed; ours turn x to the west for its
+Further errata of F: its axes (east, up, north) are left-handed; this module turns x to the west for its
 [0, Ω sin φ, Ω cos φ]. In F 5, 8, 10, 12, 15 the third component lacks the minus of F 4's product: with specific force
 +g on y it is ``−g·cos α·sin β``.
 """
@@ -19,7 +19,7 @@ from procedures.core.arrays import Array
 
 Tilt = Literal["base", "turn_zeros"]
 _STEP = 1e-6
-"""Of the central differences [rad]: their error is of the order of its square."""
+"""Step of the central differences [rad]: their error is of the order of its square."""
 
 
 def field_vectors(positions_rad: Array, vector_r: Array, tilt: Tilt, tilt_rad: Array) -> Array:

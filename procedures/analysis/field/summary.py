@@ -1,4 +1,4 @@
-"""What a field calibration says of one triad, as plain JSON-ready numbers."""
+"""Results of a field calibration of one triad, as plain JSON-ready numbers."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from procedures.core.imu_model import TriadCalibration
 
 @dataclass(frozen=True)
 class FieldTriad:
-    """One triad's bias and scale with standard uncertainties, and the base as this triad saw it."""
+    """Bias and scale of one triad with standard uncertainties, and the tilt of the base by this triad."""
 
     calibration: TriadCalibration
     bias: tuple[float, ...]

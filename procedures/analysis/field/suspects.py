@@ -1,4 +1,4 @@
-"""Which mistake would explain outputs that no bias and scale factor fit at the declared positions.
+"""Search for the mistake behind outputs that no bias and scale factor fit at the declared positions.
 
 Hypotheses: two positions are exchanged, a turn was made in the other sense, channels are reversed or exchanged. Each
 is tried by a plain line through every channel; one is named only where it explains the outputs `BETTER` times as well
@@ -16,15 +16,15 @@ from procedures.core.arrays import Array
 
 BETTER = 5.0
 GOOD = 1e-3
-"""A root mean square residual of this part of the magnitude is a good fit of positions set by hand."""
+"""Largest rms residual, relative to the magnitude, of a good fit of positions set by hand."""
 FAIR = 0.03
-"""With a residual beyond this part of the magnitude a line describes nothing."""
+"""Residual, relative to the magnitude, beyond which a line describes nothing."""
 POSITIONS_MAX = 60
-"""With more positions than this no pairs are tried: their number grows as the square."""
+"""Number of positions beyond which no pairs are tried: their number grows as the square."""
 
 
 def suspected(outputs: Array, model: FieldModel) -> str:
-    """A sentence on the likeliest mistake, empty where none explains the outputs (n, 3)."""
+    """Warning about the likeliest mistake, empty where none explains the outputs (n, 3)."""
     declared, upright = _line(outputs, model, model.positions_rad)
     tried = [(*_line(seen, model, positions), name) for positions, seen, name in _hypotheses(outputs, model)]
     sound = sorted((rms, name) for rms, positive, name in tried if positive)
@@ -59,7 +59,7 @@ def _hypotheses(outputs: Array, model: FieldModel) -> Iterator[tuple[Array, Arra
 
 
 def _line(outputs: Array, model: FieldModel, positions: Array) -> tuple[float, bool]:
-    """Root mean square residual of a line through each channel, and whether no slope is negative.
+    """Root mean square residual of a line through each channel, and True if no slope is negative.
 
     A channel whose input hardly changes has no slope of its own; one counts as negative beyond the noise alone.
     """

@@ -1,1 +1,1 @@
-"""Weighted least squares that every fit stands on: whitening, rank and determination."""
+"""Weighted least squares common to all fits: whitening, rank and determination."""

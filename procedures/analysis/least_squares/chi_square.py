@@ -27,7 +27,7 @@ def residual_factor(statistic: float, degrees_of_freedom: int, noise_known: bool
 def judged_p_value(statistic: float, degrees_of_freedom: int, noise_known: bool) -> float | None:
     """`tail_probability` of a fit's residuals, or None where it proves nothing.
 
-    That is where as many unknowns as measurements leave no degree of freedom, and where the noise was scaled to the
-    residuals because nobody knew it.
+    That is where as many unknowns as measurements leave no degree of freedom, and where unknown noise was scaled to the
+    residuals.
     """
     return tail_probability(statistic, degrees_of_freedom) if noise_known and degrees_of_freedom > 0 else None

@@ -1,4 +1,4 @@
-"""Can a set of orientations determine what is asked of it? Asked before any solve; the answer names what is lost."""
+"""Test whether a set of orientations determines the unknowns, before any solve; the answer names what is lost."""
 
 from collections.abc import Sequence
 
@@ -32,7 +32,7 @@ def require_full_rank(what: str, design: Array, names: Sequence[str], tolerance:
 
 
 def _in_words(null_space: Array, names: Sequence[str]) -> list[str]:
-    """Each row of a reduced basis of the null space as a sum of named unknowns."""
+    """Name each row of a reduced basis of the null space as a sum of unknowns."""
     return [_combination(row, names) for row in _reduced(null_space)]
 
 

@@ -6,7 +6,7 @@ from procedures.core.arrays import Array
 
 
 def scaled_pinv(design: Array) -> Array:
-    """Pseudo-inverse (k, n) of a design (n, k) whose columns may differ by orders of magnitude.
+    """Pseudo-inverse (k, n) of a design (n, k), with columns that may differ by orders of magnitude.
 
     Each column is scaled to unit length first, so that the cut of small singular values is the same in all units; a
     column of zeros gives a row of zeros.

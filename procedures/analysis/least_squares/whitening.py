@@ -1,4 +1,4 @@
-"""Weights from a covariance."""
+"""Whitening weights from a covariance matrix."""
 
 import numpy as np
 from scipy.linalg import cholesky

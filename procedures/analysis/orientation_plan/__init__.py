@@ -1,1 +1,1 @@
-"""Which orientations of the table make a calibration surest in a given time: a search, and what it is measured by."""
+"""Search for the orientations of the table that make a calibration surest in a given time."""

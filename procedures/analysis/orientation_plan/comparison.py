@@ -1,4 +1,4 @@
-"""What a plan of orientations is worth beside another in the same bench time, by the estimators that would use it."""
+"""Compare plans of orientations in the same bench time, by the estimators that would use them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Requirements:
     cross_coupling: float
 
     def of_twelve(self, matrix: Array) -> Array:
-        """In the units of the twelve coefficients, shape (12,): a row of K in parts of its scale factor."""
+        """Limits of the twelve coefficients in their units, shape (12,): a row of K in parts of its scale factor."""
         found = np.zeros((3, 4))
         for c in range(3):
             found[c] = self.bias, *(np.full(3, self.cross_coupling) * abs(matrix[c, c]))
@@ -37,7 +37,7 @@ class Requirements:
         return found.ravel()
 
     def of_nine(self, matrix: Array) -> Array:
-        """In the units of the scalar nine (b, s, t), shape (9,)."""
+        """Limits of the scalar nine (b, s, t) in their units, shape (9,)."""
         scale = self.scale_factor / np.abs(np.diagonal(matrix))
         return np.array([self.bias] * 3 + scale.tolist() + [self.cross_coupling] * 3)
 
@@ -54,10 +54,10 @@ class Setting:
     settle_s: float
     model: Model
     requirements: Mapping[str, Requirements]
-    """By triad; the triads that count."""
+    """Requirements by triad; only these triads count."""
 
     def limits(self, triad: str, matrix: Array) -> Array:
-        """Of the model's coefficients, shape (12,) or (9,)."""
+        """Limits of the model's coefficients, shape (12,) or (9,)."""
         r = self.requirements[triad]
         return r.of_nine(matrix) if self.model == "scalar" else r.of_twelve(matrix)
 
@@ -70,22 +70,22 @@ class ScoredPlan:
     dwell_s: float
     total_s: float
     sd: Mapping[str, Array]
-    """By triad: of the twelve or the nine, SI."""
+    """Standard uncertainties by triad, of the twelve or the nine coefficients, SI."""
     relative: Mapping[str, Array]
-    """The same over their limits."""
+    """Standard uncertainties divided by their limits."""
 
     def worst(self, triad: str) -> float:
-        """Greatest sd over limit of a triad."""
+        """Greatest ratio of standard uncertainty to limit of a triad."""
         return float(self.relative[triad].max())
 
     @property
     def worst_of_all(self) -> float:
-        """Over all triads: what plans are compared by."""
+        """Worst ratio over all triads, by which plans are compared."""
         return max(self.worst(triad) for triad in self.relative)
 
 
 def stations(angles: Sequence[TableAngles], dwell_s: float, settle_s: float) -> tuple[Station, ...]:
-    """One station an orientation, in order."""
+    """Stations of the plan, one an orientation, in order."""
     return tuple(
         Station(i, f"{a.outer_deg:.4g} {a.middle_deg:.4g} {a.inner_deg:.4g}", a, settle_s=settle_s, record_s=dwell_s)
         for i, a in enumerate(angles)
@@ -93,12 +93,12 @@ def stations(angles: Sequence[TableAngles], dwell_s: float, settle_s: float) -> 
 
 
 def total_time_s(angles: Sequence[TableAngles], dwell_s: float, setting: Setting) -> float:
-    """From the table's zero to the end of the last dwell."""
+    """Duration from the table's zero to the end of the last dwell."""
     return float(windows(stations(angles, dwell_s, setting.settle_s), setting.axes)[-1, 1])
 
 
 def in_short_order(angles: Sequence[TableAngles], setting: Setting) -> tuple[TableAngles, ...]:
-    """Always the nearest orientation next, beginning from the table's zero."""
+    """Order orientations by the nearest next, beginning from the table's zero."""
     left, at, ordered = list(angles), TableAngles(), list[TableAngles]()
     while left:
         at = min(left, key=partial(move_time_s, at, axes=setting.axes))
@@ -129,7 +129,7 @@ def scored(angles: Sequence[TableAngles], total_s: float, setting: Setting) -> S
 
 
 def design(triad: str, count: int, dwell_s: float, setting: Setting) -> TriadDesign:
-    """A triad for a search of `count` orientations: the noise of a dwell, split in what stations share and what not."""
+    """Design of a triad for a search of `count` orientations: a dwell's noise in shared and independent parts."""
     record = stations([TableAngles()] * count, dwell_s, setting.settle_s)
     plan = triad_plan(triad, setting.unit, record, setting.axes, setting.site, setting.table)
     covariance = _known_noise(plan)
@@ -142,9 +142,9 @@ def design(triad: str, count: int, dwell_s: float, setting: Setting) -> TriadDes
 
 
 def worst_bound(triad: str, count: int, total_s: float, setting: Setting) -> float:
-    """No plan of so many stations in this time has a worst coefficient of less than this, over its limit.
+    """Lower bound of the worst coefficient over its limit, for any plan of `count` stations in this time.
 
-    Whatever the other unknowns are, a channel's scale factor has ``var(K_cc) ≥ λ_c/Σ_i v²_ic``, λ_c the least
+    For any values of the other unknowns, a channel's scale factor has ``var(K_cc) ≥ λ_c/Σ_i v²_ic``, λ_c the least
     eigenvalue of its covariance C_c of the means, and all channels together have ``Σ_c Σ_i v²_ic = n·|v|²``. Shared out
     so that no channel is worse off than another this makes the worst ``√(Σ_c λ_c/K²_cc/(n·|v|²))``; the scalar model's
     ``Σ_i u⁴_ic·v²`` only makes it larger. A bias has at least ``1/(1ᵀC_c⁻¹1)``, which no orientation changes. Moves
@@ -162,7 +162,7 @@ def worst_bound(triad: str, count: int, total_s: float, setting: Setting) -> flo
 
 
 def worst_by_triad(plan: ScoredPlan) -> dict[str, float]:
-    """Greatest sd over limit of each triad, for the search's objective."""
+    """Greatest ratio of standard uncertainty to limit of each triad, for the search's objective."""
     return {triad: plan.worst(triad) for triad in plan.relative}
 
 
@@ -179,7 +179,7 @@ def _linear_sd(plan: TriadPlan) -> Array:
 
 
 def _scalar_sd(plan: TriadPlan, setting: Setting) -> Array:
-    """Of `fit_scalar` at the very outputs that the plan would give without noise."""
+    """Standard uncertainties by `fit_scalar` at the noise-free outputs of the plan."""
     noise = _known_noise(plan)
     angles = [s.angles for s in plan.stations if s.angles is not None]
     vectors = reference_vectors(plan.triad, angles, setting.site)

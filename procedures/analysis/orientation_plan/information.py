@@ -1,10 +1,10 @@
-"""What one station tells of a triad's coefficients: information matrices that add up over stations.
+"""Information of one station about a triad's coefficients: matrices that add up over stations.
 
-Station means are taken as independent here (the slow noise that they share goes into the bias alone, whatever the
-orientations are); flaws of the table that last are unknowns beside the coefficients, with their declared spreads, and
+Station means are taken as independent (the slow noise that they share goes into the bias alone, for all
+orientations); flaws of the table that last are further unknowns, with their declared spreads, and
 the pointing of a station is a part of its noise. So the information of a plan is the sum over its stations and the
-prior, and a search may exchange one station for another by a subtraction and an addition. What a plan is worth in the
-end, `comparison` asks of the estimators themselves.
+prior, and a search may exchange one station for another by a subtraction and an addition. The final comparison of
+plans uses the estimators themselves (`comparison`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,19 +25,19 @@ FLAWS = 6
 
 @dataclass(frozen=True)
 class TriadDesign:
-    """One triad as the search sees it."""
+    """Description of one triad for the search."""
 
     triad: str
     vector_r: Array
     """Specific force or Earth's rate at zero table angles, shape (3,) [SI]."""
     noise_variance: Array
-    """Of a station mean, what differs from station to station, per channel, shape (3,) [SI²]."""
+    """Independent variance of a station mean, per channel, shape (3,) [SI²]."""
     slow_variance: Array
-    """What all stations share, shape (3,) [SI²]: it goes into the bias."""
+    """Variance shared by all stations, shape (3,) [SI²]: it goes into the bias."""
     limits: Array
-    """Of the twelve coefficients, channel by channel, shape (12,), or of the nine of a scalar calibration, (9,)."""
+    """Limits of the twelve coefficients, channel by channel, shape (12,), or of the scalar nine, (9,)."""
     matrix: Array
-    """K as far as known, shape (3, 3)."""
+    """Best known K of the triad, shape (3, 3)."""
 
 
 def unit_vectors(angles_deg: Array, vector_r: Array) -> Array:
@@ -57,7 +57,7 @@ def flaw_axes(angles_deg: Array) -> Array:
 
 
 def information(angles_deg: Array, design: TriadDesign, model: Model, table: TableUncertainty) -> Array:
-    """Of each of m stations about the coefficients in their limits: (m, 18, 18) linear, (m, 9, 9) scalar.
+    """Information of each of m stations about the coefficients in their limits: (m, 18, 18) linear, (m, 9, 9) scalar.
 
     The linear eighteen are the twelve coefficients, each divided by its limit, and the six flaws, each by its spread.
     """
@@ -83,7 +83,7 @@ def information(angles_deg: Array, design: TriadDesign, model: Model, table: Tab
 
 
 def _scalar(vectors: Array, design: TriadDesign) -> Array:
-    """From ``|v̂|`` at K = 1: ``∂/∂b = −u``, ``∂/∂s_i = u_i·v_i``, ``∂/∂t_ij = u_i·v_j`` (thesis 3.21)."""
+    """Derivatives of ``|v̂|`` at K = 1: ``∂/∂b = −u``, ``∂/∂s_i = u_i·v_i``, ``∂/∂t_ij = u_i·v_j`` (thesis 3.21)."""
     u = vectors / np.linalg.norm(vectors, axis=1)[:, None]
     of_angles = [u[:, i] * vectors[:, j] for i, j in ((0, 1), (0, 2), (1, 2))]
     rows = np.column_stack([-u, u * vectors, *of_angles]) * design.limits
@@ -92,7 +92,7 @@ def _scalar(vectors: Array, design: TriadDesign) -> Array:
 
 
 def prior(model: Model) -> Array:
-    """What is known before the first station: the flaws, to one spread each. The rest is next to nothing."""
+    """Prior information before the first station: the flaws, to one spread each. The rest is next to nothing."""
     size, known = (9, 0) if model == "scalar" else (12 + FLAWS, FLAWS)
     # A coefficient is known beforehand to 30 000 times its limit: keeps unlucky beginnings of a search finite.
     return np.diag([1e-9] * (size - known) + [1.0] * known)
@@ -108,7 +108,7 @@ def relative_sd(total: Array, design: TriadDesign, model: Model) -> Array:
 
 @dataclass(frozen=True)
 class Objective:
-    """What the search makes small: the worst coefficient relative to its limit, over all triads.
+    """Objective of the search: the worst coefficient relative to its limit, over all triads.
 
     Smooth: ``(Σ r^p)^(1/p)`` over r = sd/limit, divided by `reference`. A triad far inside its limits must not be given
     up for another one: its own worst, over what it was in the reference plan, counts with `care`.
@@ -122,7 +122,7 @@ class Objective:
     care: float = 0.7
 
     def cost(self, totals: Sequence[Array]) -> Array:
-        """Of total informations, one (…, P, P) a triad; shape (…)."""
+        """Cost of total informations, one (…, P, P) a triad; shape (…)."""
         worst = max(self.reference.values())
         parts: list[Array] = []
         for total, design in zip(totals, self.designs, strict=True):

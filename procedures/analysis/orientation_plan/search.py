@@ -20,12 +20,12 @@ from procedures.core.arrays import Array
 Indices = NDArray[np.int64]
 
 _STEP_DEG = 1e-3
-"""Of the central differences."""
+"""Step of the central differences [deg]."""
 
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """How far to look. The defaults take a few seconds a plan."""
+    """Effort of the search. The defaults take a few seconds a plan."""
 
     minimum_deg: tuple[float, float, float] = (-180.0, -180.0, -180.0)
     maximum_deg: tuple[float, float, float] = (180.0, 180.0, 180.0)

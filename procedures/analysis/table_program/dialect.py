@@ -24,11 +24,11 @@ from procedures.core.table_angles import TableAngles
 MODE, DEMAND, DELAY = ":mode:position", ":demand:position", "delay"
 AXES = {"1": "inner", "2": "middle", "3": "outer"}
 DEGREES_MAX = 3600.0
-"""Ours: ten turns. What an axis can reach is for the bench to say."""
+"""Greatest angle of a program, ten turns [deg]; the bench checks the range of its axes. This program's own limit."""
 DELAY_MAX_S = 86_400.0
-"""Ours: a day."""
+"""Greatest delay of a program, one day [s]. This program's own limit."""
 DWELLS_MAX = 500
-"""Ours."""
+"""Greatest number of dwells in a program. This program's own limit."""
 SHOWN = 80
 """Characters of a line that a refusal repeats."""
 
@@ -47,7 +47,7 @@ class Dwell:
 
 @dataclass
 class _Reader:
-    """What the lines so far have demanded."""
+    """Demands accumulated from the lines read so far."""
 
     at: dict[str, float] = field(default_factory=dict[str, float])
     """Axis -> degrees, of axes that have a position."""
@@ -124,7 +124,7 @@ def read_program(text: str) -> tuple[Dwell, ...]:
 
 
 def refusal(line: int, code: str, expected: str) -> BadParameter:
-    """The answer to a line that cannot be taken: what stands there, its number, what was expected."""
+    """Refusal of a line that cannot be read: its text, its number, and the expected form."""
     shown = code if len(code) <= SHOWN else code[:SHOWN] + "…"
     return BadParameter("program", shown, f"line {line}: expected {expected}")
 

@@ -1,4 +1,4 @@
-"""What a program's recordings hold: dwell by dwell, the mean of every channel with its standard uncertainty."""
+"""Summary of a program's recordings: dwell by dwell, the mean of every channel with its standard uncertainty."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,14 +23,14 @@ class ChannelMean:
     unit: str
     mean: float
     standard_uncertainty: float | None
-    """None where neither noise nor scatter is known: fewer samples than batches."""
+    """Standard uncertainty; None where neither noise nor scatter is known: fewer samples than batches."""
     from_noise: bool
-    """Whether it comes from the unit's noise; else from the scatter of batch means, blind to noise slower than them."""
+    """True if it comes from the unit's noise; else from the scatter of batch means, blind to noise slower than them."""
 
 
 @dataclass(frozen=True)
 class DwellRecord:
-    """One dwell: where, how long, whether its recording is whole, and what it says."""
+    """Results of one dwell: position, duration, completeness of its recording, and the channel means."""
 
     station: int
     label: str
@@ -49,7 +49,7 @@ def mean_sd(noise: NoiseCoefficients, start_s: float, stop_s: float) -> float:
 
 
 def dwell_records(recordings: Sequence[Recording], stations: Sequence[Station], unit: Unit) -> tuple[DwellRecord, ...]:
-    """One record a station. Raises `UnfitRecording` where the recordings are not these stations', in order."""
+    """Records of the dwells, one a station. Raises `UnfitRecording` unless recordings match the stations in order."""
     told = [r.info.station for r in recordings]
     for i, station in enumerate(stations):
         if i >= len(told) or told[i] is None or told[i] != station:

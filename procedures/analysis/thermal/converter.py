@@ -1,4 +1,4 @@
-"""Stage one: the signal converter alone, currents of a precision source on its inputs over temperature (T 3.8–3.17; C).
+"""Stage one, the signal converter alone: currents of a precision source on its inputs over temperature (T 3.8–3.17; C).
 
 ``N± `` are the mean codes at ``±I``: zero ``ΔN = (N⁺ + N⁻)/2`` (3.10), centred code ``N_c = (N⁺ − N⁻)/2`` (3.11), scale
 ``K = N_c/I`` (3.12), zero at the input ``ΔI = ΔN/K`` (3.13).
@@ -14,18 +14,18 @@ from procedures.core.errors import BadParameter, UnfitRecording
 
 @dataclass(frozen=True)
 class ZeroAndScale:
-    """T 3.10–3.13 at each soak, (n,) each."""
+    """Zero and scale of T 3.10–3.13 at each soak, (n,) each."""
 
     zero_code: Array
-    """ΔN."""
+    """Zero code ΔN, (n,)."""
     scale_code_per_ma: Array
-    """K."""
+    """Scale K of code over current, (n,)."""
     zero_ma: Array
-    """ΔI."""
+    """Zero at the input ΔI, (n,)."""
 
 
 def zero_and_scale(current_ma: float, plus_code: Array, minus_code: Array) -> ZeroAndScale:
-    """From mean codes (n,) at equal and opposite currents [mA]. Raises `BadParameter`, `UnfitRecording`."""
+    """Compute zero and scale from mean codes (n,) at currents ±I [mA]. Raises `BadParameter`, `UnfitRecording`."""
     if not 0.0 < current_ma < np.inf:
         raise BadParameter("current_ma", current_ma, "finite and above 0")
     if len(plus_code) != len(minus_code) or not np.all(np.isfinite([*plus_code, *minus_code])):

@@ -1,4 +1,4 @@
-"""From recordings of a converter alone to its models: currents of both signs at each soak (T 3.8–3.17; C).
+"""Models of a converter alone from its recordings: currents of both signs at each soak (T 3.8–3.17; C).
 
 The two stations of a soak are minutes apart, so the sensor does not read quite the same at both. Codes are brought to
 the mean of the two readings with the model itself, which is fitted again; the drift within a soak being small, it has
@@ -25,7 +25,7 @@ SENSOR = "temperature_converter"
 CHANNELS = tuple(f"converter_{axis}" for axis in AXES)
 PASSES = 3
 FOLLOWS = 0.5
-"""From one soak to the next the sensor must move by at least so much of what the chamber does."""
+"""Least change of the sensor from one soak to the next, relative to the chamber's."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class ConverterSoaks:
     """Means of n soaks, in the order that they were measured."""
 
     target_c: Array
-    """Chamber's, (n,)."""
+    """Target temperatures of the chamber, (n,)."""
     sensor_c: Array
     """Converter's own sensor at +I and at −I, (n, 2)."""
     codes: Array
@@ -42,16 +42,16 @@ class ConverterSoaks:
 
 @dataclass(frozen=True)
 class Fitted:
-    """One normalised function, and how its order was chosen."""
+    """Normalised function of a channel, and the criterion that chose its order."""
 
     value: Normalised
     bic: tuple[float, ...]
-    """Of orders 1, 2, …; the chosen one is the least, unless the order was given."""
+    """Bayesian criterion of orders 1, 2, …; the chosen order has the least, unless the order was given."""
 
 
 @dataclass(frozen=True)
 class FittedChannel:
-    """One channel's model with what it was fitted to, (n,) each."""
+    """Model of one channel with the data that it was fitted to, (n,) each."""
 
     scale: Fitted
     zero: Fitted
@@ -169,6 +169,6 @@ def _fitted(sensor_c: Array, values: Array, reference_c: float, order: int | Non
 
 
 def _criterion(residual_sd: float, count: int, order: int) -> float:
-    """``n·ln(rss/n) + k·ln n``."""
+    """Bayesian information criterion ``n·ln(rss/n) + k·ln n``."""
     rss = residual_sd**2 * (count - order - 1)
     return count * float(np.log(max(rss, 1e-300) / count)) + (order + 1) * float(np.log(count))

@@ -1,4 +1,4 @@
-"""Least squares where neighbouring residuals are alike: whitened by the noise's own spectrum, run by run.
+"""Least squares with correlated residuals: whitened by the noise's own spectrum, run by run.
 
 Residuals of thermal fits are not independent: an accelerometer's flicker lasts for hours. Cosines of a run are all
 but uncorrelated, with variances that the noise model of IEEE Std 952 gives (`coloured_noise`): Q, N, B and K are the
@@ -19,9 +19,9 @@ from procedures.core.errors import UnfitRecording
 from procedures.core.noise import NoiseCoefficients
 
 SLOW = 10
-"""Cosines up to this number are where temperature lives in a cycle: there the noise is told as effective samples."""
+"""Cosines up to this number carry a cycle's temperature: there the noise is expressed as effective samples."""
 EXACT = 1e-24
-"""Of the residuals' power relative to the values': below it a fit is exact to rounding and has no noise to tell."""
+"""Power of the residuals relative to the values' below which a fit is exact to rounding and shows no noise."""
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,10 @@ class Spectrum:
     """Noise of several runs with the variances of their cosines."""
 
     noise: NoiseCoefficients
-    """Of the weighted residuals, where they were weighted."""
+    """Noise of the residuals, weighted where the fit weighted them."""
     variances: tuple[Array, ...]
-    """Of the cosines k = 0 … n − 1 of each run, (n,). The mean's is unknown and takes that of k = 1: every run has an
-    intercept of its own, so no slope feels it."""
+    """Variances of the cosines k = 0 … n − 1 of each run, (n,). The mean's is unknown and takes that of k = 1: each run
+    has an intercept of its own, so no slope is affected."""
 
     @property
     def inflation(self) -> float:
@@ -41,7 +41,7 @@ class Spectrum:
 
 
 def spectrum(residuals: Sequence[Array], cell_s: float) -> Spectrum:
-    """One noise for the residuals (n_r,) of several runs of cells of `cell_s` [s]. Raises `UnfitRecording`.
+    """Fit one noise to the residuals (n_r,) of several runs of cells of `cell_s` [s]. Raises `UnfitRecording`.
 
     Runs of different lengths are cut to the shortest for the fit; all of each is whitened.
     """
@@ -69,21 +69,21 @@ class LinearFit:
     """Least squares of several runs with one noise."""
 
     coefficients: Array
-    """(k,)"""
+    """Fitted coefficients, shape (k,)."""
     covariance: Array
-    """(k, k)"""
+    """Covariance of the coefficients, shape (k, k)."""
     spectrum: Spectrum | None
-    """Of the weighted residuals; None where the fit is exact to rounding."""
+    """Spectrum of the weighted residuals; None where the fit is exact to rounding."""
     residuals: tuple[Array, ...]
-    """Each run's, not whitened."""
+    """Residuals of each run, not whitened."""
     effective_samples: float
     """Cells over the spectrum's inflation."""
     whitened: bool
-    """Whether the answer is that of whitened cells, or of the cells as they are."""
+    """True if the answer is that of whitened cells; False if of the cells as they are."""
 
     @property
     def degrees_of_freedom(self) -> float:
-        """Of the intervals: effective samples less coefficients, at least one."""
+        """Degrees of freedom of the intervals: effective samples less coefficients, at least one."""
         return max(1.0, self.effective_samples - len(self.coefficients))
 
 

@@ -23,22 +23,22 @@ PASSES = 5
 
 @dataclass(frozen=True)
 class Correlation:
-    """How a signal goes with a temperature."""
+    """Correlation of a signal with a temperature."""
 
     r: float
     """Pearson's coefficient of the cells."""
     effective_samples: float
     slope: float
-    """Generalised least squares: signal a °C."""
+    """Slope of the signal by temperature [signal/°C], by generalised least squares."""
     slope_sd: float
     p_value: float
-    """How often noise alone would give as steep a slope, either way."""
+    """P-value: probability that noise alone gives as steep a slope, of either sign."""
 
 
 def correlation(
     signal: Array, temperature_c: Array, cell_s: float, noise: NoiseCoefficients | None = None
 ) -> Correlation:
-    """Of cell means (n,) of a signal with those of a temperature (n,) [°C], cells of `cell_s` [s].
+    """Correlate cell means (n,) of a signal with those of a temperature (n,) [°C], cells of `cell_s` [s].
 
     `noise` [rate] of the signal where it is known, as from a static run: then the slope ``ĉ = Σ X·Y/s / Σ X²/s`` is
     normal with variance ``1/Σ X²/s``. Else the noise is the most likely one of what the slope leaves, and the test is
@@ -82,7 +82,7 @@ def _slope(x: Array, y: Array, variances: Array) -> float:
 
 
 def _likely(x: Array, y: Array, shapes: Array) -> tuple[float, Array, float]:
-    """Most likely slope with the noise beside it, and twice the log of the likelihood that it gains."""
+    """Most likely slope with its most likely noise, and twice the gain in log-likelihood over no slope."""
     alone = fit_noise(y, shapes)
     slope = float(x @ y) / float(x @ x)
     beside = fit_noise(y - slope * x, shapes)

@@ -1,7 +1,7 @@
 """The coefficients of T 4.1 from runs with each axis up in turn: one fit an axis, with their whole covariance.
 
 At rest the corrected output is the known force f, so ``V = f/(K0 + A) − B0 − B`` with A and B the polynomials of T 4.1.
-A run with the axis horizontal (f ≈ 0) gives B, the vertical one (f = g) gives A (thesis 4.2.1). Here all runs are
+A run with the axis horizontal (f ≈ 0) gives B, the vertical one (f = g) gives A (thesis 4.2.1). All runs are
 solved at once, because B acts in the vertical one too and a horizontal axis is never quite horizontal. Every launch has
 a bias of its own: an intercept for each horizontal run, and in the vertical one what it adds to K0.
 """
@@ -30,7 +30,7 @@ from procedures.core.thermal_correction import (
 )
 
 PASSES = 3
-"""Gauss–Newton: the model is linear but for a scale that moves by parts in a hundred."""
+"""Gauss–Newton iterations: the model is linear but for a scale that moves by parts in a hundred."""
 RANK_TOLERANCE = 1e-7
 
 
@@ -51,21 +51,21 @@ class Order:
 
 @dataclass(frozen=True)
 class AxisFit:
-    """One accelerometer's fit."""
+    """Fit of one accelerometer's correction."""
 
     axis: int
     correction: AxisCorrection
     residual_sd_m_s2: tuple[float, float]
-    """Of the cells, in the static and in the dynamic regime; not a number where there is no such cell."""
+    """Residual standard deviations of the cells, static and dynamic; NaN where there is no such cell."""
     effective_samples: float
     degrees_of_freedom: float
     noise: NoiseCoefficients
-    """Of the residuals [m/s²-based], static cells weighing one; all zero where the fit is exact to rounding."""
+    """Noise of the residuals [m/s²-based], static cells weighing one; all zero where the fit is exact to rounding."""
     condition: float
-    """Of the column-scaled design."""
+    """Condition number of the column-scaled design."""
     order: Order
     residuals_m_s2: tuple[Array, ...]
-    """Of each run, (n,)."""
+    """Residuals of each run, (n,)."""
 
 
 def fit_correction(
@@ -113,7 +113,7 @@ def _with_lags(
 
 
 def fit_axis(runs: Sequence[ThermalRun], axis: int, reference_c: tuple[float, float], form: Form) -> AxisFit:
-    """T 4.1 of one accelerometer; see `fit_correction`.
+    """Fit T 4.1 to one accelerometer; see `fit_correction`.
 
     The cells of each regime are weighted by the inverse spread of its own residuals: sensors that lag make the dynamic
     ones worse. The form ``both`` is fitted by generalised least squares with the residuals' noise (`correlated`); the
@@ -177,7 +177,7 @@ class _Problem:
         ]
 
     def first(self) -> Array:
-        """Where the iteration begins: biases from the horizontal runs, scales from the vertical ones, no slopes."""
+        """Start of the iteration: biases from the horizontal runs, scales from the vertical ones, no slopes."""
         bias = [-float(np.mean(self.runs[i].output_m_s2[:, self.axis])) for i in self._horizontal]
         scale = [
             self.runs[i].force_m_s2[self.axis]
@@ -259,7 +259,7 @@ def _reported(runs: Sequence[ThermalRun], residuals: Sequence[Array]) -> tuple[f
 
 
 def _spread(runs: Sequence[ThermalRun], residuals: Sequence[Array]) -> tuple[float, float]:
-    """Relative spreads of the two regimes, never zero; alike where one has too few cells to say."""
+    """Relative spreads of the two regimes, never zero; equal where one has too few cells for an estimate."""
     parts = [_regime_values(runs, residuals, dynamic) for dynamic in (False, True)]
     if min(len(p) for p in parts) < 20 or any(not np.any(p) for p in parts):
         return 1.0, 1.0
@@ -268,7 +268,7 @@ def _spread(runs: Sequence[ThermalRun], residuals: Sequence[Array]) -> tuple[flo
 
 
 def _order(problem: _Problem, parameters: Array, fit: LinearFit, weights: Sequence[Array]) -> Order:
-    """Orders 1, 2 and 3 on cells weighted and whitened alike, linear about the answer."""
+    """Compare orders 1, 2 and 3 on cells weighted and whitened alike, linear about the answer."""
     designs, values = problem.linear(parameters, 3)
     variances = (
         fit.spectrum.variances if fit.spectrum and fit.whitened else [np.ones(len(r.dynamic)) for r in problem.runs]

@@ -1,8 +1,8 @@
-"""What a correction is worth: 3σ at each soak before and after, and |ĝ| over the whole cycle (thesis table 4.5).
+"""Performance of a correction: 3σ at each soak before and after, and |ĝ| over the whole cycle (thesis table 4.5).
 
-T 4.5 does not say about what its 3σ is taken. Here it is the whole departure from what the same launch showed in its
+T 4.5 leaves open the reference of its 3σ. It is taken as the whole departure from the same launch's output in its
 reference soak, ``3·√(mean((v − v_ref)²))`` over the steady part of the soak: that is what an uncorrected unit is wrong
-by, and it is of the printed size. The spread about the soak's own mean stands beside it.
+by, and it is of the printed size. The spread about the soak's own mean is reported as well.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from procedures.core.errors import BadParameter, UnfitRecording
 
 
 class Corrects(Protocol):
-    """What turns outputs and temperatures into specific forces: `ThermalCorrection`, or what it is compared with."""
+    """A map of outputs and temperatures to specific forces: `ThermalCorrection`, or an alternative to compare with."""
 
     @property
     def scales(self) -> Array:
@@ -41,7 +41,7 @@ class Soak:
 
 
 def soaks(run: ThermalRun, least_s: float = 900.0) -> tuple[Soak, ...]:
-    """Stretches of the static regime that last at least so long [s]. Raises `BadParameter`."""
+    """Stretches of the static regime that last at least `least_s` [s]. Raises `BadParameter`."""
     if not 0.0 < least_s < np.inf:
         raise BadParameter("least_s", least_s, "finite and above 0")
     edges = np.flatnonzero(np.diff(np.concatenate([[1], run.dynamic.astype(np.int8), [1]])))
@@ -66,15 +66,15 @@ def nearest(found: Sequence[Soak], case_c: float, within_c: float = 8.0) -> Soak
 
 @dataclass(frozen=True)
 class ThreeSigma:
-    """One soak of one run, x, y, z, each (3,) [m/s²]."""
+    """Errors of one soak of one run, x, y, z, each (3,) [m/s²]."""
 
     soak: Soak
     before: Array
     """Departure from the reference soak, uncorrected outputs over K0."""
     after: Array
-    """The same of the corrected specific forces."""
+    """Departure of the corrected specific forces from the reference soak."""
     spread_before: Array
-    """About the soak's own mean."""
+    """Spread about the soak's own mean."""
     spread_after: Array
 
 
@@ -84,7 +84,7 @@ def corrected(run: ThermalRun, correction: Corrects) -> Array:
 
 
 def three_sigma(run: ThermalRun, correction: Corrects, reference: Soak, at: Soak) -> ThreeSigma:
-    """3σ before and after at a soak, about what the run itself shows in its reference soak."""
+    """Errors 3σ before and after at a soak, relative to the run's own reference soak."""
     before = run.output_m_s2 * correction.scales
     after = corrected(run, correction)
     own, zero = slice(at.start, at.stop), slice(reference.start, reference.stop)
@@ -98,9 +98,9 @@ class Magnitude:
     """``|ĝ| = √(ĝ_x² + ĝ_y² + ĝ_z²)`` over a run, less gravity [m/s²] (T 3.2.3, the end)."""
 
     errors_m_s2: Array
-    """(n,)"""
+    """Errors of the magnitude, shape (n,)."""
     rms_static_m_s2: float
-    """About the run's mean; not a number where there is no such cell."""
+    """Rms about the run's mean; NaN where there is no such cell."""
     rms_dynamic_m_s2: float
 
 

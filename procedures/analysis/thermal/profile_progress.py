@@ -1,6 +1,6 @@
-"""How far a unit has come along a temperature profile, reading by reading: the same steps live and on a recording.
+"""Progress of a unit along a temperature profile, reading by reading: the same steps live and on a recording.
 
-The bench feeds it while a run is recorded and acts on what it says; the analysis feeds it the recorded readings again
+The bench feeds it while a run is recorded and acts on its decisions; the analysis feeds it the recorded readings again
 and gets the very same legs and soaks, so that the evidence for each soak is in the raw data and nowhere else.
 """
 
@@ -20,11 +20,11 @@ CASE, CONVERTER = "temperature_case", "temperature_converter"
 SENSORS = (CASE, CONVERTER, "temperature_gyro_x", "temperature_gyro_y", "temperature_gyro_z")
 """Channels of the unit's own temperature sensors."""
 AIR, SET_POINT = "chamber_air", "chamber_set_point"
-"""Channels of what the chamber said of itself, written beside the unit's."""
+"""Channels of the chamber's own readings, recorded with the unit's."""
 DISCONNECTED_CODE = -32768
-"""The least of 16 bits: what the unit sends for a sensor that is not there."""
+"""Code of a disconnected sensor, the least of 16 bits."""
 STUCK_C = 5.0
-"""A sensor whose code stays the same while all others but one move by more than this is stuck."""
+"""Change of all other sensors but one beyond which a sensor with a constant code is stuck [°C]."""
 
 
 class CheckedSamples:
@@ -43,7 +43,7 @@ class CheckedSamples:
 
 
 class Standing(StrEnum):
-    """What a reading says of the present leg."""
+    """State of the present leg after a reading."""
 
     UNDER_WAY = "under way"
     DONE = "done"
@@ -52,15 +52,15 @@ class Standing(StrEnum):
 
 @dataclass(frozen=True)
 class LegEvidence:
-    """What was recorded of one leg; times since the recording's beginning [s]."""
+    """Recorded evidence of one leg; times since the recording's beginning [s]."""
 
     target_c: float
     ramp_c_min: float
     began_s: float
     reached_s: float | None
-    """When the chamber's air was first near the target."""
+    """Time when the chamber's air was first near the target."""
     soaked_s: float | None
-    """When the criterion began to hold for good."""
+    """Time when the criterion began to hold for good."""
     ended_s: float
     case_c: float
     converter_c: float
@@ -68,7 +68,7 @@ class LegEvidence:
     case_slope_c_min: float
     converter_slope_c_min: float
     air_c: float
-    """The last reading."""
+    """Last reading of the chamber's air."""
 
 
 _SAME_C = 1e-9
@@ -76,7 +76,7 @@ _SAME_C = 1e-9
 
 
 class ReadingSteps:
-    """By which steps a sensor's readings change, and what drift may hide between two of them.
+    """Resolution of a sensor's readings, and the drift that may hide between two of them.
 
     The resolution is the smallest change seen. A drift of r shows as a step every q/r at the latest, so a reading that
     has stood for a time t excludes no drift under q/t. Readings that went up and down meanwhile are dithered by noise,
@@ -91,7 +91,7 @@ class ReadingSteps:
         self._rose_s = self._fell_s = -np.inf
 
     def take(self, t_s: float, reading_c: float) -> None:
-        """One more reading."""
+        """Add one reading to the window."""
         if self._last is None:
             self._last, self._changed_s = reading_c, t_s
         change = reading_c - self._last
@@ -117,7 +117,7 @@ class ProfileProgress:
     def __init__(self, profile: TemperatureProfile) -> None:
         self.profile = profile
         self.evidence: list[LegEvidence] = []
-        """Of every leg that is done."""
+        """Evidence of every completed leg."""
         self._began_s = 0.0
         self._reached_s: float | None = None
         self._soaked_s: float | None = None
@@ -135,14 +135,14 @@ class ProfileProgress:
 
     @property
     def slopes_c_min(self) -> tuple[float, float]:
-        """Of case and converter over the window [°C/min]; not numbers until it has filled."""
+        """Slopes of case and converter over the window [°C/min]; NaN until it has filled."""
         if len(self._window) < len(self._slope_of):
             return float("nan"), float("nan")
         case, converter = (self._slope_of @ np.array(self._window)).tolist()
         return case, converter
 
     def step(self, t_s: float, case_c: float, converter_c: float, air_c: float) -> Standing:
-        """One more reading, `CHECK_S` after the one before, `t_s` since the recording began [s].
+        """Take one more reading, `CHECK_S` after the one before, `t_s` since the recording began [s].
 
         After `DONE` the next leg has begun, if there is one. Raises `BadParameter` where no leg is left.
         """
@@ -171,7 +171,7 @@ class ProfileProgress:
         return Standing.LATE if since_s >= leg.longest_s else Standing.UNDER_WAY
 
     def _hidden(self, t_s: float) -> str:
-        """A sentence where a drift beyond the limit may hide in the steps of a sensor's readings, else empty."""
+        """Warning where a drift beyond the limit may hide in the steps of a sensor's readings, else empty."""
         limit, window_s = self.profile.criterion.slope_c_min, self.profile.criterion.window_s
         for name, seen in zip(("case", "converter"), self._steps, strict=True):
             if seen.hidden_c_min(t_s, window_s) > limit:
@@ -182,7 +182,7 @@ class ProfileProgress:
         return ""
 
     def why_late(self, air_c: float) -> str:
-        """A sentence on what the present leg lacks."""
+        """Sentence on the criteria that the present leg does not meet."""
         leg, criterion = self.leg, self.profile.criterion
         if leg is None:
             return "nothing is late"
@@ -226,10 +226,10 @@ class SensorWatch:
         self._low, self._high = low - profile.unit_margin_c, high + profile.unit_margin_c
         self._codes: list[int] = []
         self._then: list[tuple[float, ...]] = []
-        """Of each sensor: what all of them read when its code last changed."""
+        """Readings of all sensors when each sensor's code last changed."""
 
     def step(self, codes: Sequence[int], readings_c: Sequence[float]) -> str | None:
-        """A sentence where a sensor is disconnected, stuck, or reads what the unit must not be; else None.
+        """Check one reading; return a sentence if a sensor is disconnected, stuck or out of the unit's range.
 
         Codes and readings [°C] in the order of `SENSORS`.
         """

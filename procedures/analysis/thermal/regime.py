@@ -17,14 +17,14 @@ from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 
 POLES = 3
-"""Of the derivative filter, all at exp(−Δ/memory)."""
+"""Number of poles of the derivative filter, all at exp(−Δ/memory)."""
 
 
 @dataclass(frozen=True)
 class RegimeSettings:
-    """How the indicator filters and decides.
+    """Filter and decision settings of the regime indicator.
 
-    The defaults (ours) suit a case with a time constant of ten to twenty minutes and a chamber's fluctuation of
+    The defaults suit a case with a time constant of ten to twenty minutes and a chamber's fluctuation of
     ±0.5 °C: ramps of 0.25 °C/min and more are seen, soaks are quiet (`tests/simulation/test_chamber_cycle.py`).
     """
 
@@ -33,11 +33,11 @@ class RegimeSettings:
     enter_c_s2: float = 4.0e-6
     """ΔT of T 3.18: |second derivative| above it is dynamic [°C/s²]."""
     release_c_s2: float = 2.5e-6
-    """Hysteresis: |second derivative| must fall below it [°C/s²] …"""
+    """Hysteresis limit: |second derivative| must fall below it [°C/s²] …"""
     release_rate_c_s: float = 2.5e-3
     """… and |rate| below this [°C/s] …"""
     hold_s: float = 300.0
-    """… without a break for so long, before the regime is static again."""
+    """… without a break for this time [s], before the regime is static again."""
 
     def __post_init__(self) -> None:
         for name in ("memory_s", "enter_c_s2", "release_c_s2"):
@@ -70,7 +70,7 @@ class RegimeSettings:
 
 @dataclass(frozen=True)
 class RegimeSample:
-    """What the indicator says after one sample of the temperature."""
+    """Output of the indicator after one sample of the temperature."""
 
     dynamic: bool
     rate_c_s: float
@@ -80,7 +80,7 @@ class RegimeSample:
 
 
 class RegimeIndicator:
-    """T 3.18 in real time: five numbers of state, whatever came before.
+    """Regime indicator of T 3.18 in real time, with a fixed state of five numbers.
 
     The derivatives are those of the discounted least-squares parabola (fading-memory filter of second degree;
     N. Morrison, Introduction to Sequential Smoothing and Prediction, 1969, ch. 13): with θ = exp(−Δ/memory), the state
@@ -90,7 +90,7 @@ class RegimeIndicator:
     """
 
     def __init__(self, sample_s: float, settings: RegimeSettings | None = None) -> None:
-        """`sample_s`: interval of the samples, at most a third of the filter's memory. Raises `BadParameter`."""
+        """Start an indicator for samples of `sample_s`, at most a third of the memory. Raises `BadParameter`."""
         self.settings = settings or RegimeSettings()
         if not 0.0 < sample_s <= self.settings.memory_s / 3.0:
             raise BadParameter(

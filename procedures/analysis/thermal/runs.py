@@ -1,4 +1,4 @@
-"""One run of the thermal cycle as the fits see it: cell means of outputs and temperatures, and the regime of each.
+"""Input of the fits from one run of the thermal cycle: cell means of outputs and temperatures, and regimes.
 
 The unit's temperature sensors lag behind what they stand on; where their time constants are known from the data sheet
 the lag is taken out to first order, ``T = T_s + τ·dT_s/dt``.
@@ -19,7 +19,7 @@ AXES = ("x", "y", "z")
 
 
 def without_lag(reading_c: Array, sample_s: float, lag_s: float, window_s: float = 60.0) -> Array:
-    """What the sensor stands on, (n,) [°C], from its readings (n,): ``T_s + τ·dT_s/dt``.
+    """Temperature at a lagging sensor, (n,) [°C], from its readings (n,): ``T_s + τ·dT_s/dt``.
 
     The slope is that of a parabola fitted to the window about each sample (Savitzky and Golay); what is left is
     ``τ²·T''/2``. Also what stage one should be given: a converter that drifts 1e-4 m/s²/°C, read 5 s late on a ramp of
@@ -40,16 +40,16 @@ class ThermalRun:
     """Cell means of one run, one launch with one axis up. All of n cells of `cell_s`."""
 
     up: int
-    """Which axis stands upwards, 0 … 2."""
+    """Index of the axis that stands upwards, 0 … 2."""
     cell_s: float
     output_m_s2: Array
     """Nominal outputs of the accelerometers, (n, 3), the converter's own model already taken out (stage one)."""
     case_c: Array
-    """Case sensor, (n,); or (n, 3), a sensor for each axis, such as the gyros' (T 4.1)."""
+    """Case temperature, (n,); or (n, 3), a sensor for each axis, such as the gyros' (T 4.1)."""
     converter_c: Array
     """Sensor on the converter's board, (n,)."""
     dynamic: NDArray[np.bool_]
-    """Whether any sample of the cell was dynamic, (n,)."""
+    """True where any sample of the cell was dynamic, (n,)."""
     force_m_s2: tuple[float, float, float]
     """Specific force along the true input axis of each accelerometer: gravity and zero for an ideal mounting."""
 
@@ -70,7 +70,7 @@ def thermal_run(
     force_m_s2: tuple[float, float, float] | None = None,
     trace: RegimeTrace | None = None,
 ) -> ThermalRun:
-    """Cells of `cell_s` out of series of one interval `sample_s` [s]; the last samples, less than a cell, are left out.
+    """Average series of one interval `sample_s` [s] to cells of `cell_s`; an incomplete last cell is left out.
 
     Parameters
     ----------

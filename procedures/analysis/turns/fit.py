@@ -1,7 +1,7 @@
 """Scale factor of a gyro triad from whole turns of the table (IEEE Std 647, scale factor by whole revolutions).
 
 A recording begins and ends with the table at rest at the same angle and holds n whole turns of its outer axis, so each
-channel's integrated output is, exactly and whatever the ramps were,
+channel's integrated output is, exactly and for any shape of the ramps,
 
     ``y = b·T + K·(2πn·e + E) + ½·s·∫|a| dt + q/a₀·∫a² dt + c/a₀²·∫a³ dt``
 
@@ -41,35 +41,35 @@ TERMS: tuple[Term, ...] = ("asymmetry", "quadratic", "cubic")
 RAMP_SQUARE, RAMP_CUBE = 13.0 / 35.0, 43.0 / 140.0
 """Means of the ramp's ``(3s² − 2s³)²`` and of its cube."""
 UNKNOWN_NOISE_SD = units.ARCSEC
-"""Stands in [rad] for a noise that is not known until the residuals scale it."""
+"""Noise assumed in [rad] while it is not known, until the residuals scale it."""
 
 _CROSS = np.eye(9).reshape(9, 3, 3)[[1, 2, 3, 5, 6, 7]]
-"""A matrix of one for each cross-coupling, (6, 3, 3)."""
+"""Matrices with a single one in place of each cross-coupling, (6, 3, 3)."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 
 
 @dataclass(frozen=True)
 class Turning:
-    """What the table does to the unit during n stations, in the unit's axes."""
+    """Motion of the unit with the table during n stations, in the unit's axes."""
 
     seconds: Array
     """Length T of each recording [s], (n,)."""
     axis_b: Array
-    """The turning axis e, (n, 3)."""
+    """Unit vector of the turning axis e, (n, 3)."""
     angle_rad: Array
     """The whole turns, signed, (n,)."""
     rate_rad_s: Array
     """The constant rate, signed, (n,)."""
     earth_rad: Array
-    """E, (n, 3)."""
+    """Earth's turn E during each recording, in the unit's axes [rad], (n, 3)."""
     moments: Array
     """``∫|ω| dt``, ``∫ω² dt``, ``∫ω³ dt`` of the table's rate [rad, rad²/s, rad³/s²], (n, 3)."""
     angles: tuple[TableAngles, ...]
-    """Where each recording begins and ends."""
+    """Table angles at the beginning and the end of each recording."""
 
     @property
     def turned_b(self) -> Array:
-        """``2πn·e``, (n, 3) [rad]."""
+        """Turn vector ``2πn·e`` of each station, (n, 3) [rad]."""
         return self.angle_rad[:, None] * self.axis_b
 
     @property
@@ -129,10 +129,10 @@ def _cosine_integral(turn: Turn, seconds: float) -> float:
 
 
 def turn_flaws(motion: Turning, uncertainty: TableUncertainty) -> TableErrors:
-    """What the table's flaws do to the turned angle: the axis' direction in the unit, and where the turns really end.
+    """Effect of the table's flaws on the turned angle: the axis' direction in the unit, and the angles at the ends.
 
     Columns as `table_errors` has them. Level and azimuth move the axis and the unit together and do not enter. The
-    outer axis' pointing counts twice, at the beginning and at the end of the turns, each anew: √2 along the axis.
+    outer axis' pointing counts twice, at the beginning and at the end of the turns, independently: √2 along the axis.
     """
     u = TableUncertainty(uncertainty.orthogonality_sd_arcsec, uncertainty.pointing_sd_arcsec)
     flaws = table_errors(motion.angles, motion.turned_b, u, of_gravity=False)
@@ -164,19 +164,19 @@ def design(motion: Turning, slopes: Array, terms: Sequence[Term], reference_rad_
 
 @dataclass(frozen=True)
 class TurnEstimator:
-    """Generalised least squares of all three channels: what it multiplies the integrated outputs with, and its spread.
+    """Generalised least squares of all three channels: the gain on the integrated outputs and the covariance.
 
     Parameters are ordered channel by channel, k of each; outputs channel by channel, n of each.
     """
 
     design: Array
-    """(3, n, k)."""
+    """Design matrix of each channel, (3, n, k)."""
     gain: Array
-    """(3k, 3n)."""
+    """Gain from outputs to parameters, (3k, 3n)."""
     weights: Array
     """W with ``WᵀW`` the inverse of the outputs' covariance, (3n, 3n)."""
     noise_covariance: Array
-    """Of the parameters, (3k, 3k)."""
+    """Noise covariance of the parameters, (3k, 3k)."""
     table_per_sd: Array
     """Change of the parameters per standard deviation of each flaw, (3k, P)."""
     source: tuple[str, ...]
@@ -208,7 +208,7 @@ def turn_estimator(
     weigh alike, and only the flaws that stay through the job are added. `matrix` K carries the flaws into the outputs;
     its cross-couplings may each be off by `cross_sd`, as before a unit is calibrated: an axis that lies wrong by ε puts
     ``K_ij·ε`` into a scale factor, of which the diagonal of K knows nothing.
-    Raises `Undetermined` naming what the rates cannot tell apart.
+    Raises `Undetermined` naming the parameters that the rates cannot separate.
     """
     columns = design(motion, slopes, terms, reference_rad_s)
     channels, n, _ = columns.shape
@@ -243,11 +243,11 @@ class TurnFit:
     residuals: Array
     """Integrated outputs minus model, (n, 3) [rad]."""
     output_sd: Array
-    """Expected of each integrated output by noise and table, (n, 3) [rad]."""
+    """Expected standard deviation of each integrated output by noise and table, (n, 3) [rad]."""
     chi_square: float
     degrees_of_freedom: int
     p_value: float | None
-    """None where the noise was not known."""
+    """P-value of chi-square; None where the noise was not known."""
 
 
 def fit_turns(

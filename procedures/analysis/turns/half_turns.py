@@ -16,7 +16,7 @@ from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 
 PAIRS_MIN = 3
-"""A scatter of fewer pairs says nothing."""
+"""Least number of pairs for a meaningful scatter."""
 
 
 @dataclass(frozen=True)
@@ -24,15 +24,15 @@ class HalfTurns:
     """Half differences and half sums of three gyros, each (3,) [rad/s]."""
 
     half_difference: Array
-    """Of the unturned heading: what the channel feels there of the Earth's rate."""
+    """Input of each channel at the unturned heading: its component of the Earth's rate."""
     half_difference_sd: Array
-    """From the scatter of the pairs."""
+    """Standard uncertainty from the scatter of the pairs."""
     within_sd: Array
-    """What the noise within the dwells alone would leave."""
+    """Standard uncertainty expected from the noise within the dwells alone."""
     bias: Array
-    """Half sum; the vertical channel's has the Earth's vertical rate in it."""
+    """Bias estimate, the half sum; that of the vertical channel includes the Earth's vertical rate."""
     bias_sd: Array
-    """Of the mean over the series, from the scatter of the half sums."""
+    """Standard uncertainty of the mean over the series, from the scatter of the half sums."""
     pairs: int
 
     def coverage_factor(self, confidence: float) -> float:
@@ -41,7 +41,7 @@ class HalfTurns:
 
 
 def half_turns(means: Array, mean_sd: Array, turned: NDArray[np.bool_]) -> HalfTurns:
-    """From the means (n, 3) of dwells in the order they were made, their own uncertainty (n, 3), and which were turned.
+    """Reduce the means (n, 3) of dwells, in the order they were made, with uncertainties (n, 3) and turned headings.
 
     Each dwell pairs with the next if that is at the other heading. Raises `UnfitRecording` of too few pairs.
     """

@@ -1,4 +1,4 @@
-"""Whole turns before they are made: which turns, what they will give, and the limits that they cannot resolve."""
+"""Prediction of whole turns: the program of turns, its uncertainties, and the limits that it cannot resolve."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,21 +19,21 @@ from procedures.core.turn import Turn
 from procedures.core.unit import Unit
 
 UPRIGHT = {"x": TableAngles(0.0, 90.0, 0.0), "y": TableAngles(), "z": TableAngles(0.0, 0.0, -90.0)}
-"""Where each axis of the unit points upwards, along the table's outer axis."""
+"""Table attitude in which each axis of the unit points upwards, along the table's outer axis."""
 MOST_TIMES_LONGER = 64
-"""A plan that would have to turn longer than so many times is said to get nowhere."""
+"""Factor on the turning time beyond which a plan is reported as hopeless."""
 
 
 @dataclass(frozen=True)
 class TurnProgram:
-    """The same turns about each axis of the unit: every rate in both directions."""
+    """Turn program, the same turns about each axis of the unit: every rate in both directions."""
 
     rates_deg_s: tuple[float, ...]
     turning_s: float
-    """How long each rate is to last, to the nearest whole turn [s]."""
+    """Duration of the turns at each rate, to the nearest whole turn [s]."""
     ramp_s: float
     rest_s: float
-    """At rest at the end of each recording [s]."""
+    """Time at rest at the end of each recording [s]."""
     settle_s: float
 
     def turns(self, rate_deg_s: float) -> int:
@@ -61,7 +61,7 @@ class TurnProgram:
 
 @dataclass(frozen=True)
 class TurnPlan:
-    """A program on a unit and a bench."""
+    """Plan of a program on a unit and a bench."""
 
     program: TurnProgram
     unit: Unit
@@ -72,10 +72,10 @@ class TurnPlan:
     terms: tuple[Term, ...]
     reference_rad_s: float
     cross_coupling_sd: float = 0.0
-    """Of each cross-coupling of a unit that has no calibration."""
+    """Standard uncertainty of each cross-coupling of a unit without a calibration."""
 
     def estimator(self) -> TurnEstimator | None:
-        """What the plan will give; None where the unit's noise is not known. Raises `Undetermined`.
+        """Predicted estimator of the plan; None where the unit's noise is not known. Raises `Undetermined`.
 
         K is that of the current calibration, else the identity (nominal outputs) with cross-couplings of
         `cross_coupling_sd`: they carry the table's orthogonality into the scale factors.
@@ -93,12 +93,12 @@ class TurnPlan:
         return None if noise is None else made
 
     def times_longer(self, factor: int) -> "TurnPlan":
-        """The same rates, each for so many times as long."""
+        """Plan with the same rates, each for `factor` times as long."""
         return replace(self, program=replace(self.program, turning_s=factor * self.program.turning_s))
 
 
 def coefficient_names(terms: Sequence[Term]) -> tuple[str, ...]:
-    """Of all three channels: "b_x", "K11", …, "asymmetry_x", …"""
+    """Coefficient names of all three channels: "b_x", "K11", …, "asymmetry_x", …"""
     return tuple(
         f"K{number}{name[1]}" if name.startswith("K") else f"{name}_{axis}"
         for number, axis in enumerate(AXES, start=1)
@@ -115,7 +115,7 @@ def scale_factor_sd(made: TurnEstimator, terms: Sequence[Term]) -> tuple[float, 
 
 
 def longer_needed(plan: TurnPlan, limit: float) -> int | None:
-    """How many times as long the plan must turn for 3σ of every scale factor to come within a relative limit.
+    """Factor on the turning time by which 3σ of every scale factor comes within a relative limit.
 
     To the next power of two; None where `MOST_TIMES_LONGER` is too short, or the noise is not known.
     """
@@ -140,7 +140,7 @@ def bench_time_s(plan: TurnPlan) -> tuple[float, tuple[float, ...]]:
 
 
 def too_coarse(plan: TurnPlan, made: TurnEstimator, limit_ppm: float) -> str | None:
-    """A sentence where 3σ of a scale factor passes its limit [ppm]: what is expected, of what, and what would do.
+    """Warning where 3σ of a scale factor passes its limit [ppm]: expected value, its noise part, a sufficient plan.
 
     `made` is the plan's estimator.
     """

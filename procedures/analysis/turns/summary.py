@@ -1,4 +1,4 @@
-"""What whole turns tell of a gyro triad, as plain JSON-ready numbers."""
+"""Results of whole turns for a gyro triad, as plain JSON-ready numbers."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ from procedures.core.site import Site
 from procedures.core.unit import TriadRecord
 
 PLAUSIBLE = 0.2
-"""A channel that counts so much more or less than the turns made, relative, is not that of the turning axis."""
+"""Relative difference from the turns made beyond which a channel is not that of the turning axis."""
 LINEAR = 4
-"""Of each channel's parameters the first four: b and its row of K."""
+"""Number of each channel's linear parameters, which come first: b and its row of K."""
 
 
 @dataclass(frozen=True)
@@ -32,25 +32,25 @@ class RatePoint:
 
     axis: str
     rate_deg_s: float
-    """Signed."""
+    """Signed table rate [deg/s]."""
     turns: int
     departure: float
-    """``(y − b·T − K·E)/(2πn·K·e) − 1``, relative: what asymmetry and nonlinearity are made of."""
+    """Departure ``(y − b·T − K·E)/(2πn·K·e) − 1``, relative: the sum of asymmetry and nonlinearity."""
     standard_uncertainty: float
-    """Of noise and table at this station alone."""
+    """Standard uncertainty of noise and table at this station alone."""
     modelled: float
-    """The same by the fitted terms."""
+    """Departure predicted by the fitted terms."""
 
 
 @dataclass(frozen=True)
 class WholeTurns:
-    """Everything that whole turns tell of a gyro triad."""
+    """Complete results of whole turns for a gyro triad."""
 
     coefficients: tuple[Coefficient, ...]
     calibration: TriadCalibration
     """b and K with their covariance; the terms beyond the linear ones are not part of it."""
     reference_rate_deg_s: float
-    """Where the quadratic and the cubic term have the sizes given."""
+    """Rate at which the quadratic and the cubic term have the given sizes."""
     points: tuple[RatePoint, ...]
     condition: float
     chi_square: float
@@ -59,7 +59,7 @@ class WholeTurns:
     noise_known: bool
 
     def coefficient(self, name: str) -> Coefficient:
-        """By its name without the triad: "K11", "asymmetry_x"."""
+        """Look up a coefficient by its name without the triad: "K11", "asymmetry_x"."""
         return next(c for c in self.coefficients if c.name.symbol == name)
 
 
@@ -109,7 +109,7 @@ def _stations(recordings: Sequence[Recording]) -> list[Station]:
 
 
 def _require_turns(motion: Turning, outputs: Array, labels: Sequence[str]) -> None:
-    """Each station's own channel counted about as many turns as were made, in their direction."""
+    """Check that each station's own channel counted about the turns that were made, in their direction."""
     for i, channel in enumerate(motion.channels):
         made = motion.angle_rad[i] * np.sign(motion.axis_b[i, channel])
         if not abs(outputs[i, channel] / made - 1.0) < PLAUSIBLE:

@@ -1,4 +1,4 @@
-"""A whole thermal cycle: runs with each axis up become a correction, and what it is worth (thesis 4.2, paper C)."""
+"""Analysis of a thermal cycle: from runs with each axis up to a correction and its errors (thesis 4.2, paper C)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -31,23 +31,23 @@ from procedures.core.thermal_correction import Form, ThermalCorrection
 
 CURRENT = "the unit's current correction"
 SINGLE_REGIME_SHARE = 0.02
-"""With less of a run in a regime, nothing is said of it."""
+"""Share of a run in a regime below which that regime is not reported."""
 WORSE = 1.5
 """A dynamic regime that the fit explains so many times worse than the static one has heat where no sensor is. Tried on
 the rig: 0.8 to 1.0 where every term acts at a sensor, 2.4 to 2.8 where some act at a block without one."""
 SAME_REFERENCE_C = 0.05
 """The converter drifts some 1e-4 m/s² a °C: a smaller difference is below every claim."""
 REFERENCE_WITHIN_C = 8.0
-"""A reference soak further from the reference than this is told."""
+"""Greatest distance of a reference soak from the reference temperature without a warning."""
 
 
 @dataclass(frozen=True)
 class KnownOfUnit:
-    """What is known of the unit before the cycle; None where nothing is."""
+    """Prior knowledge of the unit before the cycle; None for what is not known."""
 
     converter: ConverterTriad | None = None
     calibration: TriadCalibration | None = None
-    """Of the accelerometers, in m/s²."""
+    """Calibration of the accelerometers, in m/s²."""
     correction: ThermalCorrection | None = None
     gyro_noise: tuple[NoiseCoefficients, ...] | None = None
 
@@ -62,7 +62,7 @@ def analyse_cycle(
     judge_current: bool = False,
     noise_from_cycle: bool = True,
 ) -> ThermalCycle:
-    """`series`: each run with the id of its recording.
+    """Analyse a thermal cycle from `series`, each run with the id of its recording.
 
     `judge_current`: 3σ, |ĝ| and Allan are those of ``known.correction``, which this cycle did not make.
     `noise_from_cycle`: gyros are tested against the noise that the cycle itself shows, not against the known one.
@@ -116,7 +116,7 @@ def _first_stage(known: KnownOfUnit, judge_current: bool) -> ConverterTriad | No
 
 
 def _two_references(converter: ConverterTriad | None, settings: CycleSettings) -> list[str]:
-    """A sentence where the two stages refer to different readings of the converter's sensor."""
+    """Warning where the two stages refer to different readings of the converter's sensor."""
     if converter is None:
         return []
     first, second = converter[0].scale.reference_c, settings.reference_c[1]
@@ -144,7 +144,7 @@ def _unknowns(known: KnownOfUnit, converter: ConverterTriad | None) -> list[str]
 
 
 def _plain(correction: ThermalCorrection) -> ThermalCorrection:
-    """K0 and B0 alone."""
+    """The correction with K0 and B0 alone."""
     none = (0.0, 0.0, 0.0, 0.0)
     x, y, z = (replace(a, alpha=none, beta=none, form=Form.BOTH, dynamic_offset=(0.0, 0.0)) for a in correction.axes)
     return ThermalCorrection(correction.triad, (x, y, z))
@@ -223,7 +223,7 @@ def _axis(fit: AxisFit) -> AxisFound:
 
 
 def _correlations(runs: Sequence[PreparedRun], judged: Corrects) -> tuple[AccelerometerCorrelation, ...]:
-    """Of outputs over K0 and of corrected forces with the case temperature, axis by axis, run by run."""
+    """Correlations of outputs over K0 and of corrected forces with the case temperature, axis by axis, run by run."""
     answers: list[AccelerometerCorrelation] = []
     after = [corrected(run.cells, judged) for run in runs]
     for axis, name in enumerate(AXES):
@@ -240,7 +240,7 @@ def _correlations(runs: Sequence[PreparedRun], judged: Corrects) -> tuple[Accele
 def _doubts(
     runs: Sequence[RunFound], soaked: Sequence[RunSoaks], axes: Sequence[AxisFound], settings: CycleSettings
 ) -> list[str]:
-    """What a reader must know before believing the numbers."""
+    """Warnings that limit the confidence in the numbers of a cycle."""
     warnings: list[str] = []
     for run, soak in zip(runs, soaked, strict=True):
         warnings += _of_regimes(run, settings.regime.delay_s)

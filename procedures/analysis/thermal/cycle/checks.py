@@ -1,4 +1,4 @@
-"""A thermal cycle against its limits."""
+"""Checks of a thermal cycle against its limits."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ THESIS = "thesis 4.3, 5.6"
 
 @dataclass(frozen=True)
 class CycleLimits:
-    """Each the most that is allowed."""
+    """Limits of a thermal cycle, each the largest value allowed."""
 
     three_sigma_m_s2: float
     magnitude_rms_m_s2: float
@@ -22,7 +22,7 @@ class CycleLimits:
     gyro_random_walk_deg_sqrt_h: float
     gyro_bias_in_run_deg_h: float
     level: float
-    """Chance that three sound gyros together are said to depend on temperature."""
+    """Significance level: chance that three sound gyros together fail the temperature test."""
 
 
 def cycle_checks(cycle: ThermalCycle, limits: CycleLimits) -> tuple[Check, ...]:

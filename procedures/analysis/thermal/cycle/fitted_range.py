@@ -1,4 +1,4 @@
-"""At which temperatures a correction was fitted, and whether a cycle goes beyond them."""
+"""Temperature range of a correction's fit, and warnings where a cycle goes beyond it."""
 
 from collections.abc import Sequence
 
@@ -9,13 +9,13 @@ from procedures.core.thermal_correction import EXTRAPOLATED_C, TemperatureRange,
 
 
 def range_of(cells: Sequence[ThermalRun]) -> TemperatureRange:
-    """What the fit has seen."""
+    """Temperature range that the fit's cells cover."""
     case, board = (np.concatenate([getattr(c, name) for c in cells]) for name in ("case_c", "converter_c"))
     return TemperatureRange((float(case.min()), float(case.max())), (float(board.min()), float(board.max())))
 
 
 def extrapolated(cells: Sequence[ThermalRun], judged: ThermalCorrection) -> list[str]:
-    """A sentence where the judged correction was not fitted at the cycle's temperatures."""
+    """Warning where the judged correction was not fitted at the cycle's temperatures."""
     if judged.fitted_range is None:
         return ["the judged correction does not say at which temperatures it was fitted: it may be extrapolated"]
     beyond = max(float(judged.fitted_range.beyond_c(c.case_c, c.converter_c).max()) for c in cells)

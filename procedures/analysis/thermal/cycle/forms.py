@@ -1,4 +1,4 @@
-"""What a way to correct is worth on a cycle, and C's normalised polynomial to compare with (thesis tables 4.5, 3.2.3).
+"""Performance of each correction form on a cycle, and C's normalised polynomial to compare with (thesis 4.5, 3.2.3).
 
 A correction is worth what it leaves: 3σ at each soak about the run's own reference soak, and |ĝ| over the whole run.
 """
@@ -31,7 +31,7 @@ class RunSoaks:
 
 
 def soaks_of(run: PreparedRun, reference_c: float) -> RunSoaks:
-    """Raises `UnfitRecording` where the run has no soak at all."""
+    """Find the soaks of a run and its reference soak. Raises `UnfitRecording` where it has no soak at all."""
     found = soaks(run.cells)
     if not found:
         raise UnfitRecording(
@@ -92,12 +92,12 @@ def worth(
 
 @dataclass(frozen=True)
 class NormalisedTriad:
-    """C: zero and scale of each axis as normalised polynomials of the case temperature, from soaks alone."""
+    """Triad model of paper C: zero and scale of each axis as normalised polynomials of the case temperature."""
 
     zeros: tuple[Normalised, Normalised, Normalised]
     """Output at zero force, V0 + Fs(t) [m/s²]."""
     gains: tuple[Normalised, Normalised, Normalised]
-    """Output a force, K·Fc(t)."""
+    """Scale K·Fc(t), output per force."""
 
     @property
     def scales(self) -> Array:
@@ -133,7 +133,7 @@ def normalised_triad(
 
 
 def _soak_means(run: PreparedRun, soaked: RunSoaks, axis: int) -> Array:
-    """Of each soak of a run: case temperature, output of an axis, and the force along it, (3, n)."""
+    """Mean case temperature, output of an axis and force along it in each soak of a run, (3, n)."""
     each, force = soaked.of_leg.values(), run.cells.force_m_s2[axis]
     rows = [(s.case_c, float(np.mean(run.cells.output_m_s2[s.start : s.stop, axis])), force) for s in each]
     return np.array(rows, dtype=np.float64).reshape(-1, 3).T

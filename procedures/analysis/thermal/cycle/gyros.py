@@ -29,16 +29,16 @@ def in_cells(values: Array, sample_s: float, cell_s: float) -> Array:
 
 
 def found(run: str, axis: str, c: Correlation) -> CorrelationFound:
-    """A correlation as a value of the result."""
+    """Convert a correlation to a value of the result."""
     return CorrelationFound(run, axis, c.r, c.effective_samples, c.slope, c.slope_sd, c.p_value)
 
 
 def gyro_temperatures(
     runs: Sequence[PreparedRun], settings: CycleSettings, known: Sequence[NoiseCoefficients] | None
 ) -> tuple[GyroTemperature, ...]:
-    """Each gyro against its own sensor, run by run and all together.
+    """Correlate each gyro with its own sensor, run by run and all together.
 
-    `known`: noise of x, y, z from a static run; None: what the cycle itself tells, see `correlation`. The runs'
+    `known`: noise of x, y, z from a static run; None: the noise seen in the cycle itself, see `correlation`. The runs'
     p-values are joined by Fisher's ``−2·Σ ln p``, chi-square of twice as many degrees. Raises `UnfitRecording`.
     """
     answers: list[GyroTemperature] = []

@@ -1,4 +1,4 @@
-"""What a thermal cycle tells, as plain JSON-ready numbers. SI but for °C; axes in the order x, y, z."""
+"""Results of a thermal cycle, as plain JSON-ready numbers. SI but for °C; axes in the order x, y, z."""
 
 from dataclasses import dataclass
 
@@ -10,22 +10,22 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Trace:
-    """A run for the eye: means over `step_s`, all lists alike long."""
+    """Plot data of a run: means over `step_s`, lists of equal length."""
 
     t_s: tuple[float, ...]
     """Middles since the recording's beginning."""
     dynamic: tuple[bool, ...]
-    """Whether any second of it was dynamic."""
+    """True where any second of the step was dynamic."""
     sensors_c: tuple[tuple[float, ...], ...]
     """Case, converter, gyros x, y, z."""
     air_c: tuple[float, ...]
     set_point_c: tuple[float, ...]
     acceleration_c_s2: tuple[float, ...]
-    """The indicator's second derivative."""
+    """Second derivative of the case temperature by the indicator [°C/s²]."""
     before_m_s2: tuple[tuple[float, ...], ...]
-    """Outputs over K0 less those of the reference soak, x, y, z: what an uncorrected unit is wrong by."""
+    """Outputs over K0 less those of the reference soak, x, y, z: the error of an uncorrected unit."""
     after_m_s2: tuple[tuple[float, ...], ...]
-    """The same of the corrected forces."""
+    """Corrected forces less those of the reference soak."""
     magnitude_before_m_s2: tuple[float, ...]
     """|ĝ| − g with K0 and B0 alone."""
     magnitude_after_m_s2: tuple[float, ...]
@@ -33,15 +33,15 @@ class Trace:
 
 @dataclass(frozen=True)
 class LegRegime:
-    """What the indicator made of one leg of the profile."""
+    """Regime switching observed by the indicator in one leg of the profile."""
 
     ramp_began_s: float | None
-    """When the chamber's set point began to move; None where it stood."""
+    """Time when the chamber's set point began to move; None where it stood."""
     ramp_ended_s: float | None
     dynamic_s: float | None
-    """When the regime became dynamic; None where it was dynamic before the ramp began, or did not."""
+    """Time when the regime became dynamic; None where it was dynamic before the ramp began, or did not."""
     static_s: float | None
-    """When it became static for the rest of the leg; None where it did not."""
+    """Time when the regime became static for the rest of the leg; None where it did not."""
     onset_delay_s: float | None
     chatter: int
     """Changes to dynamic that no ramp explains."""
@@ -49,7 +49,7 @@ class LegRegime:
 
 @dataclass(frozen=True)
 class RunFound:
-    """One run: what was recorded of its temperatures, and what the indicator said."""
+    """Observations of one run: its recorded temperatures and the regimes that the indicator found."""
 
     recording: str
     name: str
@@ -65,17 +65,17 @@ class RunFound:
 
 @dataclass(frozen=True)
 class AxisFound:
-    """One accelerometer's fit."""
+    """Fit of one accelerometer's correction."""
 
     correction: AxisCorrection
     uncertainties: tuple[float, ...]
-    """Standard, of α1 … α4, β1 … β4."""
+    """Standard uncertainties of α1 … α4, β1 … β4."""
     residual_sd_m_s2: tuple[float | None, float | None]
-    """Of the cells, static and dynamic."""
+    """Residual standard deviations of the cells, static and dynamic."""
     effective_samples: float
     condition: float
     bic: Triple
-    """Of orders 1, 2 and 3."""
+    """Bayesian criterion of orders 1, 2 and 3."""
     p_values: tuple[float, float]
     """F test of order 2 against 1, and of 3 against 2."""
     preferred_order: int
@@ -83,15 +83,15 @@ class AxisFound:
 
 @dataclass(frozen=True)
 class SoakFound:
-    """One soak over the runs, root mean square over them (thesis table 4.5)."""
+    """Errors of one soak, root mean square over the runs (thesis table 4.5)."""
 
     leg: int
     target_c: float
     case_c: float
     runs: int
-    """In how many runs the unit was static long enough."""
+    """Number of runs in which the unit was static long enough."""
     before_m_s2: Triple
-    """3σ: three times the rms departure from the run's reference soak."""
+    """Three-sigma error: three times the rms departure from the run's reference soak."""
     after_m_s2: Triple
     spread_before_m_s2: Triple
     """3σ about the soak's own mean."""
@@ -100,20 +100,20 @@ class SoakFound:
 
 @dataclass(frozen=True)
 class FormFound:
-    """What one way to correct is worth on this cycle."""
+    """Performance of one correction form on this cycle."""
 
     form: str
     """"both", "switched", "single", "normalised polynomial (C)", or "the unit's current correction"."""
     worst_3_sigma_m_s2: Triple
-    """Over the soaks."""
+    """Worst 3σ over the soaks, axis by axis."""
     magnitude_static_m_s2: float
     magnitude_dynamic_m_s2: float
-    """Of |ĝ| about each run's mean, root mean square over the runs."""
+    """Rms of |ĝ| about each run's mean, over the runs."""
 
 
 @dataclass(frozen=True)
 class CorrelationFound:
-    """How one channel of one run goes with a temperature."""
+    """Correlation of one channel of one run with a temperature."""
 
     run: str
     axis: str
@@ -127,7 +127,7 @@ class CorrelationFound:
 
 @dataclass(frozen=True)
 class AccelerometerCorrelation:
-    """Thesis table 4.3: before and after."""
+    """Correlation of an accelerometer with temperature, before and after correction (thesis table 4.3)."""
 
     before: CorrelationFound
     after: CorrelationFound
@@ -135,20 +135,20 @@ class AccelerometerCorrelation:
 
 @dataclass(frozen=True)
 class GyroTemperature:
-    """Is a gyro independent of its temperature? Three runs together (thesis table 4.6)."""
+    """Test of a gyro's independence of its temperature, over three runs together (thesis table 4.6)."""
 
     axis: str
     runs: tuple[CorrelationFound, ...]
     p_value: float
-    """Fisher's of the runs."""
+    """Joint p-value of the runs by Fisher's method."""
     slope_rad_s_c: float
     slope_sd_rad_s_c: float
-    """Of the runs, weighted."""
+    """Weighted slope over the runs with its standard uncertainty."""
 
 
 @dataclass(frozen=True)
 class GyroNoise:
-    """Noise of one gyro in one run (thesis table 4.7), beside what is known of the unit. None: not observed."""
+    """Noise of one gyro in one run (thesis table 4.7), with the unit's known noise to compare. None: not observed."""
 
     run: str
     axis: str
@@ -171,33 +171,33 @@ class AllanFound:
     after: tuple[float, ...]
     lower: tuple[float, ...]
     upper: tuple[float, ...]
-    """Interval of `after`."""
+    """Confidence interval of `after`."""
     rise: float
     """Largest ratio of a lower end to the upper end at any shorter time: above one the deviation surely rises."""
 
 
 @dataclass(frozen=True)
 class ThermalCycle:
-    """Everything."""
+    """Complete results of a thermal cycle."""
 
     judged: str
-    """"fit": the correction of this cycle; "current": the unit's, which has not seen it."""
+    """Judged correction: "fit" of this cycle, or "current" of the unit, which has not seen this cycle."""
     reference_c: tuple[float, float]
     stage_one: bool
-    """Whether the converter's own model was taken out first."""
+    """True if the converter's own model was taken out first."""
     force_known: bool
-    """Whether the forces come from the unit's calibration."""
+    """True if the forces come from the unit's calibration."""
     regime_delay_s: float
-    """The indicator's own."""
+    """Delay of the regime indicator itself."""
     runs: tuple[RunFound, ...]
     axes: tuple[AxisFound, AxisFound, AxisFound]
-    """Of the form that was fitted."""
+    """Axis fits of the form that was fitted."""
     correction: ThermalCorrection
-    """Fitted to this cycle."""
+    """Thermal correction fitted to this cycle."""
     soaks: tuple[SoakFound, ...]
-    """By the judged correction."""
+    """Soak errors under the judged correction."""
     magnitude_m_s2: tuple[tuple[float, float], ...]
-    """Of each run: rms of |ĝ| about its mean, before and after."""
+    """Rms of |ĝ| about its mean in each run, before and after correction."""
     forms: tuple[FormFound, ...]
     accelerometers: tuple[AccelerometerCorrelation, ...]
     gyros: tuple[GyroTemperature, ...]

@@ -1,4 +1,4 @@
-"""From second means to what the fits see: stage one, lags, regimes, and the force that each accelerometer felt.
+"""Preparation of second means for the fits: stage one, lags, regimes, and the force along each accelerometer.
 
 Stage one takes the converter's own drift out of nominal outputs first (paper C; `core.converter.at_reference`).
 """
@@ -20,39 +20,39 @@ from procedures.core.imu_model import TriadCalibration
 from procedures.core.thermal_correction import ThermalCorrection
 
 PASSES = 2
-"""Fits whose correction tells what each axis would have shown at the reference, and so the force that it felt."""
+"""Number of fits from whose correction each axis's output at the reference, and so its force, is derived."""
 
 
 @dataclass(frozen=True)
 class CycleSettings:
-    """What may be set in the analysis of a cycle; SI but for °C."""
+    """Settings of the analysis of a cycle; SI but for °C."""
 
     cell_s: float = 60.0
-    """Cells that the fits work on."""
+    """Length of the cells that the fits work on."""
     case_lag_s: float = 5.0
     converter_lag_s: float = 5.0
     """Time constants of the two sensors, by their data sheet."""
     lag_sd_s: float = 0.05
-    """Standard uncertainty of each."""
+    """Standard uncertainty of each time constant."""
     reference_c: tuple[float, float] = (20.0, 20.0)
     """Readings of case and converter sensor at which the correction changes nothing but K0 and B0."""
     regime: RegimeSettings = field(default_factory=RegimeSettings)
     gyro_trim_s: float = 600.0
     """Start of each launch that the gyros' noise is not judged by (thesis 4.1.1)."""
     level: float = 0.01
-    """Of tests."""
+    """Significance level of the tests."""
     confidence: float = 0.95
-    """Of intervals."""
+    """Confidence level of the intervals."""
 
     @property
     def lag_s(self) -> dict[str, float]:
-        """By the names of `thermal_run`."""
+        """Sensor time constants by the names of `thermal_run`."""
         return {"case": self.case_lag_s, "converter": self.converter_lag_s}
 
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """One run, a row a second and a row a cell."""
+    """Data of one run, a row a second and a row a cell."""
 
     series: CycleSeries
     trace: RegimeTrace
@@ -100,7 +100,7 @@ def with_forces(
     """The runs with the force that each accelerometer felt by the unit's calibration, and warnings.
 
     ``f_i = (V_i − b_i)/K_ii`` at the reference temperatures: effective, with what mounting and cross-coupling put into
-    it. No soak is quite at the reference, so V there is what the correction of a first fit says of the nearest soak.
+    it. No soak is quite at the reference, so V there is the nearest soak's output, corrected by a first fit.
     """
     bias, scale = calibration.bias_array, np.diagonal(calibration.matrix_array)
     for _ in range(PASSES):
@@ -118,7 +118,7 @@ def with_forces(
 
 
 LARGEST_TILT = 0.05
-"""Of gravity along a horizontal axis: more is no unlevel seat any more."""
+"""Greatest share of gravity along a horizontal axis for a seat that counts as level."""
 
 
 def _at_reference(run: ThermalRun, correction: ThermalCorrection) -> Array:

@@ -1,4 +1,4 @@
-"""A recording of one thermal run, read once, block by block: second means of everything, and the profile's evidence.
+"""Reduction of a thermal run's recording, block by block, to second means and the profile's evidence.
 
 Twelve hours at 100 samples/s of thirteen channels become 43 200 rows; what is kept does not grow with the sample rate.
 """
@@ -33,24 +33,24 @@ RATE_UNITS = {**dict.fromkeys(GYRO, "rad/s"), **dict.fromkeys(ACCELEROMETER, "m/
 
 @dataclass(frozen=True)
 class CycleSeries:
-    """One run, a row a second."""
+    """Recorded series of one run, a row a second."""
 
     label: str
     up: int
-    """Which axis stands upwards, 0 … 2."""
+    """Index of the axis that stands upwards, 0 … 2."""
     sample_s: float
     since_launch_s: float
     gyro_rad_s: Array
-    """(n, 3)"""
+    """Gyro rates [rad/s], shape (n, 3)."""
     output_m_s2: Array
     """Nominal accelerometer outputs, (n, 3)."""
     sensors_c: Array
     """The unit's temperature sensors in the order of `SENSORS`, (n, 5)."""
     air_c: Array
-    """What the chamber said, (n,)."""
+    """Chamber's air temperature, as it reports it, (n,)."""
     set_point_c: Array
     legs: tuple[LegEvidence, ...]
-    """Each leg of the profile, judged again from the recording."""
+    """Evidence of each leg of the profile, judged again from the recording."""
 
     @property
     def case_c(self) -> Array:
@@ -62,7 +62,7 @@ class CycleSeries:
 
     @property
     def name(self) -> str:
-        """For tables: "x up"."""
+        """Display name of the run for tables, as "x up"."""
         return f"{AXES[self.up]} up"
 
     @property

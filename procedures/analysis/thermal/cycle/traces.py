@@ -15,16 +15,16 @@ from procedures.core.arrays import Array
 from procedures.core.recording import AXES
 
 MOST_POINTS = 720
-"""Of a series on a page: twelve hours by the minute."""
+"""Greatest number of points of a series on a page: twelve hours by the minute."""
 MOVED_C = 0.02
-"""A set point that is further away than this from where it was, or is to be, is on a ramp."""
+"""Distance of a set point from its start and its target beyond which it is on a ramp."""
 SURE = 0.997
 """Confidence of the intervals that a rise of the Allan deviation is judged by."""
 POINTS_PER_DECADE = 5
 
 
 def trace(run: PreparedRun, judged: Corrects, plain: Corrects, reference: Soak, gravity_m_s2: float) -> Trace:
-    """A run in at most `MOST_POINTS`; `plain` is the correction without its temperature terms."""
+    """Trace of a run in at most `MOST_POINTS`; `plain` is the correction without its temperature terms."""
     series = run.series
     before = run.output_m_s2 * judged.scales
     after = judged.apply(run.output_m_s2, run.case_c, run.converter_c, run.dynamic)
@@ -55,7 +55,7 @@ def trace(run: PreparedRun, judged: Corrects, plain: Corrects, reference: Soak, 
 
 
 def leg_regimes(run: PreparedRun, delay_s: float) -> tuple[LegRegime, ...]:
-    """What the indicator made of each leg; `delay_s` is how late it may be."""
+    """Regime switching of each leg; `delay_s` is the allowed delay of the indicator."""
     return tuple(_leg_regime(run, leg, delay_s) for leg in run.series.legs)
 
 
