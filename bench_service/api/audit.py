@@ -1,4 +1,4 @@
-"""The audit trail: every request that may change something and reached a route, with its outcome."""
+"""Audit trail of HTTP requests: every request that may change something and reached a route, with its outcome."""
 
 import asyncio
 import json
@@ -28,7 +28,7 @@ NOTED_BYTES = 8192
 
 
 class AuditView(BaseModel):
-    """Who asked what, and what became of it."""
+    """One audit entry: the client, its request and the outcome."""
 
     id: str
     at: datetime
@@ -45,7 +45,7 @@ class AuditView(BaseModel):
 
 
 class AuditPage(BaseModel):
-    """Entries, newest first."""
+    """One page of audit entries, newest first."""
 
     items: list[AuditView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")
@@ -59,7 +59,7 @@ def list_audit(
     after: After = None,
     limit: Limit = 50,
 ) -> AuditPage:
-    """Who asked what, newest first."""
+    """List the audit entries, newest first: the client, its request and the outcome."""
     page = service.stores.audit.list(who=who, target=target, after=after, limit=limit)
     return AuditPage(items=[AuditView.of(entry) for entry in page.items], next=page.next)
 
@@ -67,11 +67,11 @@ def list_audit(
 STOP = "stop"
 """Name of the route that stops a bench."""
 STOP_S = 0.3
-"""How long the answer to a stop waits for its entry; one that comes later is written all the same [s]."""
+"""Longest time that the answer to a stop waits for its audit entry; a later entry is written all the same [s]."""
 
 
 class Audited:
-    """Pure ASGI. The order is: the act, its entry, the answer. See `bench_service.telemetry.audit`."""
+    """ASGI middleware: performs the act, writes its audit entry, then answers. See `bench_service.telemetry.audit`."""
 
     def __init__(self, app: ASGIApp, trail: AuditTrail) -> None:
         self._app = app
@@ -120,7 +120,7 @@ class Audited:
 
 
 class _Act:
-    """What a request says until its outcome is known."""
+    """The parts of a request that its audit entry needs, collected until the outcome is known."""
 
     def __init__(self, request: Request, who: str) -> None:
         self.request = request
@@ -138,7 +138,7 @@ class _Act:
             self._body += piece
 
     def detail(self) -> dict[str, Any]:
-        """What matters of the request; never the contents of files, nor what could not be read back."""
+        """The request's details for the audit entry; never the contents of files, nor what could not be read back."""
         found: dict[str, Any] = {"request": request_id(), "path": shown(self.request.scope["path"])}
         if self.request.url.query:
             found["query"] = self.request.url.query[:500]

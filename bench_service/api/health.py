@@ -10,7 +10,7 @@ router = APIRouter(tags=["health"])
 
 
 class Health(BaseModel):
-    """The service answers; `code_version` is what would make a number now."""
+    """Health of the service that answers; `code_version` is the version that a new result would carry."""
 
     status: str = "ok"
     code_version: str

@@ -143,7 +143,7 @@ def install(app: FastAPI, service: BenchService) -> None:
 
 
 class Measured:
-    """Pure ASGI: requests by route and status, and the time until each answer began."""
+    """ASGI middleware that counts requests by route and status, and measures the time until each answer begins."""
 
     def __init__(self, app: ASGIApp, registry: CollectorRegistry) -> None:
         self._app = app

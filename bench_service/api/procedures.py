@@ -1,4 +1,4 @@
-"""What the bench can do, and what a plan would be worth before anything moves."""
+"""Routes of procedures: the procedures of the bench, and previews of a plan before anything moves."""
 
 from typing import Annotated, Any
 
@@ -26,7 +26,7 @@ class ProcedureView(BaseModel):
 
 
 class PreviewRequest(Request):
-    """What a plan would be worth."""
+    """A plan to be previewed: procedure parameters, unit and bench."""
 
     unit: str = NAME
     bench: Annotated[str, NAME] | None = None
@@ -66,7 +66,7 @@ def list_procedures(service: Service) -> list[ProcedureView]:
 
 @router.get("/procedures/{name}", responses=problems(404))
 def read_procedure(name: str, service: Service) -> ProcedureView:
-    """One procedure."""
+    """Read one procedure by its name."""
     return _view(service.catalogue.procedure(name))
 
 

@@ -1,4 +1,4 @@
-"""Recordings: what there is, the samples out, and a recorded file in."""
+"""Routes of recordings: list them, export samples, and import a recorded file."""
 
 from datetime import datetime
 from typing import Annotated, Any
@@ -56,7 +56,7 @@ class RecordingView(BaseModel):
 
 
 class RecordingPage(BaseModel):
-    """Recordings, newest first."""
+    """One page of recordings, newest first."""
 
     items: list[RecordingView]
     next: str | None
@@ -78,7 +78,7 @@ def list_recordings(
     after: After = None,
     limit: Limit = 50,
 ) -> RecordingPage:
-    """Recordings, newest first."""
+    """List the recordings, newest first."""
     page = service.stores.recordings.list(job_id=job, unit=unit, after=after, limit=limit)
     return RecordingPage(items=[RecordingView.of(r) for r in page.items], next=page.next)
 

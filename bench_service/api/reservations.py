@@ -1,4 +1,4 @@
-"""Reservations: to keep a bench or a unit for a while. Jobs of others wait until the reservation ends."""
+"""Routes of reservations of a bench or a unit. Jobs of other clients wait until the reservation ends."""
 
 from datetime import datetime, timedelta
 from typing import Annotated
@@ -36,7 +36,7 @@ class ReservationSubmission(Request):
 
 
 class ReservationView(BaseModel):
-    """A reservation. It ends by itself at `until`."""
+    """A reservation of a bench or a unit. It ends by itself at `until`."""
 
     id: str
     bench: str | None
@@ -50,7 +50,7 @@ class ReservationView(BaseModel):
 
     @classmethod
     def of(cls, kept: Reservation) -> "ReservationView":
-        """As HTTP says it."""
+        """Convert a reservation to its HTTP view."""
         return copied(
             cls,
             kept,
@@ -61,7 +61,7 @@ class ReservationView(BaseModel):
 
 
 class ReservationPage(BaseModel):
-    """Reservations, newest first."""
+    """One page of reservations, newest first."""
 
     items: list[ReservationView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")
@@ -90,14 +90,14 @@ def list_reservations(
     after: After = None,
     limit: Limit = 50,
 ) -> ReservationPage:
-    """Reservations, newest first."""
+    """List the reservations, newest first."""
     page = service.stores.reservations.list(active_at=now() if active else None, after=after, limit=limit)
     return ReservationPage(items=[ReservationView.of(kept) for kept in page.items], next=page.next)
 
 
 @router.get("/{reservation_id}", responses=problems(404))
 def read_reservation(reservation_id: str, service: Service) -> ReservationView:
-    """One reservation."""
+    """Read one reservation by its id."""
     return ReservationView.of(service.stores.reservations.get(reservation_id))
 
 

@@ -1,4 +1,4 @@
-"""Results: methods run on stored evidence, and every result by its id."""
+"""Routes of results: run a method on stored evidence, and read results by id."""
 
 from datetime import datetime
 from typing import Annotated, Any
@@ -27,7 +27,7 @@ class AnalysisSubmission(Request):
 
 
 class Lineage(BaseModel):
-    """What made a number."""
+    """The lineage of a result: the recordings, calibrations and code that made it."""
 
     recordings: list[dict[str, str]] = Field(description="id and content hash of each recording, in order")
     calibrations: list[str]
@@ -65,7 +65,7 @@ class ResultView(BaseModel):
 
 
 class ResultPage(BaseModel):
-    """Results, newest first."""
+    """One page of results, newest first."""
 
     items: list[ResultView]
     next: str | None
@@ -91,7 +91,7 @@ def run_method(
 def list_results(
     service: Service, unit: Annotated[str | None, Query(max_length=100)] = None, after: After = None, limit: Limit = 50
 ) -> ResultPage:
-    """Results, newest first."""
+    """List the results, newest first."""
     page = service.stores.results.list(unit=unit, after=after, limit=limit)
     return ResultPage(items=[ResultView.of(result) for result in page.items], next=page.next)
 

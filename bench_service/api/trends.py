@@ -1,4 +1,4 @@
-"""Trends: a quantity of a unit over its results, with control limits."""
+"""Routes of trends: a quantity of a unit over its results, with control limits."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""What a client is told of campaigns, their runs and schedules."""
+"""HTTP schemas of campaigns, their runs and schedules."""
 
 from datetime import datetime
 
@@ -19,7 +19,7 @@ from procedures.core.limits import Check, Verdict
 
 
 class CampaignView(BaseModel):
-    """A campaign."""
+    """A stored campaign with its name."""
 
     name: str
     campaign: Campaign
@@ -31,7 +31,7 @@ class CampaignView(BaseModel):
 
 
 class CampaignPage(BaseModel):
-    """Campaigns by name."""
+    """One page of campaigns, sorted by name."""
 
     items: list[CampaignView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")
@@ -52,7 +52,7 @@ class CampaignMade(BaseModel):
 
 
 class CampaignPreview(BaseModel):
-    """What a campaign would do on a unit."""
+    """Preview of a campaign on a unit."""
 
     campaign: str
     unit: str
@@ -115,7 +115,7 @@ class CampaignRunView(BaseModel):
 
 
 class CampaignRunPage(BaseModel):
-    """Runs, newest first."""
+    """One page of campaign runs, newest first."""
 
     items: list[CampaignRunView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")
@@ -161,7 +161,7 @@ class ScheduleView(BaseModel):
 
 
 class SchedulePage(BaseModel):
-    """Schedules, newest first."""
+    """One page of schedules, newest first."""
 
     items: list[ScheduleView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")

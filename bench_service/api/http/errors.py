@@ -85,10 +85,10 @@ class Problem(BaseModel):
 RETRY_AFTER_S = "2"
 """When a request that was too much may be sent again."""
 MOST_FIELDS = 100
-"""Of a megabyte of wrong fields so many are told."""
+"""Most wrong fields that an answer lists, of a body of up to a megabyte."""
 _NO_BODY = FieldError(field="body", message="UTF-8 text of one JSON document is expected")
 _UNREAD: dict[type, str] = {RecursionError: NOT_SO_DEEP, ValueError: A_NUMBER}
-"""What is allowed instead where `json.loads` itself gave up, at a thousand brackets or at an integer of 4300 digits."""
+"""Allowed values, by the error of `json.loads` itself: at a thousand brackets or at an integer of 4300 digits."""
 
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
@@ -127,7 +127,7 @@ def install(app: FastAPI) -> None:
 
 
 class AnswerAtTheEnd:
-    """A request that is still at work when the server has waited long enough for its end is told so, and may be
+    """Middleware that ends the requests still at work when the server's time to end is over. Such a request may be
     repeated: what it asked for may be done or not, which its `Idempotency-Key` sorts out. A stream ends, unfinished.
     """
 
@@ -212,7 +212,7 @@ def _invalid(request: Request, errors: Sequence[Any], prefix: str) -> Response:
 
 
 def _follows(error: Any, errors: Sequence[Any]) -> bool:
-    """A list whose bad element was left out is told to be too short as well: that is no second fault."""
+    """Return whether an error only follows from another: a list without its bad element is also reported too short."""
     place = tuple(error["loc"])
     return error["type"] == "too_short" and any(
         len(other["loc"]) > len(place) and tuple(other["loc"][: len(place)]) == place for other in errors

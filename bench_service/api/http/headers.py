@@ -19,7 +19,7 @@ SECURITY_HEADERS = {
 
 
 class SecurityHeaders:
-    """Pure ASGI: adds the headers that an answer does not have of its own."""
+    """ASGI middleware that adds the security headers that an answer does not have of its own."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

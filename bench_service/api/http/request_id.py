@@ -14,7 +14,7 @@ ACCEPTED = re.compile(r"[A-Za-z0-9._:/+=@-]{1,100}")
 
 
 class RequestId:
-    """Pure ASGI: it never holds a stream up."""
+    """ASGI middleware that gives each request an id; it never delays a stream."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

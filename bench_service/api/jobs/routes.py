@@ -1,4 +1,4 @@
-"""Jobs: submit, read, watch, cancel, and what came out."""
+"""Routes of jobs: submit, read, watch, cancel, and read the result."""
 
 from collections.abc import AsyncIterator
 from typing import Annotated
@@ -43,7 +43,7 @@ OF_A_JOB = (
     "read_truth",
     "analyse_again",
 )
-"""What can be asked of a job once there is one."""
+"""Names of the routes that work on an existing job."""
 
 
 @router.post(
@@ -61,7 +61,7 @@ def submit(
     key: IdempotencyKey = None,
     requested_by: RequestedBy = None,
 ) -> JobView:
-    """Queue a job. The same `Idempotency-Key` with the same body gives the job that the first one made."""
+    """Submit a job to the queue. The same `Idempotency-Key` with the same body gives the job of the first request."""
     job = service.jobs.submit(copied(JobRequest, body), key, requested_by or "")
     response.headers["Location"] = f"/api/v1/jobs/{job.id}"
     return _view(service, job)
@@ -80,7 +80,7 @@ def list_jobs(
     after: After = None,
     limit: Limit = 50,
 ) -> JobPage:
-    """Jobs, newest first."""
+    """List the jobs, newest first."""
     page = service.stores.jobs.list(state=state, procedure=procedure, unit=unit, after=after, limit=limit)
     standing = service.queues.standing(page.items)
     items = [JobView.of(job, standing[job.id], service.live.of_job(job)) for job in page.items]
@@ -89,7 +89,7 @@ def list_jobs(
 
 @router.get("/{job_id}", responses=problems(404, 409))
 def read_job(job_id: str, service: Service) -> JobView:
-    """One job: everything that is known of it, its place in the queue and why it waits."""
+    """Read one job: its state, its place in the queue and why it waits."""
     return _view(service, service.stores.jobs.get(job_id))
 
 
@@ -109,9 +109,9 @@ def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
     },
 )
 def cancel(job_id: str, service: Service) -> JobView | JSONResponse:
-    """End a job: a queued one at once, a running one as soon as its bench is safe. Its recordings are kept.
+    """Cancel a job: a queued one at once, a running one as soon as its bench is safe. Its recordings are kept.
 
-    One that this version does not understand is ended too; of it, only its state is told.
+    A job that this version does not understand is cancelled too; the answer then holds only its state.
     """
     try:
         return _view(service, service.jobs.cancel(job_id))
@@ -179,7 +179,7 @@ def read_result(
 
 @router.get("/{job_id}/truth", responses=problems(404, 409))
 def read_truth(job_id: str, service: Service) -> Truth:
-    """What the simulated unit really was in this job; 404 on a real bench."""
+    """Read the true values of the simulated unit in this job; 404 on a real bench."""
     return Truth(job=job_id, triads=list(service.jobs.truth(job_id)))
 
 

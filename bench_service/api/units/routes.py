@@ -1,4 +1,4 @@
-"""Units under test: what is declared of them, their calibrations and their corrections."""
+"""Routes of units under test: their declarations, their calibrations and their corrections."""
 
 from typing import Annotated
 
@@ -31,7 +31,7 @@ def list_units(service: Service) -> list[UnitView]:
 
 @router.get("/{serial}", responses=problems(404))
 def read_unit(serial: str, service: Service) -> UnitView:
-    """One unit."""
+    """Read one unit by its serial."""
     return UnitView.of(service.stores.units.unit(serial))
 
 

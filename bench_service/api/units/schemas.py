@@ -17,7 +17,7 @@ from procedures.core.unit_correction import CorrectionKind
 
 
 class UnitDeclaration(Request):
-    """What is declared of a unit (its data sheet), without its serial, which the address has."""
+    """The declaration of a unit (its data sheet); its serial stands in the address."""
 
     sample_rate_hz: float = Field(gt=0, le=1e6, allow_inf_nan=False)
     channels: list[Channel] = Field(default_factory=list[Channel], max_length=64)
