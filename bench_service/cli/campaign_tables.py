@@ -32,7 +32,7 @@ def campaign_table(items: list[dict[str, Any]]) -> Table:
 
 
 def runs_table(items: list[dict[str, Any]]) -> Table:
-    """Runs, newest first."""
+    """Table of campaign runs, newest first."""
     table = _table("run", "campaign", "unit", "state", "verdict", "asked for", "what to know")
     for run in items:
         told = run["waiting"] or run["reason"]

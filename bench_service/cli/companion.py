@@ -1,8 +1,8 @@
 """The companion of a process that drives a bench: a supervisor in a process of its own, kept there while it drives.
 
 A companion that ended is started again, whatever ended it, at a pace that falls while it does not last. One that left
-the bench to another supervisor comes back only once nobody has supervised the bench for a while: long enough for
-whoever keeps that other one to have started it again.
+the bench to another supervisor comes back only once the bench has been without supervisor for a while: long enough for
+the keeper of that other one to have started it again.
 """
 
 import logging
@@ -21,15 +21,15 @@ from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s
 
 LOOK_S = 0.25
-"""How often it is looked whether the companion lives [s]."""
+"""Interval between checks that the companion lives [s]."""
 AGAIN_S = 1.0
-"""At least so long from one start to the next [s], and twice as long after each that did not last."""
+"""Shortest time from one start to the next [s], doubled after each companion that did not last."""
 SLOWEST_S = 60.0
-"""At most so long [s]; a companion has lasted when it lived for this time."""
+"""Longest time from one start to the next [s]; a companion has lasted when it lived for this time."""
 UNSUPERVISED_S = 5.0
-"""How long nobody may supervise a bench that was left to another supervisor [s]."""
+"""Longest time that a bench left to another supervisor may be without one [s]."""
 LEAVE_S = 2.0
-"""How long a process that ends waits for its companion to see it [s]."""
+"""Time that a process that ends waits for its companion to notice it [s]."""
 
 Process = subprocess.Popen[bytes]
 log = logging.getLogger(__name__)
@@ -95,9 +95,9 @@ class Companion:
 
 @contextmanager
 def accompanied(settings: Settings, driving: Callable[[], bool]) -> Generator[None]:
-    """A supervisor beside this process that outlives the block if it must.
+    """Run the block with a supervisor process next to this one; it outlives the block if it must.
 
-    `driving`: whether this process drives the bench now: not before it has started, not while it ends.
+    `driving`: returns whether this process drives the bench now: not before it has started, not while it ends.
     """
     over = threading.Event()
     files = HostFiles(settings.devices_in(), settings.bench_id)
@@ -139,5 +139,5 @@ def _spawn(settings: Settings) -> Process:
 
 
 def log_of(settings: Settings) -> Path:
-    """Where the companion writes what it has to say."""
+    """Return the path of the companion's log file."""
     return settings.devices_in() / f"bench-{settings.bench_id}.supervisor.log"

@@ -1,7 +1,7 @@
-"""Connections that nobody uses must not keep a stop out: so many descriptors are kept for bench, database and files.
+"""Limit on idle connections, so that they cannot keep a stop out: bench, database and files have descriptors reserved.
 
-Where more connections come than there is room for, the oldest one that asks nothing is closed for each new one; one
-that has not said what it wants within `HEADERS_S` is closed anyway. A request that is at work is never cut.
+Where more connections come than there is room for, the oldest idle one is closed for each new one; one that has not
+sent its request within `HEADERS_S` is closed anyway. A request that is at work is never cut.
 """
 
 import asyncio
@@ -19,7 +19,7 @@ LEAST = 64
 WANTED = 65_536
 """Descriptors that the process asks the system for, as far as it may have them."""
 HEADERS_S = 20.0
-"""How long a connection may take until its first request is whole up to its body [s]."""
+"""Time within which a connection's first request must have come, up to its body [s]."""
 AT_ONCE = 64
 """So many connections are accepted before the first of them is looked at."""
 QUEUE = 2048
@@ -32,7 +32,7 @@ class BoundedConnections(HttpToolsProtocol):
     """uvicorn's protocol with an end to idle connections."""
 
     most = WANTED
-    """How many connections there may be at once."""
+    """Largest number of connections at once."""
     _late: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -50,12 +50,12 @@ class BoundedConnections(HttpToolsProtocol):
 
     @property
     def _begun(self) -> bool:
-        """Whether a first request has come, as far as its body."""
+        """Return whether a first request has come, as far as its body."""
         return getattr(self, "cycle", None) is not None
 
     @property
     def idle(self) -> bool:
-        """Whether it asks nothing now."""
+        """Return whether the connection has no request at work now."""
         return not self._begun or self.cycle.response_complete
 
     def _end_if_idle(self) -> None:

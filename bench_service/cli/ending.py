@@ -1,4 +1,4 @@
-"""The end of a process that waits: SIGTERM and SIGINT set an event, and whoever waits for it ends in order."""
+"""Orderly end of a process that waits: SIGTERM and SIGINT set an event on which the process waits."""
 
 import signal
 import threading

@@ -1,4 +1,4 @@
-"""Where lines go and how they look: one handler for ours, the HTTP server's and the job engine's.
+"""Destination and format of log lines: one handler for the service's, the HTTP server's and the job engine's.
 
 `BENCH_LOG=json` writes one JSON object a line with what it is about as fields; without it, text for a person.
 """
@@ -70,7 +70,7 @@ def _json_lines() -> logging.Formatter:
     from pythonjsonlogger.json import JsonFormatter
 
     class JsonLines(JsonFormatter):
-        """What a line is about as fields of their own, beside time, level, logger and message."""
+        """Log lines as JSON: the record's own fields, and time, level, logger and message."""
 
         def format(self, record: logging.LogRecord) -> str:
             return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", super().format(record))

@@ -1,4 +1,4 @@
-"""What a command says when it cannot do what was asked."""
+"""Exceptions of a command that cannot do its work."""
 
 
 class Refused(Exception):
@@ -6,4 +6,4 @@ class Refused(Exception):
 
 
 class Away(Refused):
-    """Nobody answers, or a proxy says so, or the service that it is not ready: it may answer again soon."""
+    """The service is away: no answer, a proxy's error, or a service that is not ready; a retry may help."""

@@ -1,4 +1,4 @@
-"""The HTTP server, in this thread or beside it."""
+"""The HTTP server, in this thread or in one of its own."""
 
 import errno
 import signal
@@ -24,14 +24,14 @@ from bench_service.wall_clock import pause
 EMBEDDED = "embedded"
 """Name that commands give to a service in their own process, which they reach over a socket file."""
 GRACE_S = 3
-"""How long open connections may take to end at shutdown [s]."""
+"""Time that open connections may take to end at shutdown [s]."""
 
 
 class _Server(uvicorn.Server):
     """uvicorn's server, with a longer queue of connections, and exit code 0 after an orderly end on SIGTERM."""
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """End in order; uvicorn itself would raise SIGTERM again afterwards, and no clean-up at exit would run."""
+        """Shut down in order on SIGTERM; uvicorn itself would raise it again, and no clean-up at exit would run."""
         if sig == signal.SIGTERM:
             self.should_exit = True
         else:
@@ -123,7 +123,7 @@ def check_port(settings: Settings) -> None:
 
 @contextmanager
 def serving(settings: Settings, drive: bool = True, socket_file: Path | None = None) -> Generator[None]:
-    """A server in a thread beside this one, answering from the first line of the block, its job engine running.
+    """Run a server in a thread of its own, answering from the first line of the block, its job engine running.
 
     Raises as `ready`, but before the block is entered.
     """

@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 ENDED = ("succeeded", "failed", "cancelled", "interrupted")
 LOOK_S = 0.1
-"""How often to look [s]."""
+"""Interval between two polls of the service [s]."""
 LOOK_TIMEOUT_S = 15.0
-"""How long one look may take [s]: a service that hangs is away too."""
+"""Longest time that one poll may take [s]: a service that hangs counts as away."""
 JOB = ("id", "procedure", "unit", "state", "verdict", "progress", "page", "result", "error")
 CAMPAIGN_RUN = ("id", "campaign", "unit", "state", "verdict", "steps", "waiting", "reason", "warnings")
-"""What commands read of a job and of a campaign's run."""
+"""Fields of a job and of a campaign's run that commands read."""
 
 
 def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict[str, Any]:
@@ -46,7 +46,7 @@ def exit_code(verdict: str | None) -> int:
 
 
 def watch_campaign(client: "httpx.Client", run: dict[str, Any], console: Console, goes_on: str) -> dict[str, Any]:
-    """Follow a campaign's run until it has ended; what it waits for is shown beside the bar.
+    """Follow a campaign's run until it has ended; the reason that it waits for is shown next to the bar.
 
     Raises `Refused` with `goes_on` where the service is away for long.
     """

@@ -14,11 +14,11 @@ from bench_service.model.errors import Misconfigured
 from procedures.bench.errors import DeviceFault, Disconnected
 
 HANG_S = 3600.0
-"""How long a device that hangs says nothing [s]: longer than anybody waits."""
+"""Time for which a hanging device gives no answer [s]: longer than any caller waits."""
 
 
 class FaultRule(BaseModel):
-    """What may happen when a verb begins."""
+    """A fault that may occur when a verb begins."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -30,7 +30,7 @@ class FaultRule(BaseModel):
     probability: float = Field(gt=0.0, le=1.0)
     """Each time that the verb begins."""
     lasts_s: float | None = Field(None, gt=0.0)
-    """Of a lost link: for how long [s, real time]; None: until a person deletes its file (see `device_cables`)."""
+    """Duration of a lost link [s, real time]; None: until a person deletes its file (see `device_cables`)."""
 
     @model_validator(mode="after")
     def _only_a_lost_link_lasts(self) -> "FaultRule":

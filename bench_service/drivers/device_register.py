@@ -1,4 +1,4 @@
-"""What real devices keep by themselves, kept for a simulated bench: their state, and a link that admits one master.
+"""Register of a simulated bench's devices: the state that real devices keep themselves, and a link for one master.
 
 A real table goes on moving when the process that commanded it dies, and can be asked afterwards. A simulated table
 dies with its process, so what was commanded last is kept in a file beside the database. The file's lock is the link:
@@ -43,7 +43,7 @@ class DeviceRegister:
             os.close(file)
 
     def open(self, by: str = "", job: str | None = None) -> "DeviceLink":
-        """Take the devices' link. Raises `DeviceBusy` naming who has it."""
+        """Open the devices' link. Raises `DeviceBusy` naming its present holder."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
@@ -72,7 +72,7 @@ class DeviceLink:
 
     @property
     def is_open(self) -> bool:
-        """Whether it still commands."""
+        """Return whether the link is still open."""
         return self._file is not None
 
     def note(self, verb: str, arguments: dict[str, Any], **changes: Any) -> None:

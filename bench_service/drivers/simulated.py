@@ -32,14 +32,14 @@ if TYPE_CHECKING:
     from simulators.world import WorldConfig
 
 RANDOM_UNIT = re.compile(r"^RANDOM-(\d{1,9})$")
-"""Serial of a unit whose truth is drawn from the number in it: as many different units as a night needs."""
+"""Serial of a unit whose truth is drawn from the number in it: as many different units as a test needs."""
 
 
 T = TypeVar("T")
 
 
 def _loaded(path: Path, load: Callable[[Path], T]) -> T:
-    """A truth file. Raises `Misconfigured` naming it."""
+    """Load a truth file. Raises `Misconfigured` naming it."""
     try:
         return load(path)
     except (OSError, ValueError, TypeError) as error:
@@ -67,8 +67,8 @@ class SimulatedDriver:
     ) -> None:
         """Without a truth file a bench of any id is the shipped one under that id: a laboratory may have several.
 
-        `register`: where the devices' state outlives this process; without one, nobody else can make them safe.
-        `asking`: a person is asked what else the simulated operator does at once.
+        `register`: keeps the devices' state beyond this process; without one, no other process can make them safe.
+        `asking`: asks a person for each action that the simulated operator would otherwise do at once.
         Raises `Misconfigured` for a truth file that cannot be used, `NotMounted` for one of another bench.
         """
         self._asking = asking
@@ -128,7 +128,7 @@ class SimulatedDriver:
         return bench
 
     def device_state(self) -> DeviceState | None:
-        """What the register holds; None without one."""
+        """Read the devices' state from the register; None without one."""
         return None if self._register is None else RegisteredDevices(self._register).device_state()
 
     def make_safe(self, by: str) -> DeviceState:

@@ -16,7 +16,7 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 def _explanation(run: CampaignRun) -> str:
-    """What a run's state means to a person."""
+    """Explain a run's state in a sentence for the page."""
     if run.waiting:
         return f"It waits: {run.waiting}."
     if run.state is JobState.QUEUED:
@@ -43,7 +43,7 @@ def campaigns_page(request: Request) -> HTMLResponse:
 
 @router.get("/campaign-runs/{run_id}")
 def campaign_run_page(run_id: str, request: Request) -> HTMLResponse:
-    """A run: its steps, what each said, what it waits for."""
+    """Page of a campaign run: its steps, their results, and the reason that it waits for."""
     run = service_of(request).stores.campaigns.run(run_id)
     missed = {step.name: [c for c in step.checks if not c.passed] for step in run.steps}
     done = sum(s.finished_at is not None or s.state is StepState.SKIPPED for s in run.steps)

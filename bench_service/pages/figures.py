@@ -1,4 +1,4 @@
-"""A `Figure` of the domain as an SVG, drawn by matplotlib. Imported beside the first answers, not before.
+"""Drawing of a `Figure` of the domain as SVG by matplotlib. Imported while the first requests are served, not before.
 
 Margins are fixed and logarithmic axes have their labels and fine grid from here: laying out and typesetting them is
 what takes matplotlib most of its time, and a static run has twenty plots.
@@ -24,7 +24,7 @@ MARGINS = {"left": 0.12, "right": 0.985, "bottom": 0.15, "top": 0.97}
 COLOURS = ("#1f5fa8", "#c2410c", "#15803d", "#7c3aed", "#a16207", "#0e7490")
 MARKS = ("o", "^", "s", "D", "v", "P")
 MOST_DECADES = 12
-"""Of a logarithmic axis: what lies further below its greatest value is not shown."""
+"""Decades that a logarithmic axis shows at most: values further below its greatest one are left out."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -34,7 +34,7 @@ _elsewhere: list[WorkProcesses] = []
 
 
 def warm_up() -> None:
-    """Load matplotlib where it draws, so that nobody waits for it at the first plot."""
+    """Load matplotlib in the processes that draw, so that the first plot is not delayed."""
     svg(SMALLEST)
 
 
@@ -44,7 +44,7 @@ def draw_in(processes: WorkProcesses | None) -> None:
 
 
 SALT = "bench"
-"""Of the names inside a drawing: drawn again, a figure is the same to the byte."""
+"""Salt of the ids inside an SVG: a figure that is drawn again is the same to the byte."""
 _DRAWING = Lock()
 """matplotlib's settings are global: two drawings at once would take each other's."""
 

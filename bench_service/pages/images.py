@@ -1,4 +1,4 @@
-"""Figures as images: a page names them, a browser fetches them one by one and keeps them.
+"""Figures as image files: a page names them, and a browser fetches them one by one and caches them.
 
 A page has each figure at hand when it is made, and puts it aside for the request that follows. Where it is not there
 any more (another process answers, many pages came between), the figure is made again from the stored result.

@@ -1,4 +1,4 @@
-"""A quantity of a unit over its results, as a chart. Knows how it is drawn; not who asks for it."""
+"""Chart of a quantity of a unit over its results. Knows how it is drawn; must not know which page shows it."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -63,7 +63,7 @@ def trend_of(service: BenchService, serial: str, choice: TrendChoice) -> TrendCh
 
 
 def trend_figure(trend: Trend) -> Figure | None:
-    """The chart: values with their uncertainty, centre, limits, and the points that break a rule; None without any."""
+    """Draw values with their uncertainty, centre, limits, and the points that break a rule; None without points."""
     if not trend.points:
         return None
     unit, size = DISPLAY.get(trend.unit, (trend.unit, 1.0))

@@ -49,7 +49,7 @@ def command_in(folder: Path) -> Command:
 
 
 def one_line(done: Done, *words: str) -> None:
-    """A refusal: exit code 2, nothing said to standard output, one line to standard error."""
+    """Require a refusal: exit code 2, nothing on standard output, one line with these words on standard error."""
     assert (done.code, done.out) == (2, ""), done.err
     assert len(done.err.strip().splitlines()) == 1, done.err
     assert done.err.startswith("bench: ")

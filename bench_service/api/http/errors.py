@@ -127,7 +127,7 @@ def install(app: FastAPI) -> None:
 
 
 class AnswerAtTheEnd:
-    """Middleware that ends the requests still at work when the server's time to end is over. Such a request may be
+    """Middleware that answers every request still at work when the server's grace period is over. Such a request may be
     repeated: what it asked for may be done or not, which its `Idempotency-Key` sorts out. A stream ends, unfinished.
     """
 
