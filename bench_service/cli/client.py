@@ -93,7 +93,7 @@ def call(client: "httpx.Client", method: str, path: str, fields: Sequence[str], 
 
 
 def answer(client: "httpx.Client", method: str, path: str, **options: Any) -> "httpx.Response":
-    """Return a good answer, whatever it holds. Raises `Refused` with the service's reason, `Away` if a retry may help."""
+    """Return a good answer, whatever it holds. Raises `Refused` with the service's reason, `Away` if it may return."""
     import httpx
 
     try:

@@ -45,7 +45,7 @@ class DeviceCables:
             raise Disconnected(f"the {device} cannot be reached: its link is lost{why}")
 
     def _lost(self, path: Path) -> tuple[datetime | None, str] | None:
-        """Read the end of the loss (None: for good) and its reason; None without a file. One made by hand may be empty."""
+        """Read the loss's end (None: for good) and its reason; None without a file. A handmade file may be empty."""
         try:
             text = path.read_text(encoding="utf-8")
         except FileNotFoundError:

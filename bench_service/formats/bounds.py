@@ -1,4 +1,4 @@
-"""How much a file may demand before it is refused: lines, columns, numbers, unpacked bytes, memory and time.
+"""Limits on the resources that a file may demand: lines, columns, numbers, unpacked bytes, memory and time.
 
 Compressed formats give a small file room to ask for a thousand times its size, so every bound is checked before the
 bytes are made. Must not know formats or processes.

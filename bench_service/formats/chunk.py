@@ -19,10 +19,10 @@ RAW_BYTES = 2 * 1024 * 1024
 """Raw size of a full chunk: the payload stays under a megabyte for noise up to 10 bits, and decodes in milliseconds."""
 
 SampleType = np.dtype[np.int32] | np.dtype[np.float64]
-"""What a sample may be: counts, or values that a unit computed itself."""
+"""Type of a sample: counts, or values that a unit computed itself."""
 
 ENCODINGS = {"int32": "DELTA_BINARY_PACKED", "float64": "BYTE_STREAM_SPLIT"}
-"""How Parquet lays out a column, by the type of the samples."""
+"""Parquet encoding of a column, by the type of the samples."""
 
 
 class UnreadableChunk(Exception):
@@ -31,7 +31,7 @@ class UnreadableChunk(Exception):
 
 @dataclass(frozen=True)
 class ChunkPlace:
-    """What a chunk says of itself: whose samples, from which one on, at which rate."""
+    """Metadata of a chunk: its recording, its first sample and its rate."""
 
     recording_id: str
     start: int
@@ -44,7 +44,7 @@ def sample_type(name: str) -> SampleType:
 
 
 def rows_per_chunk(channels: int, dtype: SampleType) -> int:
-    """How many samples of each channel fill a chunk."""
+    """Number of samples of each channel that fill a chunk."""
     return max(1, RAW_BYTES // (channels * dtype.itemsize))
 
 

@@ -63,7 +63,7 @@ def _slowly(texts: Sequence[str | None], fraction: Fraction) -> list[int]:
 
 
 def _one(match: re.Match[str], fraction: Fraction) -> int:
-    """One time [ns]. Raises `ValueError` for a day that no calendar has."""
+    """Convert one time text [ns]. Raises `ValueError` for a day that no calendar has."""
     year, month, day, hour, minute, second, digits, sign, offset_h, offset_min = match.groups()
     days = date(int(year), int(month), int(day)).toordinal() - _EPOCH if year else 0
     seconds = days * 86_400 + int(hour or 0) * 3600 + int(minute) * 60 + int(second)

@@ -1,4 +1,4 @@
-"""The hash that names what a recording says, however it is cut, compressed or stored.
+"""Hash that names the content of a recording, however it is cut, compressed or stored.
 
 SHA-256 over one JSON line that describes rate, sample type and channels (name, quantity, unit, scale, offset), and then
 the samples, little-endian, row by row. Must not know chunks, files or databases.
@@ -32,7 +32,7 @@ class ContentHash:
         self._sha.update(np.ascontiguousarray(samples, dtype=self._dtype).tobytes())
 
     def copy(self) -> "ContentHash":
-        """An independent continuation."""
+        """Return an independent continuation of the hash."""
         twin = object.__new__(ContentHash)
         twin._dtype = self._dtype
         twin._sha = self._sha.copy()

@@ -25,7 +25,7 @@ from procedures.core.arrays import Array
 _BLOCK_BYTES = 4 * 1024 * 1024
 _BLANKS = re.compile(rb"[ \t]+")
 _MARGINS = re.compile(rb"(?m)^\t|\t(?=\r?$)")
-"""Tabs at the ends of lines, in a text whose blanks are single tabs: on blanks it would take their square."""
+"""Tabs at the ends of lines, in a text with single tabs: on spaces this pattern would take quadratic time."""
 
 
 class _NotANumber(Exception):
@@ -76,7 +76,7 @@ class _Reader:
         return Block(None if self._time is None else self._times(parsed.column(self._time)), values)
 
     def _parsed(self, text: bytes) -> Any:
-        """Arrow's table; a time column that holds integers stays so, until a piece has another number in it."""
+        """Parse text into Arrow's table; a time column of integers stays so until a piece has another number in it."""
         try:
             return self._read(text)
         except pa.ArrowInvalid:
@@ -134,5 +134,5 @@ def _pieces(table: TextTable, description: ImportDescription) -> Iterator[tuple[
 
 
 def _short(error: Exception) -> str:
-    """The beginning of what Arrow says: it repeats the line."""
+    """Shorten Arrow's message to its beginning: it repeats the line."""
     return str(error)[:200]

@@ -39,7 +39,7 @@ class _Strict(BaseModel):
 
 
 class ImportedChannel(_Strict):
-    """One channel: where it stands in the files, and what it means. ``value = scale·(raw − offset)`` in `unit`."""
+    """One channel: its column in the files, and its meaning. ``value = scale·(raw − offset)`` in `unit`."""
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,63}$", description="e.g. gyro_x")
     column: Column | None = Field(None, description="name, or index from 0; None: the column of the channel's name")
@@ -63,7 +63,7 @@ class ImportedChannel(_Strict):
 
     @property
     def is_accumulated(self) -> bool:
-        """Whether the steps of the column are stored, not its values."""
+        """Return whether the column's increments are stored, not its values."""
         return isinstance(self.quantity, Accumulated)
 
     def channel(self) -> Channel:

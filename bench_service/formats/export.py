@@ -21,7 +21,7 @@ from procedures.core.recording import RawArray, RecordingInfo
 
 
 class ExportFormat(StrEnum):
-    """How a recording goes out."""
+    """File format of an exported recording."""
 
     ARROW = "arrow"
     PARQUET = "parquet"
@@ -29,7 +29,7 @@ class ExportFormat(StrEnum):
 
     @property
     def media_type(self) -> str:
-        """What HTTP calls it."""
+        """Return the format's media type for HTTP."""
         return {
             "arrow": "application/vnd.apache.arrow.stream",
             "parquet": "application/vnd.apache.parquet",
@@ -42,11 +42,11 @@ class Extract:
     """A part of a recording: some channels, samples start…stop (half open)."""
 
     info: RecordingInfo
-    """Of the whole recording, its channels those that go out."""
+    """Description of the whole recording, its channels limited to the exported ones."""
     start: int
     stop: int
     dtype: str
-    """"int32" or "float64"."""
+    """Sample type, "int32" or "float64"."""
 
 
 def extract(
@@ -100,7 +100,7 @@ class _Outbox:
         return len(data)
 
     def flush(self) -> None:
-        """Nothing waits."""
+        """Flush nothing: no data are buffered."""
 
     def close(self) -> None:
         self.closed = True
@@ -112,7 +112,7 @@ class _Outbox:
 
 
 def describe(part: Extract) -> dict[str, str]:
-    """What a reader of the file must know of the recording, as text."""
+    """Describe the recording for the reader of the file, as text."""
     info = part.info
     return {
         "recording": info.id,

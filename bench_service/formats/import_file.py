@@ -31,7 +31,7 @@ _NO_ROWS = np.empty(0, np.int64)
 
 @dataclass(frozen=True)
 class ImportFile:
-    """A file: its name for messages, and a stream that can be read from the beginning again and again."""
+    """A file to import: its name for messages, and a stream that can be read repeatedly from the beginning."""
 
     name: str
     stream: BinaryIO = field(repr=False)

@@ -29,7 +29,7 @@ class Findings:
     dtype: type[np.int32] | type[np.float64]
     """Integers where all values are."""
     clock: ClockFindings | None
-    """None: there is no time column."""
+    """Findings about the time column; None: there is none."""
     warnings: tuple[str, ...]
 
 
@@ -99,7 +99,7 @@ class Survey:
             )
 
     def _are_counts(self, values: Array) -> bool:
-        """Whether all values are whole numbers; notes the first that does not fit."""
+        """Return whether all values are whole numbers; notes the first that does not fit."""
         rows = values[1:] if self._increments.columns and not self._count else values
         if not np.array_equal(rows, np.rint(rows)):
             return False

@@ -25,7 +25,7 @@ def first_fault(
     indices: Sequence[int],
     description: ImportDescription,
 ) -> str | None:
-    """The fault of the first bad line of a piece whose first line has that number; None: nothing is seen."""
+    """Describe the fault in the first bad line of a piece; `first_line` numbers its first line; None: none is found."""
     for number, line in enumerate(text.splitlines(keepends=True), first_line):
         if len(line) > LINE_BYTES:
             raise too_long(table.name, number)

@@ -92,7 +92,7 @@ class TextSource:
 
     @property
     def is_over(self) -> bool:
-        """Whether all that remains is at hand."""
+        """Return whether all remaining text is in memory."""
         return self._ended
 
     def line(self, number: int) -> bytes:
@@ -122,7 +122,7 @@ def too_long(name: str, number: int) -> UnreadableFile:
 
 
 def _encoding(start: bytes) -> str | None:
-    """UTF-16 by its mark, or by every second byte being nought; None: text whose delimiters are bytes."""
+    """Detect UTF-16 by its mark, or by every second byte being zero; None: text whose delimiters are bytes."""
     if start[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
         return "utf-16"
     sample = start[:512]

@@ -94,7 +94,7 @@ class TextTable:
         return [line + b"\n" for line in lines] if any(lines) else []
 
     def _comments(self, lines: Sequence[bytes], rows: Sequence[list[bytes]], header: bool) -> int:
-        """How many lines at the beginning are comments; the last of them may be the names."""
+        """Count the comment lines at the beginning; the last of them may be the names."""
         count = 0
         while count < len(lines) and lines[count][:1] in (b"#", b"%"):
             count += 1
@@ -142,7 +142,7 @@ class TextTable:
         )
 
     def indices(self, columns: Sequence[Column]) -> list[int]:
-        """Where the columns stand. Raises `UnreadableFile`."""
+        """Find the indices of the columns. Raises `UnreadableFile`."""
         present = listed(self.names) if self.names else f"0 … {self.width - 1}"
         found: list[int] = []
         for column in columns:
@@ -208,7 +208,7 @@ def _name(cell: bytes) -> str:
 
 
 def _same(name: str, wanted: str) -> bool:
-    """Whether a column is the one that is asked for: # and % before the first of the names do not belong to it."""
+    """Return whether a column has the requested name: # and % before the first of the names do not belong to it."""
     return name == wanted or name.lstrip(MARKERS + " \t") == wanted.strip().lstrip(MARKERS + " \t") != ""
 
 

@@ -1,4 +1,4 @@
-"""Memory in SQL: SQLite on one machine, Postgres for many, the same code. Knows no HTTP and no job engine.
+"""Stores in SQL: SQLite on one machine, Postgres for many, the same code. Knows no HTTP and no job engine.
 
 `open_stores` is the way in; `acquire_lease` is the right to drive a bench. Every error of the database leaves here as
 `StorageFull` or `StorageFailure`. A supervisor takes lease and database alone: what stores load, it does without.

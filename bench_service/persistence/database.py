@@ -25,9 +25,9 @@ from bench_service.formats.plain_json import read_back
 from bench_service.model.errors import StorageFailure, StorageFull, UnfitValue
 
 BUSY_S = 30.0
-"""How long a writer waits for another one."""
+"""Longest time that a writer waits for another one [s]."""
 LEAVE_S = 1.0
-"""How long the end waits for connections that are in use [s]."""
+"""Longest time that `dispose` waits for connections that are in use [s]."""
 TCP = {
     "connect_timeout": 10,
     "keepalives_idle": 5,
@@ -52,7 +52,7 @@ class Conflict(StorageFailure):
 
 
 class Database:
-    """One database: short reading and writing transactions, with its errors in our words."""
+    """Short reading and writing transactions of one database, with its errors as `StorageFull` or `StorageFailure`."""
 
     def __init__(self, engine: Engine) -> None:
         self.engine = engine
@@ -62,7 +62,7 @@ class Database:
 
     @contextmanager
     def read(self) -> Generator[Session, None, None]:
-        """Reads only. On SQLite all of them see one moment; on Postgres each statement sees its own."""
+        """Open a reading transaction. On SQLite all its reads see one moment; on Postgres each statement its own."""
         with storage_errors(), Session(self._reading_engine) as session:
             yield session
 
@@ -78,17 +78,17 @@ class Database:
                 tell(subject)
 
     def on_news(self, tell: Callable[[str], None]) -> None:
-        """From now on call `tell` after each commit with every subject that was announced in it; it may not raise."""
+        """Register `tell`, called after each commit with every subject that was announced in it; it may not raise."""
         self._tell.append(tell)
 
     @contextmanager
     def write_connection(self) -> Generator[Connection, None, None]:
-        """The same for work below the tables: migrations."""
+        """Open a writing transaction below the tables, for migrations."""
         with storage_errors(), self._writing_engine.begin() as connection:
             yield connection
 
     def one_at_a_time(self, session: Session, what: str) -> None:
-        """In a writing transaction: go on only once no other one that said the same words is open.
+        """Wait in a writing transaction until no other one with the same `what` is open.
 
         On SQLite writers queue for the whole database anyway.
         """
@@ -106,7 +106,7 @@ class Database:
         return self.engine.dialect.name == "postgresql"
 
     def dispose(self) -> None:
-        """Close all connections; one that a thread still reads over is waited for, as nobody would close it later."""
+        """Close all connections; wait for those that a thread still reads over, since no one would close them later."""
         pool, deadline = self.engine.pool, wall_clock.monotonic_s() + LEAVE_S
         while isinstance(pool, QueuePool) and pool.checkedout() > 0 and wall_clock.monotonic_s() < deadline:
             wall_clock.pause(0.01)
@@ -114,7 +114,7 @@ class Database:
 
 
 def announce(session: Session, subject: str) -> None:
-    """Once this writing transaction is committed, who wants to know is told of a subject: see `Database.on_news`."""
+    """Announce a subject to the listeners of `Database.on_news` once this writing transaction is committed."""
     session.info[_NEWS].append(subject)
 
 
@@ -218,7 +218,7 @@ def as_storage_error(error: Exception) -> Exception:
 
 
 def is_full(error: BaseException | None) -> bool:
-    """Whether a driver's error says that there is no room left."""
+    """Return whether a driver's error means that there is no room left."""
     if isinstance(error, sqlite3.Error):
         code = getattr(error, "sqlite_errorcode", 0)
         return code in _SQLITE_FULL or code & 0xFF == sqlite3.SQLITE_FULL

@@ -14,11 +14,11 @@ from bench_service.persistence.tables.jobs import IdempotencyKeyRow
 T = TypeVar("T")
 
 _RIVALS = 32
-"""Each conflict means that some rival committed, so who has this many rivals at once still comes through."""
+"""Number of retries. Each conflict means that a rival committed, so a process with this many rivals still succeeds."""
 
 
 class SqlKeyStore:
-    """`bench_service.jobs.stores.KeyStore`."""
+    """SQL implementation of `bench_service.jobs.stores.KeyStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -54,7 +54,7 @@ def remember(session: Session, idempotency: Idempotency | None, kind: str, made_
 
 
 def again_after_conflict(work: Callable[[], T]) -> T:
-    """Do a transaction; where a rival won the race, do it again, now seeing what the rival made."""
+    """Retry a transaction after each conflict; the retry sees the row that the rival made."""
     for _ in range(_RIVALS):
         try:
             return work()

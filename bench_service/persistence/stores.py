@@ -1,4 +1,4 @@
-"""Putting the stores together: one database, all stores. Must not know who uses them."""
+"""Construction of the stores: one database, all stores. Must not know their callers."""
 
 from bench_service.campaigns.stores import Stores
 from bench_service.persistence.bench.live_store import SqlLiveStore

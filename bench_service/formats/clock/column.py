@@ -23,7 +23,7 @@ WRAPS_S = {
     "a week": 604800.0,
     "2^32 ms": 2.0**32 * 1e-3,
 }
-"""Where counters and clocks begin again, shortest first [s]."""
+"""Periods after which counters and clocks begin again, shortest first [s]."""
 WRAP_STEPS = 50.0
 """A fall is a wrap where the step that remains is no longer than so many usual ones."""
 REPEATS_KEPT = 4_000_000
@@ -57,14 +57,14 @@ class ClockColumn:
     fall_count: int = 0
     wraps: list[Fall] = field(default_factory=list[Fall])
     still: int = 0
-    """Steps of zero."""
+    """Number of steps whose length is zero."""
     resolution: Resolution = field(default_factory=Resolution)
     largest: float = 0.0
     """Largest stamp without its sign, in the column's unit."""
     first: int | float = 0
     typical_s: float | None = None
     same: int = 0
-    """Rows whose channels equal those of the row before, whatever their time."""
+    """Number of rows whose channels equal those of the row before, whatever their time."""
     _carried_s: float = 0.0
     _last_s: float = 0.0
     _last_raw: int | float = 0
@@ -73,7 +73,7 @@ class ClockColumn:
     _times: SpooledTemporaryFile[bytes] = field(default_factory=lambda: SpooledTemporaryFile(IN_MEMORY_BYTES))  # noqa: SIM115  closed by `close`
 
     def add(self, stamps: Stamps, same: NDArray[np.bool_]) -> None:
-        """The next rows: their stamps in the column's unit, and whether the channels of each equal the row before's."""
+        """Add the next rows: their stamps in the column's unit, and whether each row's channels equal the row before's."""
         if not self.count:
             self.first = stamps[0].item()
         time_s = self._relative(stamps)
@@ -111,7 +111,7 @@ class ClockColumn:
         return units * self.scale_s + self._carried_s
 
     def _fall(self, falls: NDArray[np.intp], steps: Array, stamps: Stamps, row: int, time_s: Array) -> None:
-        """Note falls; those that are wraps are carried on where that is wanted, in place."""
+        """Record the falls of the stamps; continue those that are wraps where that is wanted, in place."""
         shift = len(steps) - len(time_s)  # −1 in the first block, whose first stamp has no step
         carried = np.zeros(len(time_s))
         looked_at = falls[: max(0, FALLS_LOOKED_AT - self.fall_count)]

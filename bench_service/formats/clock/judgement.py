@@ -34,10 +34,10 @@ class ClockFindings:
     gaps: NDArray[np.int64]
     """Rows, from 0 in what is read, after which samples are lost."""
     lost: NDArray[np.int64]
-    """How many, for each of `gaps`."""
+    """Number of lost samples for each of `gaps`."""
     warnings: tuple[str, ...]
     document: dict[str, Any]
-    """The same as JSON, to be kept with the recording."""
+    """The findings as JSON, to be kept with the recording."""
 
 
 def judge(name: str, column: ClockColumn, description: ImportDescription, column_name: str) -> ClockFindings:

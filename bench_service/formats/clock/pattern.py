@@ -1,4 +1,4 @@
-"""How the stamps of a recording come: at the sample period, coarsely, with rows lost, or as they arrived, in batches.
+"""Pattern of the stamps of a recording: at the sample period, coarse, with rows lost, or as they arrived, in batches.
 
 Model: the stamp of sample k is ``t_k = t_0 + k·P + e_k``. A coarse clock has ``|e_k|`` within its resolution, a late
 arrival ``e_k ≥ 0`` that returns to nought, and a lost row raises k for good. A median of the steps knows neither.
@@ -31,7 +31,7 @@ LONG_AND_SHORT = 0.004
 MOST = 0.75
 """Quantile of the chunks' bands that is taken as the usual one."""
 SHARED = 1.5
-"""Periods: a resolution beyond them makes rows share stamps, and in regular batches is taken as those."""
+"""Resolution in periods beyond which rows share stamps, which counts as batches where they are regular."""
 CLEAN = 0.002
 """Share of shorter steps that speaks against lost rows where the clock resolves only a step or two of its own."""
 REGULAR = 0.9
@@ -40,10 +40,10 @@ REGULAR = 0.9
 
 @dataclass(frozen=True)
 class Pattern:
-    """How the stamps come."""
+    """Pattern in which the stamps of a recording come."""
 
     kind: Literal["steady", "coarse", "batches", "jitter"]
-    """steady: at the period; coarse: up to the clock's resolution; batches and jitter: as they arrived."""
+    """The kind of pattern. steady: at the period; coarse: up to the resolution; batches, jitter: as they arrived."""
     period_s: float
     band_s: float
     """By how much stamps lie off their places, largest less smallest, over rows without a loss."""
@@ -52,7 +52,7 @@ class Pattern:
     span: int = 1
     """Rows within which one is on time."""
     usual_band_s: float = 0.0
-    """The same as `band_s` over most rows, where stamps come as they arrived."""
+    """Band like `band_s`, but over most rows, where stamps come as they arrived."""
 
 
 def find_pattern(
@@ -90,7 +90,7 @@ def find_pattern(
 
 
 def _expected(one_s: float, other_s: float, declared_s: float | None) -> bool:
-    """Whether the declared period speaks for one of two."""
+    """Return whether the declared period agrees with the first of two periods and not with the other."""
     if declared_s is None:
         return False
     return abs(one_s / declared_s - 1.0) < 0.05 and abs(other_s / declared_s - 1.0) >= 0.05
@@ -175,7 +175,7 @@ def _lines(times: Array) -> tuple[Array, Array]:
 
 
 def _is_lattice(steps: Array, base_s: float, tolerance: float, resolution_s: float) -> bool:
-    """Whether steps are whole multiples of a base, one of them itself most often."""
+    """Return whether steps are whole multiples of a base, and the base itself the most frequent of them."""
     if 3.0 * resolution_s > base_s and np.mean(steps < (1.0 - tolerance) * base_s) > CLEAN:
         return False
     multiples = np.rint(steps / base_s)
@@ -184,7 +184,7 @@ def _is_lattice(steps: Array, base_s: float, tolerance: float, resolution_s: flo
 
 
 def _batch(steps: Array, mean_s: float) -> int:
-    """How many rows come together, by the usual distance of long steps; 1: no order is to be seen."""
+    """Number of rows that come together, by the usual distance of long steps; 1: no order is visible."""
     long = np.flatnonzero(steps > 1.25 * mean_s)
     if len(long) < 4:
         return 1

@@ -117,7 +117,7 @@ class Sentences:
         ]
 
     def not_uniform(self) -> str:
-        """The stretch whose rate differs most from that of the whole."""
+        """Describe the stretch whose rate differs most from that of the whole."""
         begin, samples, duration, allowed = self.mean.worst
         row = self._row(int(self.kept.row(np.array([begin]))[0]))
         return (

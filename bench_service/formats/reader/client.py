@@ -116,7 +116,7 @@ class FileReader:
         self._places = threading.BoundedSemaphore(AT_ONCE)
 
     def close(self) -> None:
-        """End the host; a reading that is under way ends as it would."""
+        """Stop the host process; a reading that is under way ends as it would."""
         with self._lock:
             self._end_host()
 
@@ -227,7 +227,7 @@ class _Line:
             raise NoReader(f"the process that reads files is gone: {error}") from error
 
     def frame(self) -> tuple[bytes, bytes]:
-        """The next frame; what the child refuses is raised."""
+        """Receive the next frame; raise the refusal that the child sent."""
         self._budget.begin()
         try:
             kind, payload = receive(self._line, self._budget.before_wait)

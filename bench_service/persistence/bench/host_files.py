@@ -1,6 +1,6 @@
-"""What processes of one host tell one another about a bench: who drives it, and who supervises it.
+"""Files by which processes of one host know which of them drives and which supervises a bench.
 
-Two small files beside the devices' register. Must not know what is driven.
+Two small files for each bench, next to the devices' register. Must not know what is driven.
 """
 
 import fcntl
@@ -14,7 +14,7 @@ from bench_service.model.errors import BenchBusy
 
 
 class HostFiles:
-    """`bench_service.bench.processes.Watch`, and how a process says that it drives or supervises."""
+    """Marks this process as driver or supervisor of a bench, and implements `bench_service.bench.processes.Watch`."""
 
     def __init__(self, folder: Path, bench_id: str) -> None:
         self._bench_id = bench_id

@@ -1,6 +1,6 @@
 """The right to drive a bench: one process at a time, held for its life, and free again the moment it dies.
 
-On SQLite it is a lock on a file beside the database (the kernel drops it with the process); on Postgres an advisory
+On SQLite it is a lock on a file next to the database (the kernel drops it with the process); on Postgres an advisory
 lock of a connection that is used for nothing else (the server drops it with the connection). Must not know what is
 driven.
 """
@@ -24,7 +24,7 @@ from bench_service.model.errors import BenchBusy
 from bench_service.persistence.database import TCP, Database, storage_errors
 
 PASSING_S = 5.0
-"""How long a process that starts waits for a supervisor that makes the bench safe at this moment [s]."""
+"""Time for which a process that starts waits for a supervisor that is just making the bench safe [s]."""
 SUPERVISOR = "supervisor"
 
 
@@ -32,16 +32,16 @@ class BenchLease(ABC):
     """The right to drive a bench, held for a process's life, and whether it is still ours."""
 
     def __init__(self, bench_id: str, role: str) -> None:
-        """Take the bench. Raises `BenchBusy`."""
+        """Take the lease of the bench. Raises `BenchBusy`."""
         self._bench_id = bench_id
         self._role = role
         self._mutex = threading.Lock()
         self._given_back = False
         self._right: Any = self._take()
-        """That by which it is held, an open file or a connection; None: nothing."""
+        """The open file or the connection that holds the lease; None: nothing."""
 
     def held(self) -> bool:
-        """Whether the bench is still ours."""
+        """Return whether this process still holds the lease of the bench."""
         with self._mutex:
             return self._right is not None and self._is_ours(self._right)
 
@@ -121,7 +121,7 @@ class FileLease(BenchLease):
         super().__init__(bench_id, role)
 
     def _is_ours(self, right: int) -> bool:
-        """Whether the locked file is still the one that others would lock."""
+        """Return whether the locked file is still the one that other processes would lock."""
         try:
             there = self._path.stat()
         except OSError:
@@ -197,7 +197,7 @@ class ServerLease(BenchLease):
 
 
 def lease_holder(database: Database, database_url: str, bench_id: str) -> str | None:
-    """Who drives a bench now, in a person's words; None: nobody, or only a supervisor that makes it safe.
+    """Name the process that drives a bench now, for a person; None: none, or only a supervisor that makes it safe.
 
     On SQLite the lock is tried for a moment in its shared form, which a process that starts meanwhile waits out.
     """
@@ -224,7 +224,7 @@ def _worker(holder: str | None) -> str | None:
 
 
 def _busy(bench_id: str, who: str | None) -> BenchBusy:
-    """For example: bench 'sim' is driven by process 4711."""
+    """Build the refusal of a lease, for example: bench 'sim' is driven by process 4711."""
     named = who or "another process"
     return BenchBusy(f"bench {bench_id!r} is driven by {named}", passing=f"{SUPERVISOR} " in named)
 
@@ -235,7 +235,7 @@ def lease_key(bench_id: str) -> int:
 
 
 def holder(connection: Connection | Session, key: int) -> str | None:
-    """Who has an advisory lock, in the words of its connection; None where nobody has it."""
+    """Return the holder of an advisory lock, by its connection's application name; None where the lock is free."""
     query = text(
         "SELECT a.application_name FROM pg_locks l JOIN pg_stat_activity a ON a.pid = l.pid "
         "WHERE l.locktype = 'advisory' AND l.granted AND l.objsubid = 1 "

@@ -24,7 +24,7 @@ _FIELDS = tuple(column.key for column in BenchStopRow.__table__.columns)
 
 
 class SqlBenchRegistry:
-    """`bench_service.bench.registry.BenchRegistry`."""
+    """SQL implementation of `bench_service.bench.registry.BenchRegistry`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

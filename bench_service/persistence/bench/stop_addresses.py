@@ -1,6 +1,6 @@
-"""Where the supervisors of benches listen for stops, in the benches' own rows.
+"""Addresses where the supervisors of benches listen for stops, kept in the benches' own rows.
 
-A bench that is registered anew loses it; its supervisor says it again with its next look.
+A bench that is registered anew loses its address; its supervisor writes it again at its next poll.
 """
 
 from sqlalchemy import select
@@ -19,7 +19,7 @@ class SqlStopAddresses:
         self._database = database
 
     def all(self) -> dict[str, Listening]:
-        """By bench; without those whose supervisor has said none. Raises `StorageFailure`."""
+        """Return the addresses by bench; benches without one are left out. Raises `StorageFailure`."""
         with self._database.read() as session:
             rows = session.execute(select(BenchRow.id, BenchRow.document)).all()
         return {name: Listening(**document[KEY]) for name, document in rows if KEY in document}

@@ -20,7 +20,7 @@ def station_of_row(row: RecordingRow) -> Station | None:
 
 
 def info_of_row(row: RecordingRow) -> RecordingInfo:
-    """What a recording is, from its row."""
+    """Read the description of a recording from its row."""
     return copied(
         RecordingInfo,
         row,

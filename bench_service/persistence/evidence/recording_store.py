@@ -1,4 +1,4 @@
-"""Raw samples in SQL: rows that say what a recording is, chunks that hold it. Must not know who records, or why."""
+"""Raw samples in SQL: rows that describe a recording, chunks that hold it. Must not know which job records, or why."""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -47,7 +47,7 @@ class StoredSamples:
 
 
 class SqlRecordingStore:
-    """`bench_service.jobs.stores.RecordingStore`."""
+    """SQL implementation of `bench_service.jobs.stores.RecordingStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -82,7 +82,7 @@ class SqlRecordingStore:
     def read(
         self, recording_id: str, channels: Sequence[str] | None, start: int, stop: int
     ) -> Iterator[NDArray[np.int32] | NDArray[np.float64]]:
-        """See the port; `start` and `stop` beyond the ends are taken as the ends."""
+        """Read samples, see the port; `start` and `stop` beyond the ends are taken as the ends."""
         with self._database.read() as session:
             row = _found(session, recording_id)
             info = info_of_row(row)
@@ -124,7 +124,7 @@ class SqlRecordingStore:
     def _interrupt(self, recording_id: str) -> None:
         """Close a recording whose writer is gone; the hash is made from the chunks, the writer took its own along.
 
-        One that is damaged has none: that must not keep its job from ending.
+        A damaged recording gets no hash: the damage must not keep its job from ending.
         """
         with self._database.read() as session:
             row = _found(session, recording_id, with_open=True)

@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 
 
 class SqlRecordingWriter:
-    """`bench_service.jobs.stores.RecordingWriter`. Its memory is one chunk, however long the recording."""
+    """SQL implementation of `bench_service.jobs.stores.RecordingWriter`. It holds one chunk in memory at most."""
 
     def __init__(self, database: Database, new: NewRecording) -> None:
         _check(new)
@@ -96,7 +96,7 @@ class SqlRecordingWriter:
         return self._sealed
 
     def abandon(self) -> None:
-        """End without sealing. Does not raise: it is called when something failed already."""
+        """Close the recording without sealing it. Does not raise: it is called when something failed already."""
         if self._sealed is not None:
             return
         self._closed = True

@@ -1,4 +1,4 @@
-"""Changes of a job's row inside a transaction that somebody else began: its state, and the event that tells of it."""
+"""Changes of a job's row inside a transaction that the caller began: its state, and the event that records it."""
 
 from datetime import datetime
 from typing import Any
@@ -24,7 +24,7 @@ _NEWEST = (
 )
 _APPEND = insert(_EVENTS)
 CLOCKS_DIFFER_S = 5.0
-"""Clocks of several hosts may differ by this much and nobody set one back [s]."""
+"""Difference up to which clocks of several hosts may disagree without a clock having been set back [s]."""
 
 
 def found_job(session: Session, job_id: str, *, lock: bool = False) -> JobRow:
@@ -72,9 +72,9 @@ def move_job(
 
 
 def append_event(session: Session, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
-    """Add the next event of a job whose row is locked.
+    """Append the next event of a job whose row is locked.
 
-    Its time is what the clock said. Where that is before the event before it, the event says by how much: the order of
+    Its time is the clock's. Where that is before the event before it, the event records by how much: the order of
     events is that of their sequence.
     """
     sequence, before = session.execute(_NEWEST, {"job": job_id}).first() or (0, at)

@@ -1,4 +1,4 @@
-"""Reservations in SQL. Of two who want the same thing at once, one gets it: they take turns."""
+"""Reservations in SQL. Transactions for the same bench or unit take turns, so only one of two rivals gets it."""
 
 from datetime import datetime
 
@@ -22,7 +22,7 @@ _ACTIVE = (
 
 
 class SqlReservationStore:
-    """`bench_service.jobs.reservation.ReservationStore`."""
+    """SQL implementation of `bench_service.jobs.reservation.ReservationStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

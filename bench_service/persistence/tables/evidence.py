@@ -1,4 +1,4 @@
-"""Tables of evidence: units, recordings with their chunks, results, calibrations, corrections, and lineage."""
+"""SQL tables of evidence: units, recordings with their chunks, results, calibrations, corrections, and lineage."""
 
 from datetime import datetime
 from typing import Any
