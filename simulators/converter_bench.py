@@ -1,4 +1,4 @@
-"""The converter's bench: how source, converter, chamber and supply are wired; knows none of their physics."""
+"""Bench of the converter alone: how source, converter, chamber and supply are wired; knows none of their physics."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""How the unit's outputs follow the temperatures of its parts: pure functions of the nodes.
+"""Response of the unit's outputs to the temperatures of its parts: pure functions of the nodes.
 
 Everything is a departure from what the unit is with all nodes at `REFERENCE_C`. Written without sight of the inverse
 that the analysis uses.
@@ -28,7 +28,7 @@ MA_PER_NOMINAL = CURRENT_MA_PER_G / units.STANDARD_GRAVITY
 
 @dataclass(frozen=True)
 class Response:
-    """What temperature does to the three accelerometer and three gyro channels, each (n, 3).
+    """Response of the three accelerometer and three gyro channels to temperature, each (n, 3).
 
     Nominal accelerometer output of a bias b and a through-put a = (K·f)_i [m/s²]:
     ``U = converter_gain·(b + sensor_gain·a + sensor_added) + converter_added``; of a gyro ``U + gyro_added``.
@@ -81,7 +81,7 @@ def converter_codes(truth: ConverterTruth, current_ma: Array, board_c: Array) ->
 
 
 def gyros(truth: GyroThermalTruth, temperatures_c: Array) -> Array:
-    """What a failing perimeter control lets through, (n, 3) [rad/s]; zero for a healthy one."""
+    """Residue that a failing perimeter control lets through, (n, 3) [rad/s]; zero for a healthy one."""
     return np.array(truth.fault_residue_rad_s_c) * (temperatures_c[:, GYRO] - REFERENCE_C)
 
 

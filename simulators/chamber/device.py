@@ -1,7 +1,7 @@
-"""The chamber's port, and the unit's heat and thermometers beside it: implements `procedures.bench.chamber.Chamber`.
+"""Chamber device with the unit's heat and thermometers: implements `procedures.bench.chamber.Chamber`.
 
-Knows the bench's clock only as a number of ticks that pass. Temperatures are made once a second; what the unit's
-outputs make of them, and what its sensors sent, hold from the end of that second to the end of the next.
+Knows the bench's clock only as a number of ticks that pass. Temperatures are made once a second; their effect on the
+unit's outputs, and the codes of its sensors, hold from the end of that second to the end of the next.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from simulators.truth.thermal import NODES, ChamberFault, ChamberTruth, UnitTher
 
 @dataclass(frozen=True)
 class Warmth:
-    """What some ticks did: temperatures and codes of every whole second that ended within them."""
+    """Thermal outcome of some ticks: temperatures and codes of every whole second that ended within them."""
 
     temperatures_c: Array
     """(n, 8) in the order of `NODES`."""
@@ -50,7 +50,7 @@ class SimChamber:
         faults: tuple[ChamberFault, ...] = (),
         limits: ChamberLimits | None = None,
     ) -> None:
-        """`rate_hz`: ticks of the clock in a second; `now_s`: bench time; `limits`: None: all that the truth allows."""
+        """Build the device. `rate_hz`: ticks in a second; `now_s`: bench time; `limits`: None: the truth's own."""
         self.truth, self.unit = chamber, unit
         self.plant = ChamberPlant(chamber, unit.network, seed)
         self.thermometers = Thermometers(unit.thermometers, seed, chamber.ambient_c)
@@ -79,14 +79,14 @@ class SimChamber:
         self.plant.command(temperature_c, ramp_c_min / 60.0)
 
     async def read(self) -> ChamberReading:
-        """What the chamber says of itself; see the port."""
+        """Read the chamber's own report of its state; see the port."""
         self._need_link()
         s = self.plant.state
         set_point = s.control_reading_c if s.target_c is None else s.set_point_c
         return ChamberReading(self._now_s(), s.control_reading_c, set_point, s.target_c, s.door_open, s.tripped)
 
     async def make_safe(self) -> None:
-        """To ambient; a chamber that has tripped or stands open stays off."""
+        """Lead the chamber to ambient; a chamber that has tripped or stands open stays off."""
         self._need_link()
         if not (self.plant.state.tripped or self.plant.state.door_open):
             self.plant.command(self._limits.ambient_c, self._limits.ramp_c_min / 60.0)
@@ -96,7 +96,7 @@ class SimChamber:
         self.plant.state.unit_on = on
 
     def set_door(self, is_open: bool) -> None:
-        """What a person does, for instance to turn the unit over between two runs. Open, the plant stops."""
+        """Open or close the door, as a person does to turn the unit over between two runs. Open, the plant stops."""
         self.plant.state.door_open = is_open
         if is_open:
             self.plant.switch_off()
@@ -133,12 +133,12 @@ class SimChamber:
                 self.plant.fail(fault.name)
 
     def response(self, temperatures_c: Array) -> Response:
-        """What the unit's outputs make of node temperatures (n, 8)."""
+        """Compute the response of the unit's outputs to node temperatures (n, 8)."""
         return response(self.unit, temperatures_c)
 
     @property
     def link_lost(self) -> bool:
-        """Whether nobody reaches it any more, whatever it does."""
+        """Return whether the link to the chamber is lost, whatever the chamber does."""
         return any(f.name == "link_lost" and f.from_s <= self._now_s() for f in self.faults)
 
     def _need_link(self) -> None:

@@ -1,4 +1,4 @@
-"""The chamber's plant: set point generator, controller, heater and cooler, limiter, door; and the heat in the unit.
+"""Plant of the chamber: set point generator, controller, heater and cooler, limiter, door; and the heat in the unit.
 
 Goes in whole seconds; knows neither the bench's clock nor the port. The same seed gives the same temperatures in
 whatever pieces time passes, and after a resume.
@@ -25,10 +25,10 @@ class PlantState:
     """All that goes on from one second to the next, JSON-ready by `ChamberPlant.checkpoint`."""
 
     temperatures_c: list[float]
-    """Of `NODES`."""
+    """Temperatures in the order of `NODES` [°C]."""
     step: int = 0
     target_c: float | None = None
-    """None: heater and cooler are off."""
+    """Target of the controller [°C]; None: heater and cooler are off."""
     ramp_c_s: float = 0.0
     set_point_c: float = 0.0
     integral_w: float = 0.0

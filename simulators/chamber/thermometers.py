@@ -16,7 +16,7 @@ from simulators.truth import Array, KeyedBlocks
 from simulators.truth.thermal import THERMOMETERS, ThermometerTruth
 
 DISCONNECTED_CODE = -32768
-"""What a sensor sends that is not there: the least of 16 bits."""
+"""Code of a sensor that is disconnected: the smallest number of 16 bits."""
 COLUMNS = (CASE, CONVERTER, *range(GYRO.start, GYRO.stop))
 """Nodes on which the sensors sit, in the order of `THERMOMETERS`."""
 

@@ -34,11 +34,11 @@ class SimCurrentSource:
         self._set_ma = current_ma
 
     async def make_safe(self) -> None:
-        """No current."""
+        """Set the current to zero."""
         self._set_ma = 0.0
 
     def currents_ma(self, first_tick: int, ticks: int) -> Array:
-        """What it truly gives during ticks of bench time, (ticks,); the same whatever the pieces."""
+        """True currents during ticks of bench time, (ticks,) [mA]; the same whatever the pieces."""
         given = self._set_ma * (1.0 + 1e-6 * self.truth.gain_error_ppm) + self.truth.zero_error_ma
         blocks = range(first_tick // BLOCK_TICKS, (first_tick + ticks - 1) // BLOCK_TICKS + 1)
         noise = np.concatenate([self._draws.at(block).standard_normal(BLOCK_TICKS) for block in blocks])

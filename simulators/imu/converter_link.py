@@ -29,7 +29,7 @@ class ConverterLink:
     """Three channels of codes and the board's own thermometer."""
 
     def __init__(self, truth: UnitTruth, clock: SimClock, launch: Callable[[], int], codes: Codes) -> None:
-        """`launch` says which power-up this is, 0 while the converter is off."""
+        """Connect to the clock; `launch` returns the number of the power-up, 0 while the converter is off."""
         self._clock, self._codes = clock, codes
         self._tapes = Tapes(clock, launch)
         thermometer = next(c for c in temperature_channels(truth) if c.name == "temperature_converter")
@@ -45,7 +45,7 @@ class ConverterLink:
         return self._clock.rate_hz
 
     def power_up(self, _launch: int) -> None:
-        """Begin a launch."""
+        """Begin a new launch at tick zero."""
         self._ticks = 0
 
     def power_down(self) -> None:
@@ -53,9 +53,9 @@ class ConverterLink:
         self._tapes.stop()
 
     def feel(self, ticks: int, current_ma: Callable[[], Array], lengths: Lengths, board_c: Array, sent: Counts) -> None:
-        """Some ticks: currents (ticks,) on demand, and pieces of so many ticks at board temperatures and codes sent.
+        """Pass some ticks: currents (ticks,) on demand, pieces of so many ticks at board temperatures, and codes sent.
 
-        Codes are a function of current, temperature and moment alone, so none are made that nobody records.
+        Codes are a function of current, temperature and moment alone, so none are made while no recording runs.
         """
         self._ticks += ticks
         if not self._tapes.running:

@@ -18,7 +18,7 @@ Counts = NDArray[np.int32]
 
 
 class Counter:
-    """Three counters. Reading j is ``⌊φ + Θ_j/LSB + d_j⌋``, a count the difference of two readings.
+    """Three angle or velocity counters. Reading j is ``⌊φ + Θ_j/LSB + d_j⌋``, a count the difference of two readings.
 
     The sum φ + Θ/LSB is kept in units of 2⁻³² pulse, so that it is exact in any grouping; the rounding of an increment
     to that unit is at most 4e-8 pulse a second at 400 Hz. Sums may wrap round: differences of 32-bit readings do not

@@ -27,9 +27,9 @@ class SimImu:
         thermal: bool = False,
         block_s: float | None = None,
     ) -> None:
-        """`launch` says which power-up this is, 0 while the unit is off; `thermal`: it will be told its climate.
+        """Connect to the clock; `launch` returns the number of the power-up, 0 while the unit is off.
 
-        `block_s`: length of a recording's blocks instead of ten seconds.
+        `thermal`: the unit receives a climate; `block_s`: length of a recording's blocks instead of ten seconds.
         """
         self.truth = truth
         self._thermal = thermal
@@ -50,7 +50,7 @@ class SimImu:
         return self._clock.rate_hz
 
     def power_up(self, launch: int) -> None:
-        """Begin a launch: new run-to-run coefficients, noise from time zero."""
+        """Begin a new launch: new run-to-run coefficients, noise from time zero."""
         self._ticks = 0
         self._sensors = {
             name: TriadSensor(self.truth.triad(name), self.rate_hz, (self._seed, launch, name)) for name in TRIADS

@@ -31,7 +31,7 @@ MEMBERS_PER_DECADE = 2
 
 @dataclass(frozen=True)
 class GaussMarkovBank:
-    """Unit-variance members: `times_s` relaxation times (M,), `decay` over a cell, weights of a cell's mean."""
+    """Unit-variance Gauss-Markov members: relaxation times `times_s` (M,), `decay` over a cell, weights of its mean."""
 
     times_s: Array
     decay: Array
@@ -50,7 +50,7 @@ class GaussMarkovBank:
 def cell_mean(ratio: Array) -> tuple[Array, Array, Array]:
     """``e^{−r}``, h and the residue's variance of a unit Gauss-Markov process at r = Δ/τ.
 
-    Variance of the mean ``2(r − 1 + e^{−r})/r²`` less what the ends tell, ``2h²(1 + e^{−r})``; r/6 for small r.
+    Variance of the mean ``2(r − 1 + e^{−r})/r²`` less the ends' part of it, ``2h²(1 + e^{−r})``; r/6 for small r.
     """
     decay = np.exp(-ratio)
     weight = np.tanh(0.5 * ratio) / ratio
@@ -72,7 +72,7 @@ class TriadNoise:
     """Noise of one triad during one launch. Time goes forward only."""
 
     def __init__(self, truth: TriadTruth, rate_hz: float, key: tuple[int, int, str]) -> None:
-        """`key`: seed, launch number, triad's name."""
+        """Set up a triad's noise. `key`: seed, launch number, triad's name."""
         self.rate_hz = rate_hz
         self.cell_ticks = max(1, ceil(CELL_S * rate_hz))
         self.cell_s = self.cell_ticks / rate_hz
@@ -98,7 +98,7 @@ class TriadNoise:
         self._blocks.add_to(total, tick)
 
     def increments(self, tick: int, ticks: int) -> Array:
-        """That noise alone, shape (3, ticks) [rate·s]."""
+        """Return the noise alone, shape (3, ticks) [rate·s]."""
         total = np.zeros((3, ticks))
         self.add_increments(total, tick)
         return total
@@ -229,7 +229,7 @@ class TriadNoise:
 
 
 class DitherResidue:
-    """What the notch filter leaves of the mechanical dither: ``A·sin(2πft + φ)`` on each channel's integrated output.
+    """Residue of the mechanical dither after the notch filter: ``A·sin(2πft + φ)`` on each channel's integrated output.
 
     φ is drawn anew for each launch. Seen at the ticks only, so a frequency above half the sample rate shows itself
     where it folds to. An increment is ``2A·sin(πf/r)·cos(2πf(k + ½)/r + φ)`` (tick k, rate r); within a block it is a

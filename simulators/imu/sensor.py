@@ -22,14 +22,14 @@ TRIADS = ("gyro", "accelerometer")
 
 @dataclass(frozen=True)
 class Coefficients:
-    """What is true of a triad during one launch. SI, *rate* as in `TriadTruth`; `bias` (3,), `matrix` (3, 3)."""
+    """True coefficients of a triad during one launch. SI, *rate* as in `TriadTruth`; `bias` (3,), `matrix` (3, 3)."""
 
     bias: Array
     matrix: Array
     asymmetry: Array
-    """Relative, (3,)."""
+    """Relative scale-factor asymmetry of each channel, (3,)."""
     quadratic: Array
-    """[1/rate], (3,)."""
+    """Quadratic coefficient of each channel [1/rate], (3,)."""
 
     def output(self, v: Array) -> Array:
         """Noise-free nominal output of inputs of shape (n, 3) [rate], as (3, n)."""
@@ -37,7 +37,7 @@ class Coefficients:
         return self.bias[:, None] + through + even
 
     def through(self, v: Array) -> Array:
-        """What inputs of shape (n, 3) put through without the bias, (3, n) [rate]."""
+        """Output for inputs of shape (n, 3) without the bias, (3, n) [rate]."""
         through, even = self._through(v)
         return through + even
 
@@ -65,7 +65,7 @@ class TriadSensor:
     """One triad during one launch: coefficients, noise, counter."""
 
     def __init__(self, truth: TriadTruth, rate_hz: float, key: tuple[int, int, str]) -> None:
-        """`key`: seed, launch number, triad's name."""
+        """Begin a launch. `key`: seed, launch number, triad's name."""
         self.coefficients = launch_coefficients(truth, *key)
         self.noise = TriadNoise(truth, rate_hz, key)
         self._rate_hz = rate_hz

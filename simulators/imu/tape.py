@@ -38,7 +38,7 @@ class Tapes:
     """The recordings of one data link that are being made."""
 
     def __init__(self, clock: SimClock, launch: Callable[[], int], block_s: float | None = None) -> None:
-        """`launch` says which power-up this is, 0 while the unit is off; `block_s`: of blocks instead of `BLOCK_S`."""
+        """Connect to the clock; `launch` returns the power-up's number, 0: off; `block_s` replaces `BLOCK_S`."""
         self._clock, self._launch, self._block_s = clock, launch, block_s
         self.running: list[Tape] = []
 

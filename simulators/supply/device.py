@@ -14,7 +14,7 @@ class SimSupply:
         self._power_down: Callable[[], None] = lambda: None
 
     def connect(self, power_up: Callable[[int], None], power_down: Callable[[], None]) -> None:
-        """What is called when the unit gets and loses its power."""
+        """Register the functions to call when the unit gets and loses its power."""
         self._power_up = power_up
         self._power_down = power_down
 

@@ -1,4 +1,4 @@
-"""Chance, keyed: each number is a function of the seed and of what it is for, never of what was drawn before."""
+"""Random numbers by key: each is a function of the seed and of its purpose, never of what was drawn before."""
 
 from hashlib import blake2b
 

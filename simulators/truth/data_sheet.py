@@ -1,4 +1,4 @@
-"""What a laboratory would know of a simulated unit beforehand: its channels and its noise, as they truly are."""
+"""Declaration of a simulated unit, as a laboratory would know it beforehand: its channels and its true noise."""
 
 from procedures.core import units
 from procedures.core.noise import NoiseCoefficients

@@ -1,4 +1,4 @@
-"""Truth files: TOML in the units people read, each key with its unit, each refusal with field, value and range."""
+"""Truth files in TOML, in the units people read: each key with its unit, each refusal with field, value and range."""
 
 from dataclasses import fields, replace
 from importlib.resources import files
@@ -148,7 +148,7 @@ def _description(table: Table) -> BenchDescription:
 
 
 def _axis(where: str, table: Any) -> AxisLimits:
-    """Four numbers, and whether the axis has slip rings; none where it is not said."""
+    """Read an axis: four numbers, and whether it has slip rings; it has none where the key is absent."""
     continuous = table.get("continuous", False) if isinstance(table, dict) else False
     if not isinstance(continuous, bool):
         raise TruthError(f"{where}.continuous = {continuous!r} must be true or false")
@@ -160,8 +160,8 @@ def _axis(where: str, table: Any) -> AxisLimits:
 def parse_bench(text: str) -> BenchTruth:
     """A bench's truth from TOML text. Raises `TruthError`.
 
-    Without `site_truth` the declared site is the true one; chamber and operator are as in the code where nothing is
-    said of them. A `description` without a chamber is a bench without one.
+    Without `site_truth` the declared site is the true one; chamber and operator keep the defaults of the code where the
+    text has no values. A `description` without a chamber is a bench without one.
     """
     document = read_document(text)
     check_keys("bench", document, {"description", *BENCH_TRUTHS}, {"description"})

@@ -1,4 +1,4 @@
-"""What every truth is made of: arrays and vectors, and a refusal that names field, value and allowed range."""
+"""Basic types of all truth values: arrays and vectors, and a refusal that names field, value and allowed range."""
 
 from collections.abc import Mapping
 

@@ -60,7 +60,7 @@ def read_record(kind: type[Any], where: str, table: Any, needed: set[str]) -> An
 
 
 def read_changes(default: T, where: str, table: Any, keys: Mapping[str, Key] | None = None) -> T:
-    """A record with what a table says of it, the rest as in another; `keys`: None: flat numbers by the same names."""
+    """Replace the values of a record that a table gives; `keys`: None: flat numbers by the same names."""
     if keys is None:
         changes = _numbers(where, table, {f.name for f in fields(cast(Any, default))}, set())
     else:

@@ -1,4 +1,4 @@
-"""What is true of the chamber, of the unit's heat, of its thermometers, and of how it feels temperature.
+"""True values of the chamber, of the unit's heat and thermometers, and of the temperature's effect on the unit.
 
 Knows numbers and their allowed ranges. Thesis 4.2.1 gives the chamber's make, its ±1 °C over the place and ±0.5 °C in
 time; everything else of chamber and heat is ours, after a 1 m³ chamber and a unit of some 12 kg. Temperatures in °C.
@@ -18,7 +18,7 @@ THERMOMETERS = ("case", "converter", "gyro_x", "gyro_y", "gyro_z")
 
 @dataclass(frozen=True)
 class ChamberTruth:
-    """The chamber: its heat, its controller, its flaws."""
+    """True values of the chamber: its heat, its controller, its flaws."""
 
     ambient_c: float = 22.0
     air_j_k: float = 8.0e3
@@ -89,7 +89,7 @@ class NetworkTruth:
     converter_j_k: float = 150.0
     accelerometer_block_j_k: float = 800.0
     gyro_j_k: float = 1500.0
-    """Each of three."""
+    """Heat capacity of each of the three gyro blocks [J/K]."""
     air_to_case_w_k: float = 8.0
     case_to_converter_w_k: float = 0.25
     """With its capacity a lag of 600 s behind the case: the thermometers of thesis fig. 3.15."""
@@ -130,7 +130,7 @@ class ThermometerTruth:
 
 @dataclass(frozen=True)
 class AccelerometerThermalTruth:
-    """How one accelerometer channel feels temperature, as departures from `REFERENCE_C` of two nodes.
+    """Effect of temperature on one accelerometer channel, as departures from `REFERENCE_C` of two nodes.
 
     A force-rebalance pendulum answers with the current that its torquer needs: force over torquer constant. So
     ``V = f/(1 + A) − B`` with A the relative change of the torquer's constant and B the balancing rest force, each
@@ -147,7 +147,7 @@ class AccelerometerThermalTruth:
     bias_dynamic: tuple[float, float] = (0.0, 0.0)
     """B's d1 [m/s²/°C] and d2 [m/s²/°C²]."""
     block_share: float = 0.0
-    """Which structure: 0 the case, where the sensor is, 1 the accelerometer block inside, which has none."""
+    """Structure that counts: 0 the case, where the sensor is, 1 the accelerometer block inside, which has none."""
 
     def __post_init__(self) -> None:
         within("accelerometer_thermal.block_share", self.block_share, 0.0, 1.0)
@@ -161,10 +161,10 @@ class ConverterTruth:
     """One channel of the signal converter: ``code = K0·Fc(c)·I + N0 + Fs(c)`` a cycle (thesis 3.8–3.13), c as above."""
 
     codes_a_ma: float = 2184.0
-    """K0: 16 bits over ±15 mA [1/mA]."""
+    """Codes per current K0 [1/mA]: 16 bits over ±15 mA."""
     zero_code: float = 12.0
     scale_drift: tuple[float, float] = (1.5e-5, 2.0e-8)
-    """Fc − 1: [1/°C] and [1/°C²]. Ours: a voltage reference of 15 ppm/°C."""
+    """Drift of the scale, Fc − 1: [1/°C] and [1/°C²]. Ours: a voltage reference of 15 ppm/°C."""
     zero_drift: tuple[float, float] = (0.02, 1.0e-4)
     """Fs [codes/°C] and [codes/°C²]. Ours."""
 
@@ -192,7 +192,7 @@ SPAN_C = 40.0
 
 
 def default_accelerometers() -> tuple[AccelerometerThermalTruth, AccelerometerThermalTruth, AccelerometerThermalTruth]:
-    """The default channels; see the comment above for what is the thesis's and what ours."""
+    """Build the default channels; see the comment above for what is the thesis's and what ours."""
     found: list[AccelerometerThermalTruth] = []
     for (cold, hot), dynamic, still, moving in zip(_BEFORE, _BETA_DYNAMIC, _ALPHA_STATIC, _ALPHA_DYNAMIC, strict=True):
         linear = (hot + cold) / 3.0 / (2.0 * SPAN_C) - dynamic[0]
@@ -230,11 +230,11 @@ class UnitThermalTruth:
 
 
 def random_thermal_truth(seed: int) -> UnitThermalTruth:
-    """Another unit of the default's kind.
+    """Draw another unit of the default's kind.
 
     Each coefficient times a normal number of mean 1 and spread 0.3, each β with a spread of 1e-4 m/s²/°C besides;
-    thermometers' offsets of 0.5 °C, the network within ±20 %, lags within ±1 %: a second of lag that nobody knows of
-    would move the linear coefficients by several of their uncertainties.
+    thermometers' offsets of 0.5 °C, the network within ±20 %, lags within ±1 %: an unknown lag of one second would move
+    the linear coefficients by several of their uncertainties.
     """
     rng, base = keyed_generator(seed, "thermal truth"), UnitThermalTruth()
 

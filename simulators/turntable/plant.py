@@ -40,7 +40,7 @@ def _quaternion(vector_rad: Array) -> Quaternion:
 
 
 def _product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Hamilton product p·q."""
+    """Compute the Hamilton product p·q."""
     pw, px, py, pz = p
     qw, qx, qy, qz = q
     w = pw * qw - px * qx - py * qy - pz * qz
@@ -116,7 +116,7 @@ def model_text(table: TableTruth, site: SiteTruth, azimuth_deg: float, step_s: f
 
 
 class Plant:
-    """Three axes under servo. Angles here are true joint angles [rad], wrapped by whole turns by whoever holds it."""
+    """Three axes under servo. Angles here are true joint angles [rad]; the device that owns the plant wraps them."""
 
     def __init__(self, table: TableTruth, site: SiteTruth, azimuth_deg: float, rate_hz: float) -> None:
         self.steps_per_tick = max(1, ceil(1.0 / (rate_hz * STEP_S) - 1e-9))
@@ -137,16 +137,16 @@ class Plant:
 
     @property
     def rates_rad_s(self) -> Array:
-        """Joint rates, (3,)."""
+        """Current joint rates, (3,) [rad/s]."""
         return self._state[4:7].copy()
 
     @property
     def integral(self) -> Array:
-        """What the servo's integrators hold, (3,)."""
+        """State of the servo's integrators, (3,)."""
         return self._state[7:10].copy()
 
     def put(self, angles_rad: Array, integral: Array | None = None) -> None:
-        """Stand still at some joint angles; the integrators keep what they hold unless told."""
+        """Stand still at some joint angles; the integrators keep their state unless `integral` is given."""
         held = self.integral if integral is None else integral
         self._state = np.concatenate([[0.0], angles_rad, np.zeros(3), held])
 

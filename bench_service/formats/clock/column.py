@@ -73,7 +73,7 @@ class ClockColumn:
     _times: SpooledTemporaryFile[bytes] = field(default_factory=lambda: SpooledTemporaryFile(IN_MEMORY_BYTES))  # noqa: SIM115  closed by `close`
 
     def add(self, stamps: Stamps, same: NDArray[np.bool_]) -> None:
-        """Add the next rows: their stamps in the column's unit, and whether each row's channels equal the row before's."""
+        """Add the next rows: stamps in the column's unit, and whether each row's channels repeat the last row's."""
         if not self.count:
             self.first = stamps[0].item()
         time_s = self._relative(stamps)
