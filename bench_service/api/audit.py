@@ -24,7 +24,7 @@ router = APIRouter(prefix="/api/v1/audit", tags=["audit"])
 
 READING = ("GET", "HEAD", "OPTIONS")
 NOTED_BYTES = 8192
-"""A JSON body up to this size is part of the entry; of a longer one, and of files, only the size."""
+"""Size up to which a JSON body is part of the entry [bytes]; of longer bodies and of files, only the size is."""
 
 
 class AuditView(BaseModel):
@@ -131,7 +131,7 @@ class _Act:
         self._bytes = 0
 
     def body(self, message: Message) -> None:
-        """A piece of the body passes."""
+        """Note a piece of the body that passes."""
         piece: bytes = message.get("body", b"")
         self._bytes += len(piece)
         if self._is_json and self._bytes <= NOTED_BYTES:
@@ -150,7 +150,7 @@ class _Act:
         return found
 
     def _document(self) -> Any:
-        """The body where it is JSON that everything can hold, and not too long."""
+        """Return the body where it is storable JSON, and not too long."""
         if not (self._is_json and 0 < self._bytes <= NOTED_BYTES):
             return None
         try:

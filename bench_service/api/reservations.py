@@ -18,7 +18,7 @@ router = APIRouter(prefix="/api/v1/reservations", tags=["reservations"])
 
 
 class ReservationSubmission(Request):
-    """A bench or a unit, until when, and for whom."""
+    """Request to reserve a bench or a unit: until when, and for whom."""
 
     bench: Annotated[str, NAME] | None = Field(None, description="Either this, or `unit`")
     unit: Annotated[str, NAME] | None = None
@@ -75,7 +75,7 @@ class ReservationPage(BaseModel):
 def reserve(
     body: ReservationSubmission, service: Service, response: Response, key: IdempotencyKey = None
 ) -> ReservationView:
-    """Keep a bench or a unit. One that somebody keeps already is refused, with the holder and the end."""
+    """Reserve a bench or a unit. One that is reserved already is refused, with the holder and the end."""
     kind = Reserved.UNIT if body.bench is None else Reserved.BENCH
     name = body.bench or body.unit or ""
     kept = service.queues.reserve(copied(ReservationRequest, body, kind=kind, name=name), key)
@@ -103,5 +103,5 @@ def read_reservation(reservation_id: str, service: Service) -> ReservationView:
 
 @router.delete("/{reservation_id}", responses=problems(404, 507))
 def end_reservation(reservation_id: str, service: Service) -> ReservationView:
-    """Give it back before its time: jobs that waited for it may start. One that is over stays as it is."""
+    """End a reservation before its time: jobs that waited for it may start. One that is over stays as it is."""
     return ReservationView.of(service.queues.give_back(reservation_id))

@@ -18,7 +18,7 @@ router = APIRouter(prefix="/api/v1", tags=["analyses"])
 
 
 class AnalysisSubmission(Request):
-    """A method and what it is to work on."""
+    """Request to run a method: its name, its evidence and its parameters."""
 
     method: str = NAME
     recordings: list[str] = Field(default_factory=list[str], max_length=1000)
@@ -98,5 +98,5 @@ def list_results(
 
 @router.get("/results/{result_id}", responses=problems(404))
 def read_result_by_id(result_id: str, service: Service) -> ResultView:
-    """One result with its lineage."""
+    """Read one result with its lineage."""
     return ResultView.of(service.stores.results.get(result_id))

@@ -17,7 +17,7 @@ __all__ = ["BenchLease", "Database", "acquire_lease", "engine_database", "lease_
 
 
 def open_stores(database_url: str) -> "tuple[Stores, Database]":
-    """All memory behind a URL, brought to the newest form; `Database.dispose` closes it. Raises `StorageFailure`."""
+    """Open all stores behind a URL, in the newest form; `Database.dispose` closes it. Raises `StorageFailure`."""
     from bench_service.persistence.stores import open_stores as opened
 
     return opened(database_url)

@@ -68,7 +68,7 @@ class Database:
 
     @contextmanager
     def write(self) -> Generator[Session, None, None]:
-        """A transaction that commits at the end, or leaves nothing behind. Raises `StorageFull`, `StorageFailure`."""
+        """Open a transaction that commits at the end, or leaves nothing. Raises `StorageFull`, `StorageFailure`."""
         news: list[str] = []
         with storage_errors(), Session(self._writing_engine, expire_on_commit=False) as session, session.begin():
             session.info[_NEWS] = news
@@ -97,7 +97,7 @@ class Database:
             session.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": key})
 
     def free_bytes(self) -> int | None:
-        """Room on the disk of an SQLite file; None where the database is elsewhere."""
+        """Free space on the disk of an SQLite file [bytes]; None where the database is elsewhere."""
         file = self.engine.url.database
         return None if self.is_postgres or not file else shutil.disk_usage(Path(file).parent).free
 
@@ -119,7 +119,7 @@ def announce(session: Session, subject: str) -> None:
 
 
 def connect(database_url: str) -> Database:
-    """A database by its URL; the file and folder of an SQLite one are made. Raises `StorageFailure`."""
+    """Open a database by its URL; file and folder of an SQLite one are created. Raises `StorageFailure`."""
     with storage_errors():
         url = make_url(database_url)
         if url.get_backend_name() == "sqlite":
@@ -184,7 +184,7 @@ def _switch_to_wal(engine: Engine) -> None:
 
 @contextmanager
 def storage_errors() -> Generator[None, None, None]:
-    """Every error of the database, or of its driver, as `StorageFull`, `Conflict` or `StorageFailure`."""
+    """Translate every error of the database or its driver to `StorageFull`, `Conflict` or `StorageFailure`."""
     try:
         yield
     except IntegrityError as error:

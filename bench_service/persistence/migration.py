@@ -1,4 +1,4 @@
-"""Bringing a database to the newest form of the tables, at start. Knows Alembic; must not know what tables hold.
+"""Migration of a database to the newest form of its tables, at start. Knows Alembic; must not know what tables hold.
 
 All of it is one writing transaction, so of two processes that start at once the second waits and finds the work done.
 Alembic is imported only where there is work: a service that starts on a database of its own version does without.

@@ -49,19 +49,19 @@ def _view(service: BenchService, bench_id: str) -> BenchView:
 
 @router.get("", responses=problems())
 def list_benches(service: Service) -> list[BenchView]:
-    """Every bench that a worker of this database has registered."""
+    """List every bench that a worker of this database has registered."""
     return [_view(service, bench_id) for bench_id in service.benches.ids()]
 
 
 @router.get("/{bench_id}", responses=problems(404))
 def read_bench(bench_id: str, service: Service) -> BenchView:
-    """Live state, limits, declared accuracy, and the job that drives it."""
+    """Read one bench: live state, limits, declared accuracy, and the job that drives it."""
     return _view(service, bench_id)
 
 
 @router.get("/{bench_id}/queue", responses=problems(404))
 def read_queue(bench_id: str, service: Service) -> QueueView:
-    """The jobs that wait for a bench, in the order in which they start, and why each of them waits."""
+    """List the jobs that wait for a bench, in the order in which they start, and why each of them waits."""
     queue = service.queues.queue(bench_id)
     holder = service.benches.holder(bench_id)
     places = queue.places(holder is not None)
@@ -86,7 +86,7 @@ async def stop(bench_id: str, service: Service, client: ClientName, body: StopRe
 
 @router.get("/{bench_id}/stops", responses=problems(404))
 def list_stops(bench_id: str, service: Service, after: After = None, limit: Limit = 50) -> StopPage:
-    """Every stop of a bench, newest first: those that stand, and those that were released, by whom and why."""
+    """List every stop of a bench, newest first: standing and released ones, with author and reason of both."""
     service.benches.description(bench_id)
     page = service.stores.benches.stops(bench_id, after=after, limit=limit)
     return StopPage(items=[StopView.of(one) for one in page.items], next=page.next)

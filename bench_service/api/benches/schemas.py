@@ -27,14 +27,14 @@ By = Annotated[
 
 
 class StopRequest(Request):
-    """Why a bench is stopped, and by whom."""
+    """Request to stop a bench, with reason and author."""
 
     reason: str = Field("stopped by an operator", min_length=1, max_length=500)
     by: By | None = None
 
 
 class ReleaseRequest(Request):
-    """Why a stop is released, and by whom."""
+    """Request to release a stop, with author and remark."""
 
     remark: str = Field(min_length=1, max_length=500, description="What was looked at before the bench was released")
     by: By | None = None
@@ -68,7 +68,7 @@ class StopPage(BaseModel):
 
 
 class Releasing(BaseModel):
-    """The answer to a release."""
+    """The answer to a release: the released stop, and those that still stand."""
 
     stop: StopView = Field(description="The stop that was released")
     standing: list[StopView] = Field(description="Stops that still keep the bench from working, oldest first")
@@ -90,7 +90,7 @@ class DevicesView(BaseModel):
 
     @classmethod
     def of(cls, state: DeviceState | None) -> "DevicesView | None":
-        """None where this host does not know."""
+        """Convert the devices' state to its HTTP view; None where this host does not know it."""
         if state is None:
             return None
         return cls(

@@ -1,4 +1,4 @@
-"""Campaigns and their runs: define, preview, start, watch, cancel, report."""
+"""Routes of campaigns and their runs: define, preview, start, watch, cancel, report."""
 
 from typing import Annotated, Any, Literal
 
@@ -39,7 +39,7 @@ class CampaignOn(Request):
 
 
 class RunSubmission(CampaignOn):
-    """A campaign to be done."""
+    """Request to run a campaign."""
 
     seed: int | None = Field(None, ge=0, lt=2**47, description="Base of the steps' seeds on a simulated bench")
     labels: Labels = Field(default_factory=Labels, max_length=20)
@@ -52,7 +52,7 @@ class RunSubmission(CampaignOn):
 
 @router.get("/campaigns", responses=problems())
 def list_campaigns(service: Service, after: After = None, limit: Limit = 50) -> CampaignPage:
-    """Campaigns by name, those that come with the service among them."""
+    """List the campaigns by name, including those that come with the service."""
     page = service.campaigns.campaigns(after, limit)
     return CampaignPage(items=[CampaignView.of(campaign) for campaign in page.items], next=page.next)
 
@@ -96,7 +96,7 @@ def preview_campaign(name: CampaignName, body: CampaignOn, service: Service) -> 
 def start_campaign(
     name: CampaignName, body: RunSubmission, service: Service, response: Response, key: IdempotencyKey = None
 ) -> CampaignRunView:
-    """Queue a run of the campaign. A bench does one campaign run at a time, in the order of asking."""
+    """Queue a run of the campaign. A bench does one campaign run at a time, in the order of the requests."""
     request = copied(RunRequest, body, campaign=name)
     run = service.campaigns.start(request, key)
     response.headers["Location"] = f"/api/v1/campaign-runs/{run.id}"

@@ -18,7 +18,7 @@ OF_A_SCHEDULE = ("read_schedule", "change_schedule", "remove_schedule")
 
 
 class ScheduleSubmission(Request):
-    """A campaign on a unit, again and again."""
+    """Request to run a campaign on a unit at repeated times."""
 
     cron: str = Field(
         min_length=1,
@@ -63,7 +63,7 @@ def list_schedules(service: Service, after: After = None, limit: Limit = 50) -> 
 def add_schedule(
     body: ScheduleSubmission, service: Service, response: Response, key: IdempotencyKey = None
 ) -> ScheduleView:
-    """Start a campaign at given times. A time that never comes is refused, and a run that could not begin now."""
+    """Schedule a campaign at given times. A time that never comes is refused, and a run that could not begin now."""
     request = copied(ScheduleRequest, body)
     schedule = service.campaigns.schedules.add(request, key)
     response.headers["Location"] = f"/api/v1/schedules/{schedule.id}"

@@ -38,7 +38,7 @@ class CampaignPage(BaseModel):
 
 
 class CampaignMade(BaseModel):
-    """A campaign that was stored, and what to know before it runs."""
+    """A stored campaign, and the warnings before it runs."""
 
     name: str
     campaign: Campaign
@@ -63,7 +63,7 @@ class CampaignPreview(BaseModel):
 
 
 class StepRunView(BaseModel):
-    """One step of a run."""
+    """One step of a campaign run."""
 
     name: str
     does: str = Field(description="Its procedure or method")
@@ -82,7 +82,7 @@ class StepRunView(BaseModel):
 
 
 class CampaignRunView(BaseModel):
-    """One execution of a campaign."""
+    """One run of a campaign."""
 
     id: str
     campaign: str
@@ -122,7 +122,7 @@ class CampaignRunPage(BaseModel):
 
 
 class CampaignReport(BaseModel):
-    """The outcome of a run with everything that made it."""
+    """Outcome of a run with everything that made it."""
 
     run: CampaignRunView
     campaign: Campaign = Field(description="As it was when the run was asked for")
@@ -136,7 +136,7 @@ class CampaignReport(BaseModel):
 
 
 class ScheduleView(BaseModel):
-    """When a campaign starts by itself."""
+    """A schedule: the times at which a campaign starts by itself."""
 
     id: str
     cron: str

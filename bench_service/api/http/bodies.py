@@ -43,7 +43,7 @@ async def only_plain_json(request: Request) -> None:
 
 
 def refuse_unfit(document: object, place: str) -> None:
-    """Raises `RequestValidationError` with what in a document, sent as `place`, not everything can hold."""
+    """Check a document, sent as `place`. Raises `RequestValidationError` with the values that cannot be stored."""
     found = list(islice(faults(document), TOLD))
     if found:
         raise RequestValidationError(
@@ -78,7 +78,7 @@ class Bounded:
 
 
 def _most_bytes(scope: Scope) -> int | None:
-    """The longest body that a route takes; None: it takes none."""
+    """Return the longest body that a route takes; None: it takes none."""
     if _takes_json(scope):
         return BODY_BYTES
     if getattr(scope.get("route"), "body_field", None) is None:

@@ -27,7 +27,7 @@ LOOPBACK_NAMES = ("localhost", "127.0.0.1", "[::1]")
 ANY_ADDRESS = ("0.0.0.0", "::", "")
 READING = ("GET", "HEAD")
 QUIET_S = 60.0
-"""A reason to refuse is logged once in this time [s]: a page that tries again and again fills no disk."""
+"""Interval in which a reason to refuse is logged once [s]: a page that tries again and again fills no disk."""
 _AUTHORITY = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(?::(?P<port>[0-9]{1,5}))?")
 _ORIGIN = re.compile(r"(?P<scheme>https?)://(?P<authority>[^/]+)")
 _DEFAULT_PORT = {"http": "80", "https": "443"}
@@ -37,7 +37,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Door:
-    """The rules of one service."""
+    """Access rules of one service."""
 
     hosts: frozenset[str]
     """Names in `Host` that are ours; with a port only that port, without one any."""
@@ -48,7 +48,7 @@ class Door:
 
     @classmethod
     def of(cls, settings: Settings, *more_hosts: str) -> "Door":
-        """The rules that settings give. Raises `Misconfigured` for a token that cannot be used."""
+        """Build the rules from the settings. Raises `Misconfigured` for a token that cannot be used."""
         own = () if settings.host in ANY_ADDRESS else (_bracketed(settings.host),)
         try:
             token = settings.token()
@@ -58,7 +58,7 @@ class Door:
         return cls(hosts, token, settings.published == "loopback")
 
     def refusal(self, headers: Headers, method: str, peer: str | None) -> "Refusal | None":
-        """Why a request is refused; None where it is let in. `peer`: address it comes from; None: a socket file."""
+        """Return why a request is refused; None where it is let in. `peer`: its source address; None: a socket file."""
         hosts = headers.getlist("host")
         if len(hosts) != 1 or not self._ours(hosts[0]):
             text = "the name that this request speaks to is not one of this service: BENCH_HOSTS lists further names"
@@ -90,7 +90,7 @@ class Door:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a request is not let in."""
+    """Reason for which a request is refused."""
 
     status: int
     kind: str
@@ -178,5 +178,5 @@ def _follows_link(headers: Headers, method: str) -> bool:
 
 
 def _bracketed(host: str) -> str:
-    """An address as `Host` has it."""
+    """Format an address as `Host` has it."""
     return f"[{host}]" if ":" in host else host

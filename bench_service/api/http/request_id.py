@@ -1,4 +1,4 @@
-"""An id for every request: the client's own `X-Request-ID` or a new one, in the answer and in every line about it."""
+"""Request ids: the client's own `X-Request-ID` or a new one, in the answer and in every log line of the request."""
 
 import re
 
@@ -10,7 +10,7 @@ from bench_service.wall_clock import new_id
 
 HEADER = "X-Request-ID"
 ACCEPTED = re.compile(r"[A-Za-z0-9._:/+=@-]{1,100}")
-"""Anything else is replaced by an id of our own: a header must not write lines into the log."""
+"""Allowed ids; any other is replaced by a new one: a header must not write lines into the log."""
 
 
 class RequestId:

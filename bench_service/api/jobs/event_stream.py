@@ -11,7 +11,7 @@ from bench_service.bench.live.values import BenchLive
 from bench_service.model.job import Event
 
 RETRY_MS = 1000
-"""After this long a browser that lost the connection comes back."""
+"""Time after which a browser that lost the connection reconnects [ms]."""
 HEAD = f"retry: {RETRY_MS}\n\n".encode()
 HEADERS = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
 LIVE = TypeAdapter(BenchLive)
@@ -35,7 +35,7 @@ class ServerSentEvents:
     dropped = b": too slow, and let go; come back with Last-Event-ID\n\n"
 
     def event(self, event: Event) -> bytes:
-        """An event with its sequence as id."""
+        """Encode an event with its sequence as id."""
         data = EventView.of(event).model_dump_json()
         return f"id: {event.sequence}\nevent: {event.kind}\ndata: {data}\n\n".encode()
 

@@ -122,20 +122,20 @@ def cancel(job_id: str, service: Service) -> JobView | JSONResponse:
 
 @router.post("/{job_id}/pause", status_code=202, responses=problems(404, 409, 507))
 def pause(job_id: str, service: Service) -> JobView:
-    """Put a job aside: a queued one at once, a running one before its next station. The bench is then safe and free."""
+    """Pause a job: a queued one at once, a running one before its next station. The bench is then safe and free."""
     return _view(service, service.jobs.pause(job_id))
 
 
 @router.post("/{job_id}/answer", status_code=202, responses=problems(404, 409, 413, 507))
 def answer(job_id: str, body: PromptAnswer, service: Service, requested_by: RequestedBy = None) -> JobView:
-    """Say that what the job asks of the person at the bench (`prompt`) is done, or refuse it."""
+    """Confirm that the person at the bench did what the job's prompt asks (`prompt`), or decline it."""
     said = Answer(body.done, body.remark, requested_by or "")
     return _view(service, service.stores.prompts.answer(job_id, said, now()))
 
 
 @router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409, 507))
 def resume(job_id: str, service: Service) -> JobView:
-    """Queue a paused, interrupted or resumable failed job again; it goes on with the stations that remain."""
+    """Resume a paused, interrupted or resumable failed job: it is queued again and does the stations that remain."""
     return _view(service, service.jobs.resume(job_id))
 
 
@@ -149,7 +149,7 @@ async def events(
     hub: Hub,
     last_event_id: Annotated[int, Header(alias="Last-Event-ID", ge=0, le=2**31)] = 0,
 ) -> StreamingResponse:
-    """Everything that happens to the job as server-sent events, from after `Last-Event-ID`, until it has ended."""
+    """Stream the job's events as server-sent events, from after `Last-Event-ID`, until it has ended."""
     await hub.require(job_id)
     told = _told(hub, job_id, last_event_id)
     return StreamingResponse(told, media_type="text/event-stream", headers=event_stream.HEADERS)
@@ -168,7 +168,7 @@ def read_result(
     response: Response,
     if_none_match: Annotated[str | None, Header(max_length=200)] = None,
 ) -> ResultView:
-    """The result that gave the job its verdict. It never changes, so an ETag saves reading it twice."""
+    """Read the result that gave the job its verdict. It never changes, so an ETag saves reading it twice."""
     result = service.jobs.result_of(job_id)
     etag = f'"{result.id}"'
     if if_none_match == etag:
@@ -195,7 +195,7 @@ def analyse_again(
 
 @router.get("/{job_id}/analyses", responses=problems(404, 409))
 def list_analyses(job_id: str, service: Service, after: After = None, limit: Limit = 50) -> ResultPage:
-    """Every result of the job's recordings taken as a whole, newest first."""
+    """List every result of the job's recordings taken as a whole, newest first."""
     service.stores.jobs.get(job_id)
     page = service.stores.results.list(job_id=job_id, after=after, limit=limit)
     return ResultPage(items=[ResultView.of(result) for result in page.items], next=page.next)

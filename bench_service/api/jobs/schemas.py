@@ -16,7 +16,7 @@ from procedures.core.limits import Verdict
 
 
 class JobSubmission(PreviewRequest):
-    """A job to be done."""
+    """Request for a new job: procedure, unit and parameters."""
 
     procedure: str = NAME
     priority: int = Field(10, ge=1, le=1000, description="Smaller runs first")
@@ -69,7 +69,7 @@ class Progress(BaseModel):
 
 
 class PlaceView(BaseModel):
-    """A queued job's place."""
+    """Place of a queued job in its bench's queue."""
 
     position: int = Field(description="From 1, in the order of its bench's queue")
     ahead: int = Field(description="Jobs that go before it as things stand, the running one included")
@@ -167,7 +167,7 @@ class ForeignJob(BaseModel):
 
 
 class EventView(BaseModel):
-    """Something that happened to a job: the `data` of a server-sent event."""
+    """One event of a job: the `data` of a server-sent event."""
 
     sequence: int
     at: datetime

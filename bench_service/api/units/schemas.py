@@ -27,7 +27,7 @@ class UnitDeclaration(Request):
 
 
 class UnitView(BaseModel):
-    """A unit as it is declared."""
+    """The declared record of a unit."""
 
     serial: str
     sample_rate_hz: float
@@ -67,7 +67,7 @@ class CalibrationView(BaseModel):
 
 
 class CalibrationPage(BaseModel):
-    """Calibrations of a unit, newest first."""
+    """One page of a unit's calibrations, newest first."""
 
     items: list[CalibrationView]
     next: str | None
@@ -93,7 +93,7 @@ class CorrectionView(BaseModel):
 
 
 class CorrectionPage(BaseModel):
-    """Correction sets of a unit, newest first."""
+    """One page of a unit's correction sets, newest first."""
 
     items: list[CorrectionView]
     next: str | None

@@ -29,7 +29,7 @@ SUPERVISOR = "supervisor"
 
 
 class BenchLease(ABC):
-    """The right to drive a bench, held for a process's life, and whether it is still ours."""
+    """Lease of a bench, held for the life of a process, with a check that it is still held."""
 
     def __init__(self, bench_id: str, role: str) -> None:
         """Take the lease of the bench. Raises `BenchBusy`."""
@@ -46,7 +46,7 @@ class BenchLease(ABC):
             return self._right is not None and self._is_ours(self._right)
 
     def regain(self) -> bool:
-        """Take the bench again, after it was taken away; False where somebody else was first or it cannot be now."""
+        """Take the bench again after the lease was lost; False where another process was first, or on a failure."""
         with self._mutex:
             self._drop()
             if self._given_back:  # a thread that looks once more while the process ends
@@ -58,7 +58,7 @@ class BenchLease(ABC):
             return True
 
     def release(self) -> None:
-        """Give the bench back, for good; a second time does nothing."""
+        """Release the lease for good; a second call does nothing."""
         with self._mutex:
             self._given_back = True
             self._drop()
@@ -70,7 +70,7 @@ class BenchLease(ABC):
 
     @abstractmethod
     def _take(self) -> Any:
-        """Raises `BenchBusy`, and what file or database raise."""
+        """Take the lease. Raises `BenchBusy`, and what file or database raise."""
 
     @abstractmethod
     def _is_ours(self, right: Any) -> bool: ...
@@ -80,7 +80,7 @@ class BenchLease(ABC):
 
 
 def acquire_lease(database_url: str, bench_id: str, role: str = "process") -> BenchLease:
-    """Take the bench, at once or not at all; only a supervisor, which has it for a moment, is waited for.
+    """Acquire the lease at once or not at all; only a supervisor, which has it for a moment, is waited for.
 
     `role`: as what others shall name the holder. Raises `BenchBusy`, naming the holder where it is known.
     """
@@ -103,7 +103,7 @@ def _lease(database_url: str, bench_id: str, role: str) -> BenchLease:
 
 
 def _written_holder(file: int) -> str:
-    """Role and process id in a lock file; its holder writes it a moment after it took the lock."""
+    """Read role and process id from a lock file; its holder writes it a moment after it took the lock."""
     for _ in range(20):
         holder = os.pread(file, 32, 0).decode(errors="replace").strip()
         if holder:
@@ -113,7 +113,7 @@ def _written_holder(file: int) -> str:
 
 
 class FileLease(BenchLease):
-    """A locked file, with the holder's process id in it."""
+    """Lease by a locked file, with the holder's process id in it."""
 
     def __init__(self, path: Path, bench_id: str, role: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -133,7 +133,7 @@ class FileLease(BenchLease):
         os.close(right)
 
     def _take(self) -> int:
-        """The file, locked, with our process id in it."""
+        """Open the file, lock it and write this process's id into it."""
         file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
             self._lock(file)
@@ -156,7 +156,7 @@ class FileLease(BenchLease):
 
 
 class ServerLease(BenchLease):
-    """An advisory lock of a connection of its own."""
+    """Lease by an advisory lock of a connection of its own."""
 
     def __init__(self, url: URL, bench_id: str, role: str) -> None:
         self._key = lease_key(bench_id)
@@ -172,7 +172,7 @@ class ServerLease(BenchLease):
         super().__init__(bench_id, role)
 
     def _is_ours(self, right: Connection) -> bool:
-        """Ask the server over the connection that has the lock: while it answers, the lock is ours."""
+        """Ask the server over the connection that holds the lock: while it answers, the lock is held."""
         try:
             right.execute(text("SELECT 1"))
         except SQLAlchemyError:
@@ -185,7 +185,7 @@ class ServerLease(BenchLease):
         right.close()
 
     def _take(self) -> Connection:
-        """A connection that has the lock."""
+        """Open a connection that holds the lock."""
         connection = self._engine.connect()
         try:
             if not connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": self._key}):
@@ -230,7 +230,7 @@ def _busy(bench_id: str, who: str | None) -> BenchBusy:
 
 
 def lease_key(bench_id: str) -> int:
-    """The advisory lock of a bench."""
+    """Compute the key of a bench's advisory lock."""
     return int.from_bytes(hashlib.sha256(f"bench lease {bench_id}".encode()).digest()[:8], "big", signed=True)
 
 

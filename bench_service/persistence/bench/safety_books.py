@@ -25,7 +25,7 @@ from bench_service.persistence.telemetry.audit_store import SqlAuditTrail
 
 
 class SqlSafetyBooks:
-    """`bench_service.bench.supervisor.SafetyBooks` of one bench."""
+    """SQL implementation of `bench_service.bench.supervisor.SafetyBooks` for one bench."""
 
     def __init__(self, database_url: str, bench_id: str) -> None:
         self._url = database_url

@@ -13,7 +13,7 @@ KEY = "stops_taken_at"
 
 
 class SqlStopAddresses:
-    """Written by supervisors, read by every API."""
+    """Addresses written by supervisors and read by every API process."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -25,7 +25,7 @@ class SqlStopAddresses:
         return {name: Listening(**document[KEY]) for name, document in rows if KEY in document}
 
     def say(self, bench_id: str, at: Listening) -> None:
-        """Remember where a bench's supervisor listens. Raises `StorageFull`, `StorageFailure`."""
+        """Store the address where a bench's supervisor listens. Raises `StorageFull`, `StorageFailure`."""
         said = {"address": at.address, "host": at.host}
         with self._database.read() as session:
             document = session.scalar(select(BenchRow.document).where(BenchRow.id == bench_id))

@@ -42,7 +42,7 @@ class StoredSamples:
     _reader: ChunkReader
 
     def blocks(self) -> Iterator[RawArray]:
-        """The raw samples in order, a chunk at a time."""
+        """Yield the raw samples in order, a chunk at a time."""
         return self._reader.blocks([c.name for c in self.info.channels], 0, self.info.count)
 
 
@@ -111,7 +111,7 @@ class SqlRecordingStore:
         return len(left_open)
 
     def discard_open_imports(self, before: datetime) -> int:
-        """Remove what crashed imports left behind: open recordings of no job, begun before a moment. How many."""
+        """Delete open recordings of crashed imports, begun before a moment and without a job. Return their number."""
         query = select(RecordingRow.id).where(
             RecordingRow.job_id.is_(None), RecordingRow.state == _OPEN, RecordingRow.created_at < before
         )

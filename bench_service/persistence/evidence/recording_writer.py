@@ -134,7 +134,7 @@ class SqlRecordingWriter:
             return info_of_row(row)
 
     def _interrupt(self) -> None:
-        """Keep what was committed, without what had not filled a chunk."""
+        """Keep the committed chunks, and drop the samples that had not filled a chunk."""
         with self._database.write() as session:
             row = self._row(session)
             row.content_hash = self._hash.hexdigest()
@@ -170,7 +170,7 @@ class SqlRecordingWriter:
         row.stored_bytes += len(payload)
 
     def _complete_before(self) -> RecordingInfo | None:
-        """The complete recording of the same key, or of the same job and station, if there is one."""
+        """Find the complete recording of the same key, or of the same job and station, if there is one."""
         with self._database.read() as session:
             made = made_before(session, self._new.idempotency, "recording")
             row = None if made is None else session.get(RecordingRow, made)

@@ -28,7 +28,7 @@ CLOCKS_DIFFER_S = 5.0
 
 
 def found_job(session: Session, job_id: str, *, lock: bool = False) -> JobRow:
-    """The row of a job, locked for this transaction where asked. Raises `NotFound`."""
+    """Read the row of a job, locked for this transaction where asked. Raises `NotFound`."""
     row = session.scalar(_LOCKED_JOB if lock else _JOB, {"id": job_id})
     if row is None:
         raise NotFound("job", job_id)
@@ -44,7 +44,7 @@ def move_job(
     failure: Failure | None = None,
     result_id: str | None = None,
 ) -> None:
-    """Change the state of a locked row, with what goes with it, and say so in an event. Raises `IllegalTransition`."""
+    """Change the state of a locked row and its dependent fields, and append an event. Raises `IllegalTransition`."""
     before = state_of_row(row)
     if to not in LEGAL[before]:
         raise IllegalTransition(f"job {row.id} is {before.value}; it cannot become {to.value}")

@@ -120,19 +120,19 @@ def _look(session: Session, bench: str, at: datetime) -> BenchQueue:
 def _queue(
     session: Session, bench: str, at: datetime, entries: tuple[QueueEntry, ...], running: str | None = None
 ) -> BenchQueue:
-    """These entries, with everything that may keep them from starting."""
+    """Combine these entries with everything that may keep them from starting."""
     if not entries:
         return BenchQueue(bench, at, (), running)
     return BenchQueue(bench, at, entries, running, standing_stops(session, bench), active_reservations(session, at))
 
 
 def _running(session: Session, bench: str) -> str | None:
-    """The id of the job that drives a bench."""
+    """Return the id of the job that drives a bench."""
     return session.scalar(_RUNNING, {"bench": bench})
 
 
 def _entries(session: Session, bench: str, limit: int, after: QueueEntry | None = None) -> tuple[QueueEntry, ...]:
-    """The first that wait for a bench, or the next after one of them."""
+    """Read the first entries that wait for a bench, or those that follow one of them."""
     asked: dict[str, Any] = {"bench": bench, "limit": limit}
     if after is not None:
         asked |= {"last_priority": after.priority, "last_queued_at": after.queued_at, "last_id": after.id}

@@ -67,7 +67,7 @@ class EventRow(Table):
 
 
 class ReservationRow(Table):
-    """A unit or a bench that somebody keeps for a while."""
+    """A reservation of a unit or a bench."""
 
     __tablename__ = "reservations"
     __table_args__ = (Index("ix_reservations_kind_name", "kind", "name"),)
@@ -83,7 +83,7 @@ class ReservationRow(Table):
 
 
 class IdempotencyKeyRow(Table):
-    """A client's key, what was asked with it, and the id of what it made."""
+    """A client's idempotency key, the request made with it, and the id of the created object."""
 
     __tablename__ = "idempotency_keys"
 

@@ -1,4 +1,4 @@
-"""Table of the audit trail."""
+"""SQL table of the audit trail."""
 
 from datetime import datetime
 from typing import Any
