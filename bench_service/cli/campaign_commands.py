@@ -189,7 +189,7 @@ def _write_junit(content: bytes, run_id: str, file: Path) -> None:
 
 
 def _step_parameters(texts: list[str]) -> dict[str, dict[str, Any]]:
-    """``step.name=value`` as step -> name -> value."""
+    """Convert ``step.name=value`` texts to step -> name -> value."""
     found: dict[str, dict[str, Any]] = {}
     for text in texts:
         path, value = parameter(text)
@@ -209,7 +209,7 @@ def _labels(texts: list[str]) -> dict[str, str]:
 
 
 def _all(client: "httpx.Client", path: str) -> list[dict[str, Any]]:
-    """Every page of a list."""
+    """Read every page of a list."""
     items: list[dict[str, Any]] = []
     query: dict[str, Any] = {"limit": 500}
     while True:

@@ -1,4 +1,4 @@
-"""One client for both ways: a server's address, or the same application in this process."""
+"""HTTP client for both ways: a server's address, or the same application in this process."""
 
 import tempfile
 from collections.abc import Generator, Sequence
@@ -25,7 +25,7 @@ RESULT = ("id", "verdict", "document")
 
 @contextmanager
 def connect(settings: Settings, server: str | None, drive: bool) -> Generator["httpx.Client"]:
-    """A client to `server`, or to an application in this process that lives as long as the block.
+    """Open a client to `server`, or to an application in this process that lives as long as the block.
 
     `drive`: true where the embedded application is to run jobs, for which it must have the bench to itself.
     Raises `Refused` where no service answers a request made in the block.
@@ -42,7 +42,7 @@ def connect(settings: Settings, server: str | None, drive: bool) -> Generator["h
 
 
 def _token(settings: Settings) -> dict[str, str]:
-    """The header with the service's token, where the settings have one. Raises `Refused`."""
+    """Build the header with the service's token, where the settings have one. Raises `Refused`."""
     try:
         token = settings.token()
     except BadSettings as error:
@@ -119,7 +119,7 @@ def check(response: "httpx.Response") -> None:
 
 
 def segment(name: str) -> str:
-    """A name as one segment of a path, whatever is in it."""
+    """Quote a name as one segment of a path, whatever is in it."""
     return quote(name, safe="")
 
 
@@ -149,7 +149,7 @@ def _no_service(response: "httpx.Response") -> str:
 
 
 def _beginning(response: "httpx.Response") -> str:
-    """Status and the first words, in one line."""
+    """Describe an answer by its status and first words, in one line."""
     text = " ".join(response.text.split())
     shown = text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
     return f"{response.status_code} {response.reason_phrase}: {shown or 'nothing'}"

@@ -1,4 +1,4 @@
-"""The companion of a process that drives a bench: a supervisor in a process of its own, kept there while it drives.
+"""Companion of a process that drives a bench: a supervisor in a process of its own, restarted while it drives.
 
 A companion that ended is started again, whatever ended it, at a pace that falls while it does not last. One that left
 the bench to another supervisor comes back only once the bench has been without supervisor for a while: long enough for
@@ -36,10 +36,10 @@ log = logging.getLogger(__name__)
 
 
 class Companion:
-    """Starts a supervisor, and starts it again; it lives on its own."""
+    """Starts a supervisor process and restarts it when it ends; the process outlives this one."""
 
     def __init__(self, bench_id: str, spawn: Callable[[], Process], supervised: Callable[[], bool]) -> None:
-        """`spawn` starts a supervisor; `supervised`: whether anybody supervises the bench now."""
+        """`spawn` starts a supervisor; `supervised`: returns whether any process supervises the bench now."""
         self._bench_id = bench_id
         self._spawn = spawn
         self._supervised = supervised
@@ -49,7 +49,7 @@ class Companion:
         self._pause_s = AGAIN_S
 
     def look(self, now_s: float) -> None:
-        """Note its end, and start it if that is due."""
+        """Note the companion's end, and start it if that is due."""
         if self._process is not None:
             code = self._process.poll()
             if code is None:
@@ -62,7 +62,7 @@ class Companion:
             self._start(now_s)
 
     def leave(self) -> None:
-        """Wait a moment for its end; if it has work left it goes on alone."""
+        """Wait a moment for the companion's end; if it has work left, it goes on alone."""
         if self._process is None:
             return
         try:

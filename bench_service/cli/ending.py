@@ -6,7 +6,7 @@ from types import FrameType
 
 
 def ending_on_signals() -> threading.Event:
-    """An event that SIGTERM or SIGINT sets from now on. Must be called in the main thread."""
+    """Create an event that SIGTERM or SIGINT sets from now on. Must be called in the main thread."""
     ending = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:

@@ -1,4 +1,4 @@
-"""Waiting for a service that is away for a while: restarted, or behind a link that is down."""
+"""Retries while a service is away for a while: restarted, or behind a link that is down."""
 
 from collections.abc import Callable
 from typing import TypeVar

@@ -2,7 +2,7 @@
 
 
 class Refused(Exception):
-    """The service refused, or cannot be reached; the message is fit for a person."""
+    """The service refused, or cannot be reached; the message is meant for a person."""
 
 
 class Away(Refused):

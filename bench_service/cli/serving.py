@@ -46,7 +46,7 @@ class _Server(uvicorn.Server):
 def ready(
     settings: Settings, drive: bool = True, socket_file: Path | None = None, level: str = "warning"
 ) -> Generator[uvicorn.Server]:
-    """A server around an open service, ready to run; the service is closed at the end, or when the server shuts down.
+    """Open a server around a service, ready to run; the service is closed at the end, or when the server shuts down.
 
     `level`: from which on lines are logged, where the settings do not say.
     Raises `Refused` for an address that it may not listen on, `Misconfigured` for a token that cannot be used, and what
@@ -97,7 +97,7 @@ def _check_start(service: BenchService) -> None:
 
 
 def check_address(settings: Settings) -> None:
-    """Raises `Refused` for an address from which anybody could ask, with what it takes to listen there."""
+    """Check the address. Raises `Refused` for one that is reachable by anyone, with the settings that it needs."""
     if not may_listen(settings):
         raise Refused(
             f"BENCH_HOST = {settings.host}: this service listens on another address than a loopback one only with a "
@@ -107,7 +107,7 @@ def check_address(settings: Settings) -> None:
 
 
 def check_port(settings: Settings) -> None:
-    """Raises `Refused` with a hint where the port is taken, and as `check_address`."""
+    """Check port and address. Raises `Refused` with a hint where the port is taken, and as `check_address`."""
     check_address(settings)
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -72,7 +72,7 @@ def stop_here(bench: str, folder: Path, reason: str, wait_s: float, say: Callabl
 
 
 def stop_command(arguments: Sequence[str], environ: Mapping[str, str]) -> int:
-    """``bench stop`` by itself, without the rest of the command line; its exit code.
+    """Run ``bench stop`` by itself, without the rest of the command line; return its exit code.
 
     Of the environment it reads what it needs: a setting that another command would refuse does not keep a stop out.
     """
@@ -110,7 +110,7 @@ def _known(folder: Path, bench: str) -> bool:
 
 
 def _make_safe(folder: Path, bench: str) -> tuple[bool, str]:
-    """Over the devices' own link, where no other process has it; numerics are loaded here, and only here."""
+    """Make safe over the devices' own link, where no other process has it; numerics are loaded here, and only here."""
     from bench_service.bench.make_safe import over_new_link
     from bench_service.drivers.device_register import DeviceRegister
     from bench_service.drivers.registered import RegisteredDevices

@@ -35,7 +35,7 @@ def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]]
 
 
 def check_table(document: dict[str, Any]) -> Table:
-    """Each value against its limit."""
+    """Table of checks, each value next to its limit."""
     table = Table(title="Checks")
     for column in ("check", "value", "limit", "unit", "outcome"):
         table.add_column(column, justify="left" if column in ("check", "unit", "outcome") else "right")

@@ -13,7 +13,7 @@ from procedures.bench.errors import Disconnected
 
 
 class DeviceCables:
-    """The cables of one bench's devices, which are named as in the devices' journal: "turntable", "imu", …"""
+    """Cables of one bench's devices, which are named as in the devices' journal: "turntable", "imu", …"""
 
     def __init__(self, folder: Path, bench_id: str) -> None:
         self._folder = folder
@@ -38,7 +38,7 @@ class DeviceCables:
         partial.replace(path)
 
     def need(self, device: str) -> None:
-        """Raises `Disconnected` naming the device while its link is lost."""
+        """Check a device's cable. Raises `Disconnected` naming the device while its link is lost."""
         lost = self._lost(self.file(device))
         if lost is not None and (lost[0] is None or wall_clock.now() < lost[0]):
             why = f" ({lost[1]})" if lost[1] else ""

@@ -14,7 +14,7 @@ from typing import Any
 from bench_service import wall_clock
 
 ROTATE_BYTES = 2_000_000
-"""A journal of this size becomes an old one."""
+"""Size at which a journal becomes an old one [bytes]."""
 KEPT = 3
 """Number of old journals that are kept."""
 
@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 
 class DeviceJournal:
-    """The journal of one bench; any process may append a line, whole lines never mix."""
+    """Journal of one bench; any process may append a line, whole lines never mix."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -62,7 +62,7 @@ class DeviceJournal:
         self.path.replace(self._old(1))
 
     def entries(self) -> list[dict[str, Any]]:
-        """Every line that is kept, oldest first; without those that a full disk cut."""
+        """Read every line that is kept, oldest first; without those that a full disk cut."""
         found: list[dict[str, Any]] = []
         for file in [*(self._old(number) for number in range(KEPT, 0, -1)), self.path]:
             for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:

@@ -32,7 +32,7 @@ class DeviceRegister:
         self.cables = DeviceCables(folder, bench_id)
 
     def read(self) -> DeviceState | None:
-        """The devices' state, without their link; None where no process of this host ever had it."""
+        """Read the devices' state without their link; None where no process of this host ever had it."""
         try:
             file = os.open(self.path, os.O_RDONLY | os.O_CLOEXEC)
         except FileNotFoundError:
@@ -60,7 +60,7 @@ class DeviceRegister:
 
 
 class DeviceLink:
-    """The right to command a bench's devices, and the memory of what was commanded. Closed, it commands nothing."""
+    """Right to command a bench's devices, and the memory of the last commands. Closed, it commands nothing."""
 
     def __init__(self, file: int, journal: DeviceJournal, by: str, job: str | None) -> None:
         self._file: int | None = file
@@ -76,14 +76,14 @@ class DeviceLink:
         return self._file is not None
 
     def note(self, verb: str, arguments: dict[str, Any], **changes: Any) -> None:
-        """Write what is asked of the devices, and what that makes of them. Raises `Disconnected` once it is closed."""
+        """Write a demand on the devices, and the state that it leads to. Raises `Disconnected` once it is closed."""
         with self._mutex:
             if self._file is None:
                 raise Disconnected(f"{verb}: this process has given up the devices' link")
             self._note(self._file, verb, arguments, changes)
 
     def close(self) -> None:
-        """Give the link back; a second time does nothing. A device that still moves goes on moving."""
+        """Release the link; a second call does nothing. A device that still moves goes on moving."""
         with self._mutex:
             if self._file is not None:
                 self._note(self._file, "link.closed", {}, {"linked": False})
@@ -105,7 +105,7 @@ def _written(state: DeviceState) -> bytes:
 
 
 def _read(file: int) -> DeviceState | None:
-    """The state in a file; None in an empty one, which somebody is about to write."""
+    """Read the state in a file; None in an empty one, which another process is about to write."""
     try:
         document = read_record(file)
     except Unreadable:

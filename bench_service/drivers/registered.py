@@ -12,7 +12,7 @@ from procedures.bench import SAFE_ORDER, Bench
 from procedures.bench.errors import Disconnected, OutOfRange
 
 READS = frozenset({"turntable.read_angles", "turntable.is_moving", "supply.is_on", "chamber.read"})
-"""Verbs that change nothing: not noted."""
+"""Verbs that change nothing and are not noted."""
 REMEMBERED = ("table", "powered", "chamber_target_c", "current_ma")
 """Fields of the state that change as soon as a demand is made; a refused demand does not change them."""
 SAFE: dict[str, Callable[[DeviceState], dict[str, Any]]] = {
@@ -23,7 +23,7 @@ SAFE: dict[str, Callable[[DeviceState], dict[str, Any]]] = {
 }
 """State of each device after it is made safe."""
 LOST = "as the bench's truth file has it"
-"""Why a link is lost that neither a person nor an exercise has lost."""
+"""Reason of a lost link that neither a person nor an exercise has lost."""
 
 
 class RegisterObserver:
@@ -73,7 +73,7 @@ class RegisterObserver:
             self._faults.strike(verb, arguments)
 
     def end(self, verb: str, failure: BaseException | None) -> None:
-        """Note what became of a demand. One that was refused before anything moved changed nothing."""
+        """Note the outcome of a demand. One that was refused before anything moved changed nothing."""
         self._notice_losses()
         if verb in READS:
             return
@@ -90,7 +90,7 @@ class RegisterObserver:
         self._note_quietly(f"{verb}.failed", {"error": f"{type(failure).__name__}: {failure}"}, changes)
 
     def asked(self, device: str) -> None:
-        """A block is wanted: not noted, there are too many."""
+        """Check the link for a block and inject faults; the request is not noted, as there are too many."""
         self._reach(f"{device}.block")
         if self._faults is not None:
             self._faults.strike(f"{device}.block", {})
@@ -149,13 +149,13 @@ class RegisteredBench(ObservedBench):
         self._link = link
 
     def close(self) -> None:
-        """Give the link back. A verb that is still under way finds it closed."""
+        """Release the link. A verb that is still under way finds it closed."""
         self._link.close()
         super().close()
 
 
 class RegisteredDevices:
-    """`bench_service.bench.devices.BenchDevices` over a register: it needs no world, as real devices need no job."""
+    """Implements `bench_service.bench.devices.BenchDevices` by a register, without a world or a job."""
 
     def __init__(self, register: DeviceRegister) -> None:
         self._register = register
@@ -184,7 +184,7 @@ class RegisteredDevices:
             link.close()
 
     def _make_safe(self, link: DeviceLink, device: str) -> Disconnected | None:
-        """Make one device safe; why it could not be reached."""
+        """Make one device safe; return why it could not be reached."""
         try:
             self._register.cables.need(device)
         except Disconnected as lost:

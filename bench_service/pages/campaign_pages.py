@@ -1,4 +1,4 @@
-"""The pages around campaigns: what there is, a run step by step, a quantity's trend."""
+"""Routes of the campaign pages: the overview, a run step by step, a quantity's trend."""
 
 from urllib.parse import quote, urlencode
 
@@ -28,7 +28,7 @@ def _explanation(run: CampaignRun) -> str:
 
 @router.get("/campaigns")
 def campaigns_page(request: Request) -> HTMLResponse:
-    """Campaigns, schedules, the latest runs."""
+    """Page of campaigns, schedules and the latest runs."""
     service = service_of(request)
     return templates.TemplateResponse(
         request,
@@ -53,7 +53,7 @@ def campaign_run_page(run_id: str, request: Request) -> HTMLResponse:
 
 @router.get("/units/{serial}/trend")
 def trend_page(serial: str, request: Request, query: TrendQuery) -> HTMLResponse:
-    """A quantity over the unit's results; without one, what there is to choose from."""
+    """Page of a quantity's trend over the unit's results; without a quantity, the list of those to choose from."""
     service = service_of(request)
     choice = wanted_trend(service, serial, query)
     chart = trend_of(service, serial, choice)

@@ -30,7 +30,7 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 SMALLEST = Figure("", "", "", (Series("", (0.0, 1.0), (0.0, 1.0)),))
 _elsewhere: list[WorkProcesses] = []
-"""The process that draws, where it is not this one."""
+"""The processes that draw, where it is not this one."""
 
 
 def warm_up() -> None:
@@ -39,7 +39,7 @@ def warm_up() -> None:
 
 
 def draw_in(processes: WorkProcesses | None) -> None:
-    """From now on draw in another process; None: in this one."""
+    """Draw in another process from now on; None: in this one."""
     _elsewhere[:] = [] if processes is None else [processes]
 
 
@@ -51,7 +51,7 @@ _DRAWING = Lock()
 
 @lru_cache(maxsize=200)
 def svg(figure: Figure) -> str:
-    """The figure as an SVG document; drawn once, because a result never changes."""
+    """Return the figure as an SVG document; drawn once, because a result never changes."""
     for processes in _elsewhere:
         try:
             return processes.result("svg", figure)
@@ -61,7 +61,7 @@ def svg(figure: Figure) -> str:
 
 
 def drawn_here(figure: Figure) -> str:
-    """The figure as an SVG document, drawn by this process."""
+    """Draw the figure as an SVG document in this process."""
     with _DRAWING:
         return _drawn(figure)
 
@@ -94,7 +94,7 @@ def _drawn(figure: Figure) -> str:
 
 
 def _draw(axes: "Axes", series: Series, colour: str, mark: str) -> None:
-    """One series in its style; error bars where it has them."""
+    """Draw one series in its style; error bars where it has them."""
     if series.style == "reference":
         axes.plot(series.x, series.y, linestyle="--", linewidth=1.0, color="#444444", label=series.name)
         return

@@ -13,7 +13,7 @@ templates = Jinja2Templates(Path(__file__).parent / "templates")
 
 
 def number(value: Any) -> str:
-    """A cell as a reader wants it: six significant digits, a dash for what is absent."""
+    """Format a cell for a reader: six significant digits, a dash for what is absent."""
     if value is None:
         return "–"
     if isinstance(value, bool):

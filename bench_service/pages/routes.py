@@ -33,7 +33,7 @@ def _page(request: Request, name: str, **context: Any) -> HTMLResponse:
 
 
 def _reported(service: BenchService, result: StoredResult) -> dict[str, Any]:
-    """A result with its report: tables as they are, figures with the address of their image."""
+    """Result with its report: tables as they are, figures with the address of their image."""
     report = service.catalogue.report(result)
     sections: list[dict[str, Any]] = []
     number = 0
@@ -48,7 +48,7 @@ def _reported(service: BenchService, result: StoredResult) -> dict[str, Any]:
 
 
 def _noise_rows(unit: Unit) -> list[list[str]]:
-    """A row a channel: its noise coefficients in the units people read, a dash for what is absent."""
+    """Noise coefficients, one row for each channel, in the units people read, a dash for what is absent."""
     rows: list[list[str]] = []
     for triad, rate_unit in (("gyro", "rad/s"), ("accelerometer", "m/s^2")):
         record = unit.triad(triad)
@@ -86,7 +86,7 @@ def _explanation(job: Job) -> str:
 
 @router.get("/")
 def home(request: Request) -> HTMLResponse:
-    """The benches, their units, the latest jobs."""
+    """Page of the benches, their units and the latest jobs."""
     service = service_of(request)
     queued = service.stores.queue.lengths()
     return _page(

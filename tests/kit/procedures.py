@@ -119,5 +119,5 @@ def require_report(report: Report) -> None:
 
 
 def parameters_of(procedure: AnyProcedure, context: Context, **parameters: object) -> Parameters:
-    """Parameters with every default filled."""
+    """Return the parameters with every default filled."""
     return procedure.resolve(procedure.params.model_validate(parameters), context)
