@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from procedures.bench.errors import OutOfRange
 
 SLICE_S = 10.0
-"""At most this much bench time passes between two points where a cancellation can land."""
+"""Longest bench time between two points where a cancellation can land [s]."""
 REAL_TIME_SLICE_S = 0.1
 """Longest real time between two such points, where the clock is asked to keep pace with real time [s]."""
 

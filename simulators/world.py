@@ -32,7 +32,7 @@ from simulators.turntable.profile import move_ticks
 
 CHECKPOINT_VERSION = 3
 WARM_SLICE_S = 60.0
-"""Slices and blocks of a world with a chamber: a thermal run is half a day, at few samples a second."""
+"""Length of slices and blocks of a world with a chamber: a thermal run is half a day, at few samples a second."""
 
 
 @dataclass(frozen=True)
@@ -43,19 +43,19 @@ class WorldConfig:
     bench: BenchTruth = field(default_factory=default_bench)
     seed: int = 1
     sample_rate_hz: float | None = None
-    """Instead of the unit's own rate."""
+    """Sample rate that replaces the unit's own [Hz]."""
     thermal: bool = False
     """True where the unit stands in the chamber and feels its temperature; else it is warm, at the reference."""
     currents: bool = False
     """True where a converter alone stands in the chamber, a current source on its inputs, instead of the whole unit."""
     real_time_factor: float | None = None
-    """Bench seconds per real second; None: as fast as it can."""
+    """Number of bench seconds per real second; None: as fast as it can."""
     wait: Wait | None = field(default=None, repr=False)
     """Function that waits real seconds; needed with a real-time factor."""
 
     @property
     def rate_hz(self) -> float:
-        """Samples per second, also the clock's ticks."""
+        """Samples per second, which are also the clock's ticks [Hz]."""
         return self.unit.sample_rate_hz if self.sample_rate_hz is None else self.sample_rate_hz
 
     @property
@@ -93,7 +93,7 @@ class SimulatedBench(Bench):
         }
 
     def lost_links(self) -> frozenset[str]:
-        """Devices that do not answer any more, and never will."""
+        """List the devices that do not answer any more, and never will."""
         return frozenset({"chamber"}) if self.chamber is not None and self.chamber.link_lost else frozenset()
 
     def true_calibration(self) -> dict[str, tuple[Array, Array]]:
@@ -102,7 +102,7 @@ class SimulatedBench(Bench):
 
 
 def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> SimulatedBench:
-    """A bench with the table at zero and the unit off, or as a checkpoint of the same seed and rate left it.
+    """Build a bench with the table at zero and the unit off, or as a checkpoint of the same seed and rate left it.
 
     Raises `DeviceFault` where a chamber is wanted and the bench has none, `OtherVersion` for another's checkpoint.
     """
@@ -145,7 +145,7 @@ def _chamber(config: WorldConfig, clock: SimClock) -> SimChamber:
 def _unit(
     config: WorldConfig, clock: SimClock, table: SimTurntable, supply: SimSupply, chamber: SimChamber | None
 ) -> SimImu:
-    """A whole unit on the table."""
+    """Build the whole unit, and connect it to table, supply and chamber."""
     imu = SimImu(config.unit, config.seed, clock, supply.launch, config.thermal, config.slice_s)
     if chamber is None:
         supply.connect(imu.power_up, imu.power_down)
@@ -156,7 +156,7 @@ def _unit(
 
 
 def _connect_warm(clock: SimClock, table: SimTurntable, supply: SimSupply, imu: SimImu, chamber: SimChamber) -> None:
-    """Whatever moves the unit also warms it; its power heats it."""
+    """Connect unit and chamber: time that moves the unit also warms it, and its power heats it."""
 
     def advance(ticks: int) -> None:
         motion, warmth = table.advance(ticks), chamber.advance(ticks)

@@ -15,7 +15,7 @@ from procedures.core.recording import Channel, RawArray
 
 
 class ContentHash:
-    """The hash while samples arrive."""
+    """Content hash while samples arrive."""
 
     def __init__(self, channels: Sequence[Channel], rate_hz: float, dtype: SampleType) -> None:
         self._dtype = np.dtype(dtype).newbyteorder("<")
@@ -39,12 +39,12 @@ class ContentHash:
         return twin
 
     def hexdigest(self) -> str:
-        """The hash of what has arrived, as 64 hexadecimal digits."""
+        """Return the hash of all samples so far, as 64 hexadecimal digits."""
         return self._sha.hexdigest()
 
 
 def content_hash(channels: Sequence[Channel], rate_hz: float, samples: RawArray) -> str:
-    """The hash of a recording held in memory."""
+    """Compute the hash of a recording held in memory."""
     whole = ContentHash(channels, rate_hz, samples.dtype)
     whole.update(samples)
     return whole.hexdigest()

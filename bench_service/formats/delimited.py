@@ -1,4 +1,4 @@
-"""Columns of numbers out of delimited text, plain or gzipped, a block at a time.
+"""Reader of delimited text, plain or gzipped: columns of numbers, a block at a time.
 
 Arrow reads the numbers fast; where it stumbles, the piece is read again slowly to say which line is wrong and why.
 """
@@ -35,7 +35,7 @@ class _NotANumber(Exception):
 def text_columns(
     stream: BinaryIO, name: str, columns: Sequence[Column], description: ImportDescription, bounds: Bounds
 ) -> Iterator[Block]:
-    """The named columns, block by block, the time first where the description has one. Raises `UnreadableFile`."""
+    """Read the named columns, block by block, the time first where the description has one. Raises `UnreadableFile`."""
     table = TextTable(stream, name, description, bounds)
     reader = _Reader(table, name, columns, description)
     for number, text in _pieces(table, description):
@@ -49,7 +49,7 @@ def text_columns(
 
 
 class _Reader:
-    """Makes blocks of whole lines of a table."""
+    """Converts whole lines of a table to blocks."""
 
     def __init__(self, table: TextTable, name: str, columns: Sequence[Column], description: ImportDescription) -> None:
         self._description = description
@@ -64,7 +64,7 @@ class _Reader:
         self._missing = description.gaps == "mark"
 
     def block(self, text: bytes) -> Block:
-        """The block of some whole lines. Raises `ArrowInvalid`, `_NotANumber`, `NoClock`."""
+        """Convert some whole lines to a block. Raises `ArrowInvalid`, `_NotANumber`, `NoClock`."""
         if self._blanks:
             text = _MARGINS.sub(b"", _BLANKS.sub(b"\t", text))
         parsed = self._parsed(text)
@@ -113,7 +113,7 @@ class _Reader:
 
 
 def _pieces(table: TextTable, description: ImportDescription) -> Iterator[tuple[int, bytes]]:
-    """Whole lines of the rows that are wanted, with the number of the first. Raises `UnreadableFile`."""
+    """Yield whole lines of the wanted rows, with the number of the first. Raises `UnreadableFile`."""
     number, row = table.first_line, 1
     first, last = description.rows.first, description.rows.last
     while piece := table.text.piece(_BLOCK_BYTES):

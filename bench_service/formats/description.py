@@ -13,7 +13,7 @@ from procedures.core.recording import Channel, Quantity
 from procedures.core.unit import SERIAL
 
 Column = str | int
-"""By name, or by index from 0."""
+"""Column of a file by name, or by index from 0."""
 
 DELIMITERS = {",": b",", ";": b";", "tab": b"\t", "whitespace": b" "}
 
@@ -136,7 +136,7 @@ class ImportDescription(_Strict):
         return self
 
     def columns_of(self, file: int) -> tuple[Column, ...]:
-        """The columns that are read from a file, the time first where there is one."""
+        """List the columns that are read from a file, the time first where there is one."""
         time: tuple[Column, ...] = () if self.time_column is None else (self.time_column,)
         return (*time, *(c.source_column for c in self.channels if c.file == file))
 
@@ -146,5 +146,5 @@ class ImportDescription(_Strict):
         return SECONDS.get(self.time_unit, 1e-9)
 
     def declared(self) -> dict[str, Any]:
-        """As JSON, to be kept with the recording."""
+        """Return the description as JSON, to be kept with the recording."""
         return self.model_dump(mode="json", exclude_defaults=True)

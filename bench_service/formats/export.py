@@ -1,4 +1,4 @@
-"""A recording going out as Arrow, Parquet or CSV, a block at a time: memory does not grow with its length.
+"""Export of a recording as Arrow, Parquet or CSV, a block at a time: memory does not grow with its length.
 
 Samples go out as they are stored, raw; scale, offset, unit and quantity of each channel, the rate and the content hash
 of the whole recording travel with them. ``value = scale·(raw − offset)``. Must not know where the blocks come from.
@@ -56,7 +56,7 @@ def extract(
     start_s: float | None = None,
     stop_s: float | None = None,
 ) -> Extract:
-    """The part that is asked for, by names and by time since the first sample [s]; a sample belongs to its beginning.
+    """Select a part by names and by time since the first sample [s]; a sample belongs to its beginning.
 
     Raises `MissingChannel`, `BadParameter`.
     """
@@ -79,7 +79,7 @@ def _sample(info: RecordingInfo, field: str, moment_s: float) -> int:
 
 
 def export(part: Extract, blocks: Iterable[RawArray], form: ExportFormat) -> Iterator[bytes]:
-    """The bytes of a file. `blocks` are the samples of the part, in order, each (n, channels)."""
+    """Yield the bytes of a file. `blocks` are the samples of the part, in order, each (n, channels)."""
     writers: dict[ExportFormat, Callable[[Extract, Iterable[RawArray]], Iterator[bytes]]] = {
         ExportFormat.ARROW: _arrow,
         ExportFormat.PARQUET: _parquet,
@@ -89,7 +89,7 @@ def export(part: Extract, blocks: Iterable[RawArray], form: ExportFormat) -> Ite
 
 
 class _Outbox:
-    """A file that gives away what was written to it."""
+    """File object that hands out the bytes written to it."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []

@@ -1,4 +1,4 @@
-"""Recorded files coming in: columns of one or several files become the samples and the uniform rate of one recording.
+"""Import of recorded files: columns of one or several files become the samples and uniform rate of one recording.
 
 The files are read twice, a block at a time: once to check every number and every time step, once to hand the samples
 on. Nothing is interpolated: what does not fit is refused with file, row and the way out, and what is left out or
@@ -38,7 +38,7 @@ class ImportFile:
 
 
 class Imported(Protocol):
-    """Files that were checked and fit together, wherever they are read."""
+    """Files that were checked and fit together, whichever process reads them."""
 
     @property
     def description(self) -> ImportDescription: ...

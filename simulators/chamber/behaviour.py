@@ -47,14 +47,14 @@ class Response:
 
 
 def response(truth: UnitThermalTruth, temperatures_c: Array) -> Response:
-    """The response at node temperatures (n, 8) in the order of `NODES` [°C]."""
+    """Compute the response at node temperatures (n, 8) in the order of `NODES` [°C]."""
     gain, added = accelerometers(truth.accelerometers, temperatures_c)
     converter_gain, zero = converters(truth.converter, temperatures_c[:, CONVERTER])
     return Response(gain, added, converter_gain, zero, gyros(truth.gyro, temperatures_c))
 
 
 def accelerometers(truths: Sequence[AccelerometerThermalTruth], temperatures_c: Array) -> tuple[Array, Array]:
-    """Gain 1/(1 + A) and added −B [m/s²] of each channel, (n, 3) both."""
+    """Compute gain 1/(1 + A) and added −B [m/s²] of each channel, (n, 3) both."""
     departure = temperatures_c - REFERENCE_C
     case, block, board = (departure[:, [node]] for node in (CASE, BLOCK, CONVERTER))
     share = np.array([t.block_share for t in truths])

@@ -26,19 +26,19 @@ class Warmth:
     """Thermal outcome of some ticks: temperatures and codes of every whole second that ended within them."""
 
     temperatures_c: Array
-    """(n, 8) in the order of `NODES`."""
+    """Node temperatures, (n, 8), in the order of `NODES` [°C]."""
     codes: Codes
-    """(n, 5) in the order of `THERMOMETERS`."""
+    """Sensor codes, (n, 5), in the order of `THERMOMETERS`."""
     end_ticks: tuple[int, ...]
-    """At which of the ticks, 1 … ticks, each second ended."""
+    """Ticks, 1 … ticks, at which each second ended."""
     before_c: Array
-    """(8,), at the end of the last second before these ticks: they hold until the first one ends."""
+    """Node temperatures (8,) at the end of the last second before these ticks: they hold until the first one ends."""
     codes_before: Codes
-    """(5,), of that same second."""
+    """Sensor codes (5,) of that same second."""
 
 
 class SimChamber:
-    """Chamber, unit's heat, thermometers. `advance` is what the world's clock moves."""
+    """Device of chamber, unit's heat and thermometers. The world's clock calls `advance`."""
 
     def __init__(
         self,
@@ -92,7 +92,7 @@ class SimChamber:
             self.plant.command(self._limits.ambient_c, self._limits.ramp_c_min / 60.0)
 
     def unit_power(self, on: bool) -> None:
-        """The unit's supply was switched: from the next second on it heats itself, or no more."""
+        """Note that the unit's supply was switched: from the next second on it heats itself, or no more."""
         self.plant.state.unit_on = on
 
     def set_door(self, is_open: bool) -> None:
@@ -102,12 +102,12 @@ class SimChamber:
             self.plant.switch_off()
 
     def reset_limiter(self) -> None:
-        """Reset by hand after an over-temperature: for tests, in a person's place; nothing in the service can do it."""
+        """Reset by hand after an over-temperature, in a person's place: for tests; nothing in the service can do it."""
         self.plant.state.tripped = False
         self.plant.switch_off()
 
     def advance(self, ticks: int) -> Warmth:
-        """Let whole ticks pass; cheap where no second ends within them."""
+        """Advance whole ticks; cheap where no second ends within them."""
         per_second = self._rate_hz * STEP_S
         first = int(self._ticks / per_second + 1e-9)
         seconds = int((self._ticks + ticks) / per_second + 1e-9) - first
@@ -118,7 +118,7 @@ class SimChamber:
         return Warmth(path, self.thermometers.read(first, path), ends, before, codes_before)
 
     def _pieces(self, first: int, seconds: int) -> list[Array]:
-        """Node temperatures of so many seconds, cut where something breaks."""
+        """Compute node temperatures of so many seconds, cut where a fault begins."""
         cuts = {min(max(int(f.from_s / STEP_S) - first, 0), seconds) for f in self.faults}
         edges = sorted({0, seconds} | cuts)
         pieces = [np.empty((0, len(NODES)))]
@@ -146,7 +146,7 @@ class SimChamber:
             raise Disconnected("the chamber does not answer")
 
     def checkpoint(self) -> dict[str, Any]:
-        """State to resume from, JSON-ready."""
+        """State of the device to resume from, JSON-ready."""
         return {
             "ticks": self._ticks,
             "plant": self.plant.checkpoint(),

@@ -18,7 +18,7 @@ INPUTS = ("heater_w", "ambient_c", "place_c", "unit_on")
 controller, and the unit's power (0 or 1)."""
 HEATER, AMBIENT, PLACE, POWER = range(len(NODES), len(NODES) + len(INPUTS))
 RAMPED = PLACE
-"""The input that moves along a straight line."""
+"""Input that moves along a straight line within a step."""
 
 
 def rates(chamber: ChamberTruth, unit: NetworkTruth, door_open: bool) -> tuple[Array, Array]:
@@ -75,5 +75,5 @@ class Step:
 
 
 def steady(a: Array, b: Array, u: Array) -> Array:
-    """Temperatures at which nothing changes any more, (8,) [°C], for inputs (4,) held for ever."""
+    """Compute the steady temperatures, (8,) [°C], for inputs (4,) held for ever."""
     return np.asarray(np.linalg.solve(a, -b @ u), dtype=np.float64)

@@ -42,7 +42,7 @@ class Blocks:
             at += step
 
     def forget(self) -> None:
-        """Make the next block anew, whichever it is."""
+        """Discard the kept block, so that the next one is made anew."""
         self._block = -1
 
 

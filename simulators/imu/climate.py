@@ -12,7 +12,7 @@ from simulators.imu.counter import Counts
 from simulators.truth import Array
 
 Lengths = NDArray[np.intp]
-"""Ticks of pieces of time that follow one another, (pieces,)."""
+"""Lengths of consecutive pieces of time in ticks, (pieces,)."""
 
 
 @dataclass(frozen=True)
@@ -56,5 +56,5 @@ class Climate:
     """Codes of the temperature sensors, (pieces, 5)."""
 
     def codes_at_ticks(self) -> Counts:
-        """Codes held at the sample rate, (ticks, 5)."""
+        """Repeat the codes at the sample rate, (ticks, 5)."""
         return np.repeat(self.codes, self.accelerometer.lengths, axis=0)

@@ -22,11 +22,11 @@ Codes = Callable[[int, Array, Array], Array]
 """(channel, currents (n,) [mA], board temperatures (n,) [°C]) -> codes a cycle (n,), not yet whole."""
 CURRENT_CHANNELS = tuple(Channel(f"converter_{axis}", Quantity.SPECIFIC_FORCE, "count") for axis in AXES)
 FULL_SCALE = 2**15 - 1
-"""The converter has 16 bits; beyond them it stays at the end."""
+"""Full scale of the converter's 16 bits; beyond it the code is clipped."""
 
 
 class ConverterLink:
-    """Three channels of codes and the board's own thermometer."""
+    """Data link with three channels of codes and the board's own thermometer."""
 
     def __init__(self, truth: UnitTruth, clock: SimClock, launch: Callable[[], int], codes: Codes) -> None:
         """Connect to the clock; `launch` returns the number of the power-up, 0 while the converter is off."""
@@ -49,7 +49,7 @@ class ConverterLink:
         self._ticks = 0
 
     def power_down(self) -> None:
-        """End of the launch; recordings in progress find the converter gone."""
+        """End the launch; recordings in progress find the converter gone."""
         self._tapes.stop()
 
     def feel(self, ticks: int, current_ma: Callable[[], Array], lengths: Lengths, board_c: Array, sent: Counts) -> None:
@@ -81,7 +81,7 @@ class ConverterLink:
         return Stream(self._channels, self.rate_hz, start / self.rate_hz, blocks, station, launched_s)
 
     def checkpoint(self) -> dict[str, Any]:
-        """State to resume from."""
+        """State of the link, from which it can resume."""
         return {"ticks": self._ticks}
 
     def resume(self, launch: int, state: dict[str, Any]) -> None:

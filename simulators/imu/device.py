@@ -1,4 +1,4 @@
-"""The unit's data link on a simulated bench: implements `procedures.bench.imu.Imu`."""
+"""Data link of the unit on a simulated bench: implements `procedures.bench.imu.Imu`."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,7 +16,7 @@ from simulators.truth import UnitTruth, temperature_channels, unit_channels
 
 
 class SimImu:
-    """A unit that counts from power-up to power-down, whether or not anybody reads it."""
+    """A unit that counts from power-up to power-down, whether or not a recording runs."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class SimImu:
         }
 
     def power_down(self) -> None:
-        """End of the launch; recordings in progress find the unit gone."""
+        """End the launch; recordings in progress find the unit gone."""
         self._sensors = {}
         self._tapes.stop()
 
@@ -100,7 +100,7 @@ class SimImu:
         return Stream(channels, self.rate_hz, start / self.rate_hz, blocks, station, launched_s)
 
     def sensor(self, triad: str) -> TriadSensor:
-        """A triad of the present launch. Raises `NotPowered`."""
+        """Return a triad of the present launch. Raises `NotPowered`."""
         self._tapes.need_power()
         return self._sensors[triad]
 

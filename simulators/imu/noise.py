@@ -90,7 +90,7 @@ class TriadNoise:
 
     @property
     def block_ticks(self) -> int:
-        """Ticks of a canonical block."""
+        """Number of ticks of a canonical block."""
         return self._blocks.ticks
 
     def add_increments(self, total: Array, tick: int) -> None:
@@ -129,7 +129,7 @@ class TriadNoise:
         return {"block": self._start.block, "bank": self._start.bank.tolist(), "walk": self._start.walk.tolist()}
 
     def resume(self, state: dict[str, Any]) -> None:
-        """Go on from a checkpoint."""
+        """Go on from the state of a checkpoint."""
         bank = np.array(state["bank"], dtype=np.float64).reshape(-1, 3)
         self._next = SlowState(int(state["block"]), bank, np.array(state["walk"], dtype=np.float64))
         self._start = self._next
@@ -143,7 +143,7 @@ class TriadNoise:
         return self._streams[name].at(block)
 
     def _draws(self, process: str, shape: tuple[int, ...], block: int) -> Array:
-        """Standard normal, channel by channel, shape (*shape, 3)."""
+        """Draw standard normal numbers, channel by channel, shape (*shape, 3)."""
         return np.stack([self._rng(c, process, block).standard_normal(shape) for c in range(3)], axis=-1)
 
     def _first_state(self) -> SlowState:
@@ -154,7 +154,7 @@ class TriadNoise:
         return SlowState(0, bank, np.zeros(3))
 
     def _fill_block(self, block: int, noise: Array) -> None:
-        """Noise increments of one canonical block into `noise`, shape (3, ticks of a block)."""
+        """Write the noise increments of one canonical block to `noise`, shape (3, ticks of a block)."""
         slow_block, part = divmod(block, CELLS_PER_SLOW_BLOCK // CELLS_PER_WHITE_BLOCK)
         slow = self._slow_rates(slow_block)
         cells = slow[:, part * CELLS_PER_WHITE_BLOCK : (part + 1) * CELLS_PER_WHITE_BLOCK]
@@ -167,7 +167,7 @@ class TriadNoise:
         self._residue.add_block(block, noise)
 
     def _slow_rates(self, block: int) -> Array:
-        """Cell means of all slow processes in one slow block, shape (3, CELLS_PER_SLOW_BLOCK) [rate]."""
+        """Compute the cell means of all slow processes in one slow block, shape (3, CELLS_PER_SLOW_BLOCK) [rate]."""
         while self._slow_block != block:
             if self._next.block > block:
                 raise ValueError(f"noise block {block} has passed: time goes forward only")

@@ -49,7 +49,7 @@ class Coefficients:
 
 
 def launch_coefficients(truth: TriadTruth, seed: int, launch: int, triad: str) -> Coefficients:
-    """Coefficients of launch number `launch`: bias and each row of K move by their run-to-run draws."""
+    """Draw the coefficients of launch number `launch`: bias and each row of K move from run to run."""
     draw = keyed_generator(seed, launch, triad, "run to run").standard_normal(6)
     bias = np.array(truth.bias) + truth.bias_run_to_run_sd * draw[:3]
     factor = 1.0 + truth.scale_factor_run_to_run_sd_ppm * units.PPM * draw[3:]
@@ -62,7 +62,7 @@ def launch_coefficients(truth: TriadTruth, seed: int, launch: int, triad: str) -
 
 
 class TriadSensor:
-    """One triad during one launch: coefficients, noise, counter."""
+    """One triad during one launch, with coefficients, noise and counter."""
 
     def __init__(self, truth: TriadTruth, rate_hz: float, key: tuple[int, int, str]) -> None:
         """Begin a launch. `key`: seed, launch number, triad's name."""
@@ -109,11 +109,11 @@ class TriadSensor:
         return self._rest[1]
 
     def checkpoint(self) -> dict[str, Any]:
-        """State to resume from, JSON-ready."""
+        """State of the triad to resume from, JSON-ready."""
         return {"phase": self.counter.phase, "ahead": self.counter.ahead, "noise": self.noise.checkpoint()}
 
     def resume(self, state: dict[str, Any]) -> None:
-        """Go on from a checkpoint."""
+        """Go on from the state of a checkpoint."""
         self.noise.resume(state["noise"])
         self.counter.resume(state["phase"], state["ahead"])
 

@@ -57,9 +57,9 @@ class SimOperator:
             raise DeviceFault("the unit is on: it is switched off before it is set by hand")
 
     def checkpoint(self) -> dict[str, Any]:
-        """State to resume from."""
+        """State of the operator, from which it can resume."""
         return {"settings": self.settings}
 
     def resume(self, state: dict[str, Any]) -> None:
-        """Go on from a checkpoint."""
+        """Go on from the state of a checkpoint."""
         self.settings = int(state["settings"])

@@ -105,7 +105,7 @@ def _triad(name: str, table: Table) -> TriadTruth:
 
 
 def parse_unit(text: str) -> UnitTruth:
-    """A unit's truth from TOML text. Raises `TruthError`."""
+    """Parse a unit's truth from TOML text. Raises `TruthError`."""
     document = read_document(text)
     check_keys("unit", document, {"serial", "sample_rate_hz", "thermal", *KEYS}, {"serial", *KEYS})
     triads = {name: _triad(name, document[name]) for name in KEYS}
@@ -158,7 +158,7 @@ def _axis(where: str, table: Any) -> AxisLimits:
 
 
 def parse_bench(text: str) -> BenchTruth:
-    """A bench's truth from TOML text. Raises `TruthError`.
+    """Parse a bench's truth from TOML text. Raises `TruthError`.
 
     Without `site_truth` the declared site is the true one; chamber and operator keep the defaults of the code where the
     text has no values. A `description` without a chamber is a bench without one.
@@ -179,7 +179,7 @@ def parse_bench(text: str) -> BenchTruth:
 
 
 def _faults(tables: Any) -> tuple[ChamberFault, ...]:
-    """Named faults of the chamber, each with the moment of bench time from which it is there."""
+    """Read the named faults of the chamber, each with the bench time at which it begins."""
     if not isinstance(tables, list):
         raise TruthError(f"chamber_faults = {tables!r} must be a list of tables")
     found: list[ChamberFault] = []
@@ -193,22 +193,22 @@ def _faults(tables: Any) -> tuple[ChamberFault, ...]:
 
 
 def load_unit(path: Path) -> UnitTruth:
-    """A unit's truth from a file."""
+    """Load a unit's truth from a file."""
     return parse_unit(path.read_text(encoding="utf-8"))
 
 
 def load_bench(path: Path) -> BenchTruth:
-    """A bench's truth from a file."""
+    """Load a bench's truth from a file."""
     return parse_bench(path.read_text(encoding="utf-8"))
 
 
 def default_unit() -> UnitTruth:
-    """The unit that is shipped, "SIM-0001"."""
+    """Return the shipped unit, "SIM-0001"."""
     return parse_unit(_shipped("default_unit.toml"))
 
 
 def default_bench() -> BenchTruth:
-    """The bench that is shipped, "sim"."""
+    """Return the shipped bench, "sim"."""
     return parse_bench(_shipped("default_bench.toml"))
 
 

@@ -33,7 +33,7 @@ GYRO_KEYS = {"fault_residue_deg_h": Key("fault_residue_rad_s_c", units.DEG_PER_H
 
 
 def read_thermal(table: Any) -> UnitThermalTruth:
-    """The truth of a table ``thermal``. Raises `TruthError`."""
+    """Read the truth of a table ``thermal``. Raises `TruthError`."""
     if not isinstance(table, dict):
         raise TruthError(f"thermal = {table!r} must be a table")
     given, default = cast(Mapping[str, Any], table), UnitThermalTruth()

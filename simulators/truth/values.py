@@ -1,4 +1,4 @@
-"""The truth of one simulated bench and one simulated unit, as frozen values.
+"""True values of one simulated bench and one simulated unit, as frozen values.
 
 Knows numbers and their allowed ranges; knows neither files nor motion.
 """
@@ -44,9 +44,9 @@ class TableTruth:
     middle_inner_nonorthogonality_arcsec: float = 0.0
     """Angle ε_mi: the inner axis x is turned by it about y; its angle with the middle axis is 90° + ε_mi."""
     base_tilt_north_arcsec: float = 0.0
-    """The outer axis leans by it to the north."""
+    """Tilt of the outer axis to the north."""
     base_tilt_east_arcsec: float = 0.0
-    """The outer axis leans by it to the east."""
+    """Tilt of the outer axis to the east."""
     azimuth_error_arcsec: float = 0.0
     """True heading of x at zero angles minus the declared azimuth, clockwise from north."""
     pointing_sd_arcsec: float = 0.0
@@ -77,7 +77,7 @@ class OperatorTruth:
     """Accuracy and speed of the person at the bench who sets the unit by hand. Ours."""
 
     fixture_tilt_sd_arcsec: float = 300.0
-    """The seat in a chamber is a manual table: about each of its axes the unit leans by so much, anew each time."""
+    """Standard deviation of the unit's lean about each axis of its seat, a manual table, drawn anew each time."""
     set_by_hand_s: float = 300.0
     """Bench time from the door's opening to its closing; the unit is set halfway."""
 
@@ -94,7 +94,7 @@ class CurrentSourceTruth:
     gain_error_ppm: float = 4.0
     zero_error_ma: float = 5e-5
     noise_ma: float = 2e-4
-    """Standard deviation within one cycle of the converter."""
+    """Standard deviation of the noise within one cycle of the converter."""
 
     def __post_init__(self) -> None:
         ranges = {"gain_error_ppm": (-1e5, 1e5), "zero_error_ma": (-1.0, 1.0), "noise_ma": (0.0, 1.0)}
@@ -139,7 +139,7 @@ class TriadTruth:
     bias: Vector
     """Bias b of each channel [rate]."""
     matrix: Matrix
-    """K, output per input, dimensionless."""
+    """Matrix K, output per input, dimensionless."""
     quantization: Vector
     """Quantization Q [rate·s]: standard deviation of a reading's whole error; the pulse follows, see `pulse`."""
     random_walk: Vector = ZERO
@@ -168,11 +168,11 @@ class TriadTruth:
     dither_frequency_hz: Vector = ZERO
     """Frequency of the mechanical dither [Hz]; above half the sample rate it appears folded."""
     scale_factor_asymmetry_ppm: Vector = ZERO
-    """Scale factor for positive less that for negative input."""
+    """Difference of the scale factors for positive and negative input."""
     scale_factor_nonlinearity_ppm: Vector = ZERO
     """Relative change of the output at the reference input by the quadratic term."""
     nonlinearity_reference: float = units.STANDARD_GRAVITY
-    """The reference input [rate]."""
+    """Reference input of the nonlinearity [rate]."""
     bias_run_to_run_sd: float = 0.0
     """Standard deviation of the bias from run to run [rate]."""
     scale_factor_run_to_run_sd_ppm: float = 0.0
@@ -220,7 +220,7 @@ class TriadTruth:
 
     @property
     def transients(self) -> tuple[tuple[Vector, float], ...]:
-        """All that decays from power-up: amplitudes [rate] and times [s] of start-up and self-heating."""
+        """List everything that decays from power-up: amplitudes [rate] and times [s] of start-up and self-heating."""
         return (
             (self.startup, self.startup_time_s),
             (self.self_heating_1, self.self_heating_1_time_s),
@@ -247,5 +247,5 @@ class UnitTruth:
             raise TruthError("unit.serial must not be empty")
 
     def triad(self, name: str) -> TriadTruth:
-        """A triad by name, "gyro" or "accelerometer"."""
+        """Return a triad by name, "gyro" or "accelerometer"."""
         return {"gyro": self.gyro, "accelerometer": self.accelerometer}[name]

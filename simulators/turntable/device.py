@@ -1,4 +1,4 @@
-"""A three-axis table on a simulated bench: implements `procedures.bench.turntable.Turntable`.
+"""Three-axis table on a simulated bench: implements `procedures.bench.turntable.Turntable`.
 
 Time moves the table (`advance`, called by the clock); its verbs only give it profiles and let time pass. At rest it is
 locked: not stepped, its attitude constant. Angles are wrapped by whole turns at standstill and while turning, the turns
@@ -60,12 +60,12 @@ class SimTurntable:
         self._demand = 0
         self._fault = ""
         self._lean: Array | None = None
-        """Rotation vector of the unit on the inner axis, (3,); None: it is mounted on the table as it should be."""
+        """Rotation vector of the unit on the inner axis, (3,) [rad]; None: it is mounted exactly."""
         self._rest = self._at_rest()
 
     @property
     def locked(self) -> bool:
-        """At rest and held."""
+        """True while the axes are at rest and held."""
         return self._profile is None
 
     async def move_to(self, angles: TableAngles) -> None:
@@ -108,7 +108,7 @@ class SimTurntable:
         self._lock()
 
     def _need_leave(self, violations: tuple[str, ...]) -> None:
-        """Limits first, then whether the table may move at all."""
+        """Check the limits first, then whether the table may move at all."""
         if violations:
             raise OutOfRange("; ".join(violations))
         if self._fault:
@@ -131,7 +131,7 @@ class SimTurntable:
         return self._plant.rates_rad_s / units.DEG
 
     async def make_safe(self) -> None:
-        """Ramp down to rest and lock, whatever it was doing. Raises `DeviceFault` where the plant has failed."""
+        """Ramp down to rest and lock, during any motion. Raises `DeviceFault` where the plant has failed."""
         if self._fault:
             raise DeviceFault(self._fault)
         if self.locked:
@@ -205,7 +205,7 @@ class SimTurntable:
         return self._rest[0][0], self._rest[1][0]
 
     def advance(self, ticks: int) -> Motion:
-        """Let the table live through some ticks. A plant that fails leaves the table faulted."""
+        """Advance the table by some ticks. A plant that fails leaves the table faulted."""
         tick_s = 1.0 / self._clock.rate_hz
         if self._profile is None or self._fault:
             return Motion(ticks, self._rest[0] * tick_s, self._rest[1] * tick_s)

@@ -73,7 +73,7 @@ def attitude(axes_rad: Array, table: TableTruth, azimuth_deg: float) -> Array:
 
 
 def earth_rate_enu(site: SiteTruth) -> Array:
-    """``Ω·[0, cos L, sin L]``, (3,) [rad/s]."""
+    """Earth's rate ``Ω·[0, cos L, sin L]``, (3,) [rad/s]."""
     latitude = site.latitude_deg * units.DEG
     return site.earth_rate_rad_s * np.array([0.0, np.cos(latitude), np.sin(latitude)])
 

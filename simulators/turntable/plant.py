@@ -17,7 +17,7 @@ from simulators.turntable.kinematics import X, Y, Z, wobble_vector
 from simulators.turntable.profile import Profile
 
 STEP_S = 0.00125
-"""Longest step of integration; a whole number of steps makes one tick."""
+"""Longest integration step [s]; a whole number of steps makes one tick."""
 BANDWIDTH_RAD_S = 2.0 * pi * 20.0
 INTEGRAL_SHARE = 0.15
 INTEGRAL_LIMIT_RAD_S = 1e-3
@@ -68,7 +68,7 @@ def _base_quaternion(table: TableTruth, azimuth_deg: float) -> Quaternion:
 
 
 def model_text(table: TableTruth, site: SiteTruth, azimuth_deg: float, step_s: float) -> str:
-    """The model as MJCF."""
+    """Build the MuJoCo model as MJCF text."""
     arcsec = pi / 648000.0
     middle = _about(X, table.outer_middle_nonorthogonality_arcsec * arcsec)
     inner = _about(Y, table.middle_inner_nonorthogonality_arcsec * arcsec)
@@ -132,7 +132,7 @@ class Plant:
 
     @property
     def angles_rad(self) -> Array:
-        """True joint angles, (3,)."""
+        """True joint angles, (3,) [rad]."""
         return self._state[1:4].copy()
 
     @property

@@ -56,7 +56,7 @@ class RampDown:
 
     @property
     def duration_s(self) -> float:
-        """Until the last axis rests."""
+        """Duration until the last axis rests [s]."""
         return float(np.max(np.abs(self.rate_rad_s) / self.deceleration_rad_s2))
 
     def at(self, time_s: Array) -> tuple[Array, Array]:
@@ -109,5 +109,5 @@ def move_ticks(distance_deg: Array, limits: tuple[AxisLimits, ...], rate_hz: flo
 
 
 def deceleration_rad_s2(limits: tuple[AxisLimits, ...]) -> Array:
-    """Deceleration of a stop, (3,): the axes' limits."""
+    """Deceleration of a stop, (3,), which equals the axes' limits."""
     return MARGIN * units.DEG * np.array([limit.acceleration_deg_s2 for limit in limits])

@@ -11,7 +11,7 @@ from bench_service.formats.clock.resolution import Resolution
 from procedures.core.arrays import Array
 
 IN_MEMORY_BYTES = 16 * 1024 * 1024
-"""Stamps beyond that lie in a file without a name."""
+"""Size of the stamps in memory [bytes]; further ones go to an unnamed file."""
 WRAPS_S = {
     "2^16 µs": 2.0**16 * 1e-6,
     "2^32 ns": 2.0**32 * 1e-9,
@@ -25,11 +25,11 @@ WRAPS_S = {
 }
 """Periods after which counters and clocks begin again, shortest first [s]."""
 WRAP_STEPS = 50.0
-"""A fall is a wrap where the step that remains is no longer than so many usual ones."""
+"""Largest step that may remain after a wrap, as a multiple of the usual step."""
 REPEATS_KEPT = 4_000_000
 FALLS_KEPT = 100
 FALLS_LOOKED_AT = 20_000
-"""More falls are counted, and none of them is taken as a wrap."""
+"""Number of falls beyond which they are only counted, and none is taken as a wrap."""
 
 Stamps = NDArray[np.int64] | Array
 
@@ -42,7 +42,7 @@ class Fall:
     before: int | float
     after: int | float
     wrap: str | None
-    """The name of the period that the clock begins again with; None: it is no wrap."""
+    """Name of the period after which the clock began again; None: the fall is no wrap."""
 
 
 @dataclass
@@ -53,7 +53,7 @@ class ClockColumn:
     unwrap: bool
     count: int = 0
     falls: list[Fall] = field(default_factory=list[Fall])
-    """The first of them; those that were carried on are in `wraps`."""
+    """First falls of the column; those that were continued as wraps are in `wraps`."""
     fall_count: int = 0
     wraps: list[Fall] = field(default_factory=list[Fall])
     still: int = 0
@@ -96,7 +96,7 @@ class ClockColumn:
         self._times.write(time_s.tobytes())
 
     def close(self) -> None:
-        """Give the room of the stamps back."""
+        """Free the memory of the stamps."""
         self._times.close()
 
     def _relative(self, stamps: Stamps) -> Array:
@@ -161,7 +161,7 @@ class ClockColumn:
 
     @property
     def duration_s(self) -> float:
-        """From the first stamp to the last."""
+        """Return the time from the first stamp to the last [s]."""
         return self._last_s
 
 

@@ -32,16 +32,16 @@ class Places:
     late_rows: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     """The row before each stretch of rows whose stamps are late or early, without lost samples."""
     late: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-    """By how many periods they are off."""
+    """Number of periods by which they are off."""
 
     @property
     def lost(self) -> int:
-        """All samples that are lost."""
+        """Total number of lost samples."""
         return int(self.samples[self.samples > 0].sum())
 
     @property
     def surplus(self) -> int:
-        """All rows that the time has no room for."""
+        """Total number of rows for which the time has no room."""
         return int(-self.samples[self.samples < 0].sum())
 
     def before(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:

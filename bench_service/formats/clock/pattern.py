@@ -13,21 +13,21 @@ import numpy as np
 from procedures.core.arrays import Array
 
 CHUNK = 64
-"""Rows over which a clock's own error is looked at."""
+"""Number of rows over which a clock's own error is estimated."""
 LONG_CHUNK = 1024
-"""Rows over which a mean step is taken where rows come in batches."""
+"""Number of rows over which a mean step is taken where rows come in batches."""
 FEW = 16
-"""Fewer steps show no order: they are taken as steps of one length, and what differs as a loss."""
+"""Number of steps below which no order shows: they are taken as of one length, and deviations as losses."""
 COARSE = 0.9
 """Part of the resolution by which a stamp may be off its place on a coarse clock. Rounding is half of it."""
 ON_LATTICE = 0.9
 """Share of the steps that are whole multiples of one where rows are lost from a uniform clock."""
 SINGLE = 0.4
-"""Share of the steps that are that one itself."""
+"""Share of the steps that are that base itself."""
 DENSE = 0.6
 """The smallest ratio of the shortest step to the mean one that speaks for lost rows, where the order is regular."""
 LONG_AND_SHORT = 0.004
-"""By so much the period of long chunks may differ from that of short ones where no row is lost in most of them."""
+"""Largest difference of the periods of long and short chunks where no row is lost in most of them, relative."""
 MOST = 0.75
 """Quantile of the chunks' bands that is taken as the usual one."""
 SHARED = 1.5
@@ -48,9 +48,9 @@ class Pattern:
     band_s: float
     """By how much stamps lie off their places, largest less smallest, over rows without a loss."""
     batch: int = 1
-    """Rows that come together."""
+    """Number of rows that come together."""
     span: int = 1
-    """Rows within which one is on time."""
+    """Number of rows within which one is on time."""
     usual_band_s: float = 0.0
     """Band like `band_s`, but over most rows, where stamps come as they arrived."""
 

@@ -13,16 +13,16 @@ from procedures.core.arrays import Array
 STRETCH = 256
 """Number of steps whose mean is compared with that of all: jitter of a fifth of a step is 0.2 % of it."""
 WINDOW = 1 << 18
-"""Rows that are looked at together."""
+"""Number of rows that are processed together."""
 SLIPS = 0.4
 """Resolution in periods beyond which a clock that is a little fast or slow slips by a tick now and then."""
 WHOLE = 0.9
 """Resolution in periods beyond which a slip looks like a lost sample."""
 PAUSE = 8
-"""More samples lost in one place are a pause."""
+"""Number of samples lost in one place beyond which the gap is a pause."""
 MOST_RUNS = 1000
 SAMPLES = 4
-"""Windows from which the pattern is found."""
+"""Number of windows from which the pattern is found."""
 
 
 class KeptRows:
@@ -135,7 +135,7 @@ def stretch_of(count: int) -> int:
 
 
 def _means(time_s: Array, stretch: int) -> Array:
-    """Mean stamp of each whole stretch."""
+    """Compute the mean stamp of each whole stretch."""
     whole = len(time_s) // stretch
     return time_s[: whole * stretch].reshape(whole, stretch).mean(axis=1)
 
