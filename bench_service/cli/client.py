@@ -109,7 +109,7 @@ def answer(client: "httpx.Client", method: str, path: str, **options: Any) -> "h
 
 
 def check(response: "httpx.Response") -> None:
-    """Check an answer. Raises `Refused` with the service's reason if it is an error, and if it is a web page."""
+    """Check that an answer is good. Raises `Refused` with the service's reason if it is an error or a web page."""
     if not response.is_success:
         response.read()
         raise (Away if response.status_code in NOT_NOW else Refused)(_sentence(response))

@@ -41,7 +41,7 @@ def run_command_line(settings: Settings, arguments: list[str] | None = None) -> 
         return 2
     except typer.Abort:
         return 2
-    except SystemExit as ended:  # whoever read the output has gone, or no server could start; 1 would be a verdict
+    except SystemExit as ended:  # the output was closed, or no server could start; 1 would be a verdict
         return 2 if ended.code else 0
     except Exception as error:
         if hasattr(error, "show") and hasattr(error, "exit_code"):  # a usage error of the command line itself

@@ -68,7 +68,7 @@ class Companion:
         try:
             self._process.wait(LEAVE_S)
         except subprocess.TimeoutExpired:
-            self._process.returncode = 0  # nobody waits for it any more
+            self._process.returncode = 0  # no one waits for the process any more
 
     def _start(self, now_s: float) -> None:
         self._started_s = now_s

@@ -97,7 +97,7 @@ def _check_start(service: BenchService) -> None:
 
 
 def check_address(settings: Settings) -> None:
-    """Check the address. Raises `Refused` for one that is reachable by anyone, with the settings that it needs."""
+    """Check the address of the server. Raises `Refused` if anyone could reach it, with the settings it needs."""
     if not may_listen(settings):
         raise Refused(
             f"BENCH_HOST = {settings.host}: this service listens on another address than a loopback one only with a "

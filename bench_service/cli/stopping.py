@@ -93,7 +93,7 @@ def stop_command(arguments: Sequence[str], environ: Mapping[str, str]) -> int:
 
 
 def _say(line: str) -> None:
-    with suppress(OSError):  # nobody reads it, or its disk is full: the stop goes on
+    with suppress(OSError):  # the output is closed, or its disk is full: the stop goes on
         print(line, flush=True)
 
 

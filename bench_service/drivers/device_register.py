@@ -1,7 +1,7 @@
 """Register of a simulated bench's devices: the state that real devices keep themselves, and a link for one master.
 
 A real table goes on moving when the process that commanded it dies, and can be asked afterwards. A simulated table
-dies with its process, so what was commanded last is kept in a file beside the database. The file's lock is the link:
+dies with its process, so what was commanded last is kept in a file next to the database. The file's lock is the link:
 the kernel gives it to one process and takes it back at its death.
 """
 
@@ -52,7 +52,7 @@ class DeviceRegister:
             state = _read(file)
             os.close(file)
             holder = (state.by if state is not None else "") or "another process"
-            refusals = DeviceJournal(self.journal.path)  # closed again: whoever has the link may rotate the journal
+            refusals = DeviceJournal(self.journal.path)  # closed again: the holder of the link may rotate it
             refusals.write("link.refused", {"holder": holder})
             refusals.close()
             raise DeviceBusy(f"the devices of bench {self.bench_id!r} are driven by {holder}") from None

@@ -149,7 +149,7 @@ class RegisteredBench(ObservedBench):
         self._link = link
 
     def close(self) -> None:
-        """Release the link. A verb that is still under way finds it closed."""
+        """Release the devices' link. A verb that is still under way finds it closed."""
         self._link.close()
         super().close()
 

@@ -32,7 +32,7 @@ class Bounds:
 
     @classmethod
     def of(cls, file_bytes: int) -> "Bounds":
-        """Return the bounds of files that have so many bytes together."""
+        """Return the bounds of files with this total size [bytes]."""
         hundreds = max(1.0, file_bytes / (100 * MEGABYTE))
         return cls(
             cells=int(cls.cells * hundreds),

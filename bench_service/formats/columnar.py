@@ -166,14 +166,14 @@ def _opened(
 
 
 def _require_bounded(metadata: Any, schema: Any, wanted: Sequence[int], name: str, bounds: Bounds) -> None:
-    """Raises `UnreadableFile` where the columns are too long, before one of them is unpacked."""
+    """Check the size of the columns before one is unpacked. Raises `UnreadableFile` where they are too long."""
     cells = metadata.num_rows * len(wanted)
     if cells > bounds.cells:
         raise UnreadableFile(
             name,
             f"{metadata.num_rows} rows of {len(wanted)} columns are {cells} numbers, at most {bounds.cells} are read",
         )
-    if metadata.num_columns != len(schema.names):  # nested columns: those that are wanted cannot be told apart here
+    if metadata.num_columns != len(schema.names):  # nested columns: the wanted ones cannot be identified here
         return
     unpacked = sum(
         metadata.row_group(group).column(index).total_uncompressed_size

@@ -81,9 +81,9 @@ def read_back(stored: str | bytes) -> Any:
 
 
 def mended(node: Any, room: int = 2 * DEPTH) -> Any:
-    """A document with each text as it is shown, and without what lies so deep in it that no answer could hold it.
+    """Escape each text of a document, and cut branches that are nested too deeply for any answer.
 
-    `room`: levels; more than the rule's, as what was sent lies in documents of our own.
+    `room`: levels; more than the rule's, as the service nests the documents that clients sent in its own.
     """
     if isinstance(node, str):
         return shown(node)

@@ -78,7 +78,7 @@ class TextSource:
         return text.replace(b"\r", b"\n") if self._cr else text
 
     def fill(self, size: int) -> None:
-        """Buffer at least so many bytes, or all that there are."""
+        """Buffer at least `size` bytes, or all that there are."""
         parts, have = [self._buffer], len(self._buffer)
         while have < size and not self._ended:
             part = self._lines(self._decoded(self._read(PIECE_BYTES)))

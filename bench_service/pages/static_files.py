@@ -1,4 +1,4 @@
-"""Scripts and style sheets of the pages: our own, and those of the installed package that shows the API's document."""
+"""Scripts and style sheets of the pages: the service's, and those of the package that shows the API's document."""
 
 import hashlib
 from dataclasses import dataclass

@@ -14,7 +14,7 @@ from bench_service.persistence.tables.jobs import IdempotencyKeyRow
 T = TypeVar("T")
 
 _RIVALS = 32
-"""Number of retries. Each conflict means that a rival committed, so a process with this many rivals still succeeds."""
+"""Number of retries after conflicts: each means that a rival committed, so up to this many rivals are survived."""
 
 
 class SqlKeyStore:

@@ -50,7 +50,7 @@ class SimChamber:
         faults: tuple[ChamberFault, ...] = (),
         limits: ChamberLimits | None = None,
     ) -> None:
-        """Build the device. `rate_hz`: ticks in a second; `now_s`: bench time; `limits`: None: the truth's own."""
+        """Build the chamber device. `rate_hz`: ticks in a second; `now_s`: bench time; `limits`: None: the truth's."""
         self.truth, self.unit = chamber, unit
         self.plant = ChamberPlant(chamber, unit.network, seed)
         self.thermometers = Thermometers(unit.thermometers, seed, chamber.ambient_c)
@@ -118,7 +118,7 @@ class SimChamber:
         return Warmth(path, self.thermometers.read(first, path), ends, before, codes_before)
 
     def _pieces(self, first: int, seconds: int) -> list[Array]:
-        """Compute node temperatures of so many seconds, cut where a fault begins."""
+        """Compute node temperatures of the next seconds, cut where a fault begins."""
         cuts = {min(max(int(f.from_s / STEP_S) - first, 0), seconds) for f in self.faults}
         edges = sorted({0, seconds} | cuts)
         pieces = [np.empty((0, len(NODES)))]

@@ -76,7 +76,7 @@ class Thermometers:
         return driven
 
     def _noise(self, first: int, count: int) -> Array:
-        """Standard normal numbers of so many seconds, (count, 5)."""
+        """Draw standard normal numbers for `count` seconds, (count, 5)."""
         rows: list[Array] = []
         at = first
         while at < first + count:

@@ -53,7 +53,7 @@ class ConverterLink:
         self._tapes.stop()
 
     def feel(self, ticks: int, current_ma: Callable[[], Array], lengths: Lengths, board_c: Array, sent: Counts) -> None:
-        """Pass some ticks: currents (ticks,) on demand, pieces of so many ticks at board temperatures, and codes sent.
+        """Pass some ticks: currents (ticks,) on demand, lengths of pieces, their board temperatures, and codes sent.
 
         Codes are a function of current, temperature and moment alone, so none are made while no recording runs.
         """

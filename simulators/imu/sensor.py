@@ -65,7 +65,7 @@ class TriadSensor:
     """One triad during one launch, with coefficients, noise and counter."""
 
     def __init__(self, truth: TriadTruth, rate_hz: float, key: tuple[int, int, str]) -> None:
-        """Begin a launch. `key`: seed, launch number, triad's name."""
+        """Begin a launch of the triad. `key`: seed, launch number, triad's name."""
         self.coefficients = launch_coefficients(truth, *key)
         self.noise = TriadNoise(truth, rate_hz, key)
         self._rate_hz = rate_hz

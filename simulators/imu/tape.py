@@ -27,7 +27,7 @@ class Tape:
         self.held += len(counts)
 
     def take(self, count: int) -> Counts:
-        """Take the oldest counts, at most so many ticks."""
+        """Take the oldest counts, at most `count` ticks."""
         whole = np.concatenate(self.blocks) if len(self.blocks) != 1 else self.blocks[0]
         self.blocks = [whole[count:]] if len(whole) > count else []
         self.held = len(whole) - count
@@ -48,7 +48,7 @@ class Tapes:
             tape.broken = True
 
     def need_power(self, tape: Tape | None = None) -> None:
-        """Check the power. Raises `NotPowered`, also for a recording through which the unit was switched off."""
+        """Check that the unit has power. Raises `NotPowered`, also if it was off at any time during the recording."""
         if self._launch() == 0 or (tape is not None and tape.broken):
             raise NotPowered("the unit is switched off")
 

@@ -30,7 +30,7 @@ class SimOperator:
         door: Callable[[bool], None],
         place: Callable[[TableAngles, Array], None],
     ) -> None:
-        """Wire the operator. `is_on`: the unit has power; `door(open)`; `place(angles, lean)`: seat the unit so."""
+        """Wire the operator to the bench. `is_on`: the unit has power; `door(open)`; `place(angles, lean)`: seat it."""
         self._truth, self._seed, self._clock = truth, seed, clock
         self._is_on, self._door, self._place = is_on, door, place
         self.settings = 0

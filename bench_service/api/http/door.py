@@ -40,7 +40,7 @@ class Door:
     """Access rules of one service."""
 
     hosts: frozenset[str]
-    """Names in `Host` that are ours; with a port only that port, without one any."""
+    """Names in `Host` that belong to this service; with a port only that port, without one any."""
     token: str | None = None
     """The token that programs send as `Authorization: Bearer …` from any address but a loopback one."""
     all_local: bool = False

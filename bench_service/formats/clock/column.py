@@ -166,7 +166,7 @@ class ClockColumn:
 
 
 def windows(count: int, length: int, most: int) -> Sequence[tuple[int, int]]:
-    """At most so many stretches of the given length, evenly over `count` rows."""
+    """Select stretches of the given length evenly over `count` rows, up to a largest number of them."""
     whole = max(1, count // length)
     picked = np.unique(np.linspace(0, whole - 1, min(most, whole)).astype(int))
     return [(int(p) * length, min(count, int(p + 1) * length + 1)) for p in picked]

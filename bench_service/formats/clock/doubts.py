@@ -20,7 +20,7 @@ _SPELLED = {"n": "ns", "u": "us", "µ": "us", "mic": "us", "mil": "ms", "ms": "m
 
 
 def require_declared(name: str, rate_hz: float, description: ImportDescription) -> None:
-    """Raises `BadParameter` where the declared rate is another one."""
+    """Check the declared rate. Raises `BadParameter` where it is another one."""
     declared = description.rate_hz
     if declared is None or abs(rate_hz / declared - 1.0) <= description.rate_tolerance:
         return
@@ -56,7 +56,7 @@ def doubts(
 
 
 def clock_error_s(pattern: Pattern, resolution_s: float) -> float:
-    """By how much stamps may be off their places, for all that is known [s]."""
+    """Largest error of the stamps' places, for all that is known [s]."""
     return resolution_s + (0.0 if pattern.kind in ("steady", "coarse") else pattern.band_s)
 
 

@@ -106,7 +106,7 @@ def _require_growing(name: str, column: ClockColumn, description: ImportDescript
 
 
 def _require_whole(name: str, found: Sentences) -> None:
-    """Check for losses. Raises `UnfitRecording` with all that is lost and doubled, and the ways out."""
+    """Check for lost and doubled rows. Raises `UnfitRecording` with all of them, and the ways out."""
     problems: list[str] = []
     ways: list[str] = []
     if len(found.repeats) and found.description.repeats == "refuse":

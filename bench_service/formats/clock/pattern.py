@@ -46,7 +46,7 @@ class Pattern:
     """The kind of pattern. steady: at the period; coarse: up to the resolution; batches, jitter: as they arrived."""
     period_s: float
     band_s: float
-    """By how much stamps lie off their places, largest less smallest, over rows without a loss."""
+    """Spread of the stamps about their places, largest less smallest, over rows without a loss."""
     batch: int = 1
     """Number of rows that come together."""
     span: int = 1
@@ -97,7 +97,7 @@ def _expected(one_s: float, other_s: float, declared_s: float | None) -> bool:
 
 
 def _chunks(stretches: Sequence[Array], rows: int) -> list[Array]:
-    """Whole chunks of so many rows, or the stretches themselves where they are shorter."""
+    """Split stretches into whole chunks of a length, or keep them where they are shorter."""
     found = [t[a : a + rows] for t in stretches for a in range(0, len(t) - rows + 1, rows)]
     return found or [t for t in stretches if len(t) > 1]
 

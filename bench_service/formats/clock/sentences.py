@@ -108,7 +108,7 @@ class Sentences:
         return []
 
     def lost_digits(self, finest_s: float, coarsest_s: float) -> list[str]:
-        """Describe stamps that lose digits as they grow, so many that it matters."""
+        """Describe stamps that lose enough digits as they grow for it to matter."""
         if coarsest_s * self.mean.rate_hz < 0.05:
             return []
         return [

@@ -40,7 +40,7 @@ def serve(line: socket.socket) -> None:
         ]
         _answer(line, files, ImportDescription.model_validate_json(asked["description"]))
     except (OSError, Broken):
-        return  # whoever asked does not want to know any more
+        return  # the client has gone
 
 
 def _limit(bounds: Bounds) -> None:

@@ -70,7 +70,7 @@ class BenchLease(ABC):
 
     @abstractmethod
     def _take(self) -> Any:
-        """Take the lease. Raises `BenchBusy`, and what file or database raise."""
+        """Take the lease of the bench. Raises `BenchBusy`, and the errors of file or database."""
 
     @abstractmethod
     def _is_ours(self, right: Any) -> bool: ...
@@ -139,7 +139,7 @@ class FileLease(BenchLease):
             self._lock(file)
             os.ftruncate(file, 0)
             os.pwrite(file, f"{self._role} {os.getpid()}\n".encode(), 0)
-        except BaseException:  # a full disk: an open file that nobody knows would keep the lock from us too
+        except BaseException:  # a full disk: a leaked open file would keep the lock
             os.close(file)
             raise
         return file
@@ -152,7 +152,7 @@ class FileLease(BenchLease):
             except BlockingIOError:
                 if not again:
                     raise _busy(self._bench_id, _written_holder(file)) from None
-            wall_clock.pause(0.01)  # it may only be somebody who looks whether it is taken: `lease_holder`
+            wall_clock.pause(0.01)  # the lock may only be tested by `lease_holder`
 
 
 class ServerLease(BenchLease):

@@ -141,7 +141,7 @@ class SqlRecordingWriter:
             row.state = RecordingState.INTERRUPTED.value
 
     def _row(self, session: Session) -> RecordingRow:
-        """This recording's row, made with its first chunk; still open, or somebody closed it in between."""
+        """Return this recording's row, made with its first chunk; still open, unless it was closed in between."""
         if not self._chunks:
             row = row_of_new(self._new, self.id, self._created_at, self._rows)
             session.add(row)

@@ -51,7 +51,7 @@ def move_job(
     if verdict is None and to is JobState.FAILED:
         verdict = Verdict.ERROR
     row.state = to.value
-    row.prompt = None  # whoever was asked is asked again, if it still matters
+    row.prompt = None  # the prompt is repeated later, if it still matters
     data: dict[str, Any] = {"state": to.value, "before": before.value}
     if to is JobState.QUEUED:
         row.verdict = row.failure = row.finished_at = row.result_id = None

@@ -1,4 +1,4 @@
-"""Reservations in SQL. Transactions for the same bench or unit take turns, so only one of two rivals gets it."""
+"""Reservations of benches and units in SQL. Transactions for the same name take turns: one of two rivals gets it."""
 
 from datetime import datetime
 
