@@ -17,7 +17,7 @@ Found = TypeVar("Found")
 def patiently(ask: Callable[[], Found], say: Callable[[str], object], goes_on: str) -> Found:
     """Call `ask` and return its answer; retry while the service is away. `ask` must change nothing.
 
-    `goes_on`: the fate of the job or run that is asked about after the last retry, and how to look at it again.
+    `goes_on`: sentence on what becomes of the job or run when retries end, and how to look at it again.
     Raises `Refused` with it after `PATIENCE_S`, and any other exception of `ask` at once.
     """
     begun, begun_s = now(), monotonic_s()

@@ -16,7 +16,7 @@ _waiting = 0
 
 
 async def stop_in_own_thread(stops: StopService, bench_id: str, reason: str, by: str) -> Stopped:
-    """Run `StopService.stop` outside the pool of threads that all other routes share. Raises what it raises."""
+    """Run `StopService.stop` in a thread of its own, outside the pool of all other routes. Raises what it raises."""
     global _waiting
     _waiting += 1
     try:

@@ -152,7 +152,7 @@ class FileLease(BenchLease):
             except BlockingIOError:
                 if not again:
                     raise _busy(self._bench_id, _written_holder(file)) from None
-            wall_clock.pause(0.01)  # the lock may only be tested by `lease_holder`
+            wall_clock.pause(0.01)  # perhaps `lease_holder` is only testing the lock
 
 
 class ServerLease(BenchLease):

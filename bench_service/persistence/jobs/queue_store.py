@@ -21,7 +21,7 @@ from bench_service.persistence.tables.jobs import JobRow, ReservationRow
 
 QUEUED, RUNNING = JobState.QUEUED.value, JobState.RUNNING.value
 FIRST_PAGE, LONGER = 20, 4
-"""Number of entries read to find the one that starts next, and its growth each time that none of them may start."""
+"""Number of entries read to find the one that starts next, and the factor of its growth while none may start."""
 
 _ORDER = (JobRow.priority, JobRow.queued_at, JobRow.id)
 _ENTRY = columns(JobRow, QueueEntry)
