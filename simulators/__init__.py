@@ -1,4 +1,4 @@
-"""THE WORLD: a bench in software. It makes data; it never judges them.
+"""Simulated bench, the world that the procedures measure. It makes data; it never judges them.
 
 Simulated
 ---------

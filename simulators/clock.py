@@ -1,4 +1,4 @@
-"""Simulated time: whole sample intervals ("ticks"), and sleeping is what moves the world.
+"""Simulated time in whole sample intervals ("ticks"); sleeping on it moves the world.
 
 Knows how long a tick is and whom to call when ticks pass; does not know what they do with them.
 """
@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 from procedures.bench.errors import OutOfRange
 
 SLICE_S = 10.0
-"""At most this much bench time passes between two points where a cancellation can land."""
+"""Longest bench time between two points where a cancellation can land [s]."""
 REAL_TIME_SLICE_S = 0.1
-"""The same in real seconds, where the clock is asked to keep pace with real time."""
+"""Longest real time between two such points, where the clock is asked to keep pace with real time [s]."""
 
 Wait = Callable[[float], Awaitable[None]]
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What the unit went through during some ticks, in its own axes.
+    """Motion that the unit went through during some ticks, in its own axes.
 
     Increments per tick, shape (ticks, 3), or (1, 3) where every tick is alike: `angle_rad` the integral of inertial
     angular rate, `velocity_m_s` the integral of specific force.
@@ -36,12 +36,12 @@ class Motion:
 
 @coroutine
 def _let_others_run() -> Generator[None, None, None]:
-    """Suspend for no time: whoever drives the coroutine may cancel it here."""
+    """Suspend for no time: the caller that drives the coroutine may cancel it here."""
     yield
 
 
 class SimClock:
-    """Implements `procedures.bench.clock.Clock`. `connect` tells it what to move."""
+    """Simulated clock; implements `procedures.bench.clock.Clock`. `connect` sets the function that moves the world."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class SimClock:
         wait: Wait | None = None,
         slice_s: float | None = None,
     ) -> None:
-        """`real_time_factor`: bench seconds per real second, None: as fast as it can; `wait` waits real seconds.
+        """Start at tick 0. `real_time_factor`: bench seconds per real second, None: unlimited; `wait`: real seconds.
 
         `slice_s`: instead of `SLICE_S`.
         """
@@ -68,17 +68,17 @@ class SimClock:
         self._advance = advance
 
     def now_s(self) -> float:
-        """Bench time [s]."""
+        """Current bench time [s]."""
         return self.ticks / self.rate_hz
 
     def ticks_in(self, seconds: float) -> int:
-        """Whole ticks that last at least so long (up to a millionth of a tick). Raises `OutOfRange`."""
+        """Smallest number of whole ticks that last `seconds` (up to a millionth of a tick). Raises `OutOfRange`."""
         if not 0.0 <= seconds < float("inf"):
             raise OutOfRange(f"seconds = {seconds!r} must be finite and not negative")
         return ceil(seconds * self.rate_hz - 1e-6)
 
     async def sleep(self, seconds: float) -> None:
-        """Let the world go on for so long, in slices."""
+        """Let the world go on for `seconds` of bench time, in slices."""
         await self.pass_ticks(self.ticks_in(seconds))
 
     async def pass_ticks(self, ticks: int) -> None:

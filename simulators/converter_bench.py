@@ -1,4 +1,4 @@
-"""The converter's bench: how source, converter, chamber and supply are wired; knows none of their physics."""
+"""Bench of the converter alone: how source, converter, chamber and supply are wired; knows none of their physics."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ CONVERTER_SENSOR = THERMOMETERS.index("converter")
 
 
 def current_source(bench: BenchTruth, seed: int) -> SimCurrentSource:
-    """The bench's current source. Raises `DeviceFault` where it declares none."""
+    """Return the bench's current source. Raises `DeviceFault` where the bench declares none."""
     limits = bench.description.current_source
     if limits is None:
         raise DeviceFault(f"bench {bench.description.id!r} has no current source, and the job wants currents")

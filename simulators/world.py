@@ -1,4 +1,4 @@
-"""The door: a whole simulated bench from its truth, a seed, and perhaps a checkpoint.
+"""Entry point of the package: a whole simulated bench from its truth, a seed, and perhaps a checkpoint.
 
 Knows how clock, table, supply, unit, chamber and operator are wired; knows none of their physics.
 """
@@ -32,30 +32,30 @@ from simulators.turntable.profile import move_ticks
 
 CHECKPOINT_VERSION = 3
 WARM_SLICE_S = 60.0
-"""Slices and blocks of a world with a chamber: a thermal run is half a day, at few samples a second."""
+"""Length of slices and blocks of a world with a chamber: a thermal run is half a day, at few samples a second."""
 
 
 @dataclass(frozen=True)
 class WorldConfig:
-    """What makes a world: two truths, a seed, whether it has a chamber, and how fast time may pass."""
+    """Configuration of a world: two truths, a seed, whether it has a chamber, and how fast time may pass."""
 
     unit: UnitTruth = field(default_factory=default_unit)
     bench: BenchTruth = field(default_factory=default_bench)
     seed: int = 1
     sample_rate_hz: float | None = None
-    """Instead of the unit's own rate."""
+    """Sample rate that replaces the unit's own [Hz]."""
     thermal: bool = False
-    """Whether the unit stands in the chamber and feels its temperature; else it is warm through, at the reference."""
+    """True where the unit stands in the chamber and feels its temperature; else it is warm, at the reference."""
     currents: bool = False
-    """Whether a converter alone stands in the chamber, a current source on its inputs, instead of the whole unit."""
+    """True where a converter alone stands in the chamber, a current source on its inputs, instead of the whole unit."""
     real_time_factor: float | None = None
-    """Bench seconds per real second; None: as fast as it can."""
+    """Number of bench seconds per real second; None: as fast as it can."""
     wait: Wait | None = field(default=None, repr=False)
-    """Waits real seconds; needed with a real-time factor."""
+    """Function that waits real seconds; needed with a real-time factor."""
 
     @property
     def rate_hz(self) -> float:
-        """Samples per second, also the clock's ticks."""
+        """Samples per second, which are also the clock's ticks [Hz]."""
         return self.unit.sample_rate_hz if self.sample_rate_hz is None else self.sample_rate_hz
 
     @property
@@ -66,7 +66,7 @@ class WorldConfig:
 
 @dataclass
 class SimulatedBench(Bench):
-    """A bench whose truth can be asked, and which can be frozen and woken."""
+    """A simulated bench that gives its truth, and that can be saved to a checkpoint and built from one."""
 
     config: WorldConfig = field(kw_only=True)
     clock: SimClock  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -78,7 +78,7 @@ class SimulatedBench(Bench):
     current_source: SimCurrentSource | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def checkpoint(self) -> dict[str, Any]:
-        """What `build` needs to go on from here, JSON-ready. Raises `DeviceFault` while the table moves."""
+        """State from which `build` goes on, JSON-ready. Raises `DeviceFault` while the table moves."""
         return {
             "version": CHECKPOINT_VERSION,
             "seed": self.config.seed,
@@ -93,7 +93,7 @@ class SimulatedBench(Bench):
         }
 
     def lost_links(self) -> frozenset[str]:
-        """Devices that do not answer any more, and never will."""
+        """List the devices that do not answer any more, and never will."""
         return frozenset({"chamber"}) if self.chamber is not None and self.chamber.link_lost else frozenset()
 
     def true_calibration(self) -> dict[str, tuple[Array, Array]]:
@@ -102,7 +102,7 @@ class SimulatedBench(Bench):
 
 
 def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> SimulatedBench:
-    """A bench with the table at zero and the unit off, or as a checkpoint of the same seed and rate left it.
+    """Build a bench with the table at zero and the unit off, or as a checkpoint of the same seed and rate left it.
 
     Raises `DeviceFault` where a chamber is wanted and the bench has none, `OtherVersion` for another's checkpoint.
     """
@@ -145,7 +145,7 @@ def _chamber(config: WorldConfig, clock: SimClock) -> SimChamber:
 def _unit(
     config: WorldConfig, clock: SimClock, table: SimTurntable, supply: SimSupply, chamber: SimChamber | None
 ) -> SimImu:
-    """A whole unit on the table."""
+    """Build the whole unit, and connect it to table, supply and chamber."""
     imu = SimImu(config.unit, config.seed, clock, supply.launch, config.thermal, config.slice_s)
     if chamber is None:
         supply.connect(imu.power_up, imu.power_down)
@@ -156,7 +156,7 @@ def _unit(
 
 
 def _connect_warm(clock: SimClock, table: SimTurntable, supply: SimSupply, imu: SimImu, chamber: SimChamber) -> None:
-    """Whatever moves the unit also warms it; its power heats it."""
+    """Connect unit and chamber: time that moves the unit also warms it, and its power heats it."""
 
     def advance(ticks: int) -> None:
         motion, warmth = table.advance(ticks), chamber.advance(ticks)
@@ -176,7 +176,7 @@ def _connect_warm(clock: SimClock, table: SimTurntable, supply: SimSupply, imu: 
 
 
 def climate_of(chamber: SimChamber, warmth: Warmth, ticks: int) -> Climate:
-    """What the temperatures of some ticks do to the unit: the last second's until the next one ends."""
+    """Climate that the temperatures of some ticks make for the unit: the last second's until the next one ends."""
     felt = chamber.response(np.concatenate([warmth.before_c[None], warmth.temperatures_c]))
     edges = (0, *warmth.end_ticks, ticks)
     lengths = np.array([end - begin for begin, end in pairwise(edges)])
@@ -229,9 +229,9 @@ class DwellMeans:
     """Station means made without samples, each (n, 3) in the unit's axes: nominal outputs, and the true inputs."""
 
     gyro: Array
-    """[rad/s]"""
+    """Nominal gyro outputs [rad/s]."""
     accelerometer: Array
-    """[m/s²]"""
+    """Nominal accelerometer outputs [m/s²]."""
     rate_b: Array
     """True angular rate [rad/s]."""
     specific_force_b: Array
@@ -243,7 +243,7 @@ def true_inputs(
 ) -> tuple[Array, Array]:
     """True angular rate and specific force at commanded angles, each (n, 3), pointing errors of the moves included.
 
-    Pure numpy. `moves`: number of the move to each of the angles since the bench was opened; 1, 2, … if not told.
+    Pure numpy. `moves`: number of the move to each of the angles since the bench was opened; None: 1, 2, …
     """
     table = config.bench.table
     numbers = range(1, len(angles) + 1) if moves is None else moves
@@ -257,7 +257,7 @@ def _axes_rad(angles: Sequence[TableAngles]) -> Array:
 
 
 def dwell_means(config: WorldConfig, stations: Sequence[Station], launch: int = 1) -> DwellMeans:
-    """What the means of the stations' recordings would be, in milliseconds, for Monte Carlo (`tests.validation`).
+    """Compute the means of the stations' recordings, in milliseconds of time, for Monte Carlo (`tests.validation`).
 
     The unit is switched on with the table at zero and the stations follow as in a procedure: move, settle, record. See
     `simulators.imu.sensor.station_means` for what is equal to a full run and what only has the same distribution.

@@ -1,1 +1,1 @@
-"""HTTP in, HTTP out, ``/api/v1``: one file per noun, no rules of its own."""
+"""HTTP interface of the service under ``/api/v1``: one file for each resource, without rules of its own."""

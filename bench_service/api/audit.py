@@ -1,4 +1,4 @@
-"""The audit trail: every request that may change something and reached a route, with its outcome."""
+"""Audit trail of HTTP requests: every request that may change something and reached a route, with its outcome."""
 
 import asyncio
 import json
@@ -24,11 +24,11 @@ router = APIRouter(prefix="/api/v1/audit", tags=["audit"])
 
 READING = ("GET", "HEAD", "OPTIONS")
 NOTED_BYTES = 8192
-"""A JSON body up to this size is part of the entry; of a longer one, and of files, only the size."""
+"""Size up to which a JSON body is part of the entry [bytes]; of longer bodies and of files, only the size is."""
 
 
 class AuditView(BaseModel):
-    """Who asked what, and what became of it."""
+    """One audit entry: the client, its request and the outcome."""
 
     id: str
     at: datetime
@@ -45,7 +45,7 @@ class AuditView(BaseModel):
 
 
 class AuditPage(BaseModel):
-    """Entries, newest first."""
+    """One page of audit entries, newest first."""
 
     items: list[AuditView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")
@@ -59,7 +59,7 @@ def list_audit(
     after: After = None,
     limit: Limit = 50,
 ) -> AuditPage:
-    """Who asked what, newest first."""
+    """List the audit entries, newest first: the client, its request and the outcome."""
     page = service.stores.audit.list(who=who, target=target, after=after, limit=limit)
     return AuditPage(items=[AuditView.of(entry) for entry in page.items], next=page.next)
 
@@ -67,11 +67,11 @@ def list_audit(
 STOP = "stop"
 """Name of the route that stops a bench."""
 STOP_S = 0.3
-"""How long the answer to a stop waits for its entry; one that comes later is written all the same [s]."""
+"""Longest time that the answer to a stop waits for its audit entry; a later entry is written all the same [s]."""
 
 
 class Audited:
-    """Pure ASGI. The order is: the act, its entry, the answer. See `bench_service.telemetry.audit`."""
+    """ASGI middleware: performs the act, writes its audit entry, then answers. See `bench_service.telemetry.audit`."""
 
     def __init__(self, app: ASGIApp, trail: AuditTrail) -> None:
         self._app = app
@@ -120,7 +120,7 @@ class Audited:
 
 
 class _Act:
-    """What a request says until its outcome is known."""
+    """The parts of a request that its audit entry needs, collected until the outcome is known."""
 
     def __init__(self, request: Request, who: str) -> None:
         self.request = request
@@ -131,14 +131,14 @@ class _Act:
         self._bytes = 0
 
     def body(self, message: Message) -> None:
-        """A piece of the body passes."""
+        """Note a piece of the body that passes."""
         piece: bytes = message.get("body", b"")
         self._bytes += len(piece)
         if self._is_json and self._bytes <= NOTED_BYTES:
             self._body += piece
 
     def detail(self) -> dict[str, Any]:
-        """What matters of the request; never the contents of files, nor what could not be read back."""
+        """The request's details for the audit entry; never the contents of files, nor what could not be read back."""
         found: dict[str, Any] = {"request": request_id(), "path": shown(self.request.scope["path"])}
         if self.request.url.query:
             found["query"] = self.request.url.query[:500]
@@ -150,7 +150,7 @@ class _Act:
         return found
 
     def _document(self) -> Any:
-        """The body where it is JSON that everything can hold, and not too long."""
+        """Return the body where it is storable JSON, and not too long."""
         if not (self._is_json and 0 < self._bytes <= NOTED_BYTES):
             return None
         try:

@@ -1,4 +1,4 @@
-"""Is it alive, is it ready."""
+"""Health routes for monitoring: liveness and readiness of the service."""
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
@@ -10,7 +10,7 @@ router = APIRouter(tags=["health"])
 
 
 class Health(BaseModel):
-    """The service answers; `code_version` is what would make a number now."""
+    """Health of the service that answers; `code_version` is the version that a new result would carry."""
 
     status: str = "ok"
     code_version: str
@@ -21,13 +21,13 @@ class Health(BaseModel):
 
 @router.get("/healthz", responses=problems())
 async def healthz(service: Service) -> Health:
-    """The process answers, whatever its threads are busy with."""
+    """Report that the process answers, whatever its threads are busy with."""
     return Health(code_version=service.code_version)
 
 
 @router.get("/readyz", responses=problems())
 def readyz(service: Service) -> Health:
-    """A job could start here: the database answers, its disk has room, the engine runs, the lease is held.
+    """Report whether a job could start: the database answers, its disk has room, the engine runs, the lease is held.
 
     Waits for the engine after a start. 503 names every reason. A stopped bench refuses by a person's will: a note.
     """

@@ -1,4 +1,4 @@
-"""The numbers that a monitor reads, in Prometheus text format.
+"""Metrics for monitoring, in Prometheus text format.
 
 Jobs, benches and recordings come from the database and are the same in every process; requests and listeners are this
 process's own.
@@ -37,7 +37,7 @@ BENCH_STATES = ("idle", "busy", "stopped", "offline")
     responses={**problems(), 200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
 )
 def metrics(request: Request, service: Service, hub: Hub) -> Response:
-    """Jobs, stations, recordings, benches, listeners and requests, in Prometheus text format."""
+    """Read the metrics: jobs, stations, recordings, benches, listeners and requests, in Prometheus text format."""
     tallies: Tallies = request.app.state.tallies
     tallies.update()
     registry = CollectorRegistry()
@@ -47,7 +47,7 @@ def metrics(request: Request, service: Service, hub: Hub) -> Response:
 
 
 class Snapshot(Collector):
-    """Everything that is known at one scrape."""
+    """All values of one scrape."""
 
     def __init__(self, service: BenchService, tallies: Tallies, hub: EventHub) -> None:
         self._service = service
@@ -55,7 +55,7 @@ class Snapshot(Collector):
         self._hub = hub
 
     def collect(self) -> Iterator[Metric]:
-        """One family after the other."""
+        """Yield the metric families one after the other."""
         yield from self._jobs()
         yield from self._campaigns()
         yield from self._benches()
@@ -126,7 +126,7 @@ def _state(live: BenchLive | None, stopped: bool) -> str:
 
 
 def _buckets(spread: Spread) -> list[tuple[str, float]]:
-    """Cumulative counts up to each bound, as the format wants them."""
+    """Convert counts to the cumulative counts up to each bound that the format requires."""
     total, found = 0, list[tuple[str, float]]()
     for bound, count in zip([*map(str, DURATION_S), "+Inf"], spread.counts, strict=True):
         total += count
@@ -135,7 +135,7 @@ def _buckets(spread: Spread) -> list[tuple[str, float]]:
 
 
 def install(app: FastAPI, service: BenchService) -> None:
-    """Give an application its counts, and measure its requests."""
+    """Give an application its metrics registry, and measure its requests."""
     registry = CollectorRegistry()
     app.state.tallies = Tallies(service.stores.tallies)
     app.state.request_metrics = registry
@@ -143,7 +143,7 @@ def install(app: FastAPI, service: BenchService) -> None:
 
 
 class Measured:
-    """Pure ASGI: requests by route and status, and the time until each answer began."""
+    """ASGI middleware that counts requests by route and status, and measures the time until each answer begins."""
 
     def __init__(self, app: ASGIApp, registry: CollectorRegistry) -> None:
         self._app = app

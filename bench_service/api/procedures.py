@@ -1,4 +1,4 @@
-"""What the bench can do, and what a plan would be worth before anything moves."""
+"""Routes of procedures: the procedures of the bench, and previews of a plan before anything moves."""
 
 from typing import Annotated, Any
 
@@ -16,7 +16,7 @@ router = APIRouter(prefix="/api/v1", tags=["procedures"])
 
 
 class ProcedureView(BaseModel):
-    """A procedure with the JSON Schemas of what it takes and gives."""
+    """A procedure with the JSON Schemas of its parameters and its result."""
 
     name: str
     title: str
@@ -26,7 +26,7 @@ class ProcedureView(BaseModel):
 
 
 class PreviewRequest(Request):
-    """What a plan would be worth."""
+    """A plan to be previewed: procedure parameters, unit and bench."""
 
     unit: str = NAME
     bench: Annotated[str, NAME] | None = None
@@ -34,7 +34,7 @@ class PreviewRequest(Request):
 
 
 class Preview(BaseModel):
-    """A plan before anything moves."""
+    """Preview of a plan before anything moves."""
 
     procedure: str
     unit: str
@@ -60,19 +60,19 @@ def _view(entry: Procedure[Parameters, Outcome] | Method[Parameters, Outcome]) -
 
 @router.get("/procedures", responses=problems())
 def list_procedures(service: Service) -> list[ProcedureView]:
-    """Every procedure, with the JSON Schemas of its parameters and its result."""
+    """List every procedure, with the JSON Schemas of its parameters and its result."""
     return [_view(procedure) for procedure in service.catalogue.procedures.values()]
 
 
 @router.get("/procedures/{name}", responses=problems(404))
 def read_procedure(name: str, service: Service) -> ProcedureView:
-    """One procedure."""
+    """Read one procedure by its name."""
     return _view(service.catalogue.procedure(name))
 
 
 @router.post("/procedures/{name}/preview", responses=problems(404, 413))
 def preview(name: str, request: PreviewRequest, service: Service) -> Preview:
-    """Stations, duration, predicted uncertainties and warnings of a plan; axis limits that it passes as violations."""
+    """Preview stations, duration, predicted uncertainties and warnings of a plan; violations of axis limits."""
     plan = service.planner.plan(name, request.unit, request.parameters, request.bench)
     return copied(
         Preview,
@@ -88,5 +88,5 @@ def preview(name: str, request: PreviewRequest, service: Service) -> Preview:
 
 @router.get("/methods", tags=["analyses"], responses=problems())
 def list_methods(service: Service) -> list[ProcedureView]:
-    """Every method that can be run on recordings or calibrations, with its JSON Schemas."""
+    """List every method that can be run on recordings or calibrations, with its JSON Schemas."""
     return [_view(method) for method in service.catalogue.methods.values()]

@@ -1,4 +1,4 @@
-"""Recordings: what there is, the samples out, and a recorded file in."""
+"""Routes of recordings: list them, export samples, and import a recorded file."""
 
 from datetime import datetime
 from typing import Annotated, Any
@@ -56,7 +56,7 @@ class RecordingView(BaseModel):
 
 
 class RecordingPage(BaseModel):
-    """Recordings, newest first."""
+    """One page of recordings, newest first."""
 
     items: list[RecordingView]
     next: str | None
@@ -78,14 +78,14 @@ def list_recordings(
     after: After = None,
     limit: Limit = 50,
 ) -> RecordingPage:
-    """Recordings, newest first."""
+    """List the recordings, newest first."""
     page = service.stores.recordings.list(job_id=job, unit=unit, after=after, limit=limit)
     return RecordingPage(items=[RecordingView.of(r) for r in page.items], next=page.next)
 
 
 @router.get("/{recording_id}", responses=problems(404))
 def read_recording(recording_id: str, service: Service) -> RecordingView:
-    """One recording with its channels, its hash and the results that used it."""
+    """Read one recording with its channels, its hash and the results that used it."""
     stored = service.stores.recordings.get(recording_id)
     return RecordingView.of(stored, service.stores.results.of_recording(recording_id))
 
@@ -99,7 +99,7 @@ def read_data(
     start_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="From the first sample")] = None,
     stop_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="Not included")] = None,
 ) -> StreamingResponse:
-    """The raw samples, whole or by channel and time, streamed: nothing is held in memory, however long it is."""
+    """Stream the raw samples, whole or by channel and time; none are held in memory, however long the recording."""
     recordings = service.stores.recordings
     stored = recordings.get(recording_id)
     names = None if channels is None else channels.split(",")

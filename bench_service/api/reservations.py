@@ -1,4 +1,4 @@
-"""Reservations: to keep a bench or a unit for a while. Jobs of others wait until the reservation ends."""
+"""Routes of reservations of a bench or a unit. Jobs of other clients wait until the reservation ends."""
 
 from datetime import datetime, timedelta
 from typing import Annotated
@@ -18,7 +18,7 @@ router = APIRouter(prefix="/api/v1/reservations", tags=["reservations"])
 
 
 class ReservationSubmission(Request):
-    """A bench or a unit, until when, and for whom."""
+    """Request to reserve a bench or a unit: until when, and for whom."""
 
     bench: Annotated[str, NAME] | None = Field(None, description="Either this, or `unit`")
     unit: Annotated[str, NAME] | None = None
@@ -36,7 +36,7 @@ class ReservationSubmission(Request):
 
 
 class ReservationView(BaseModel):
-    """A reservation. It ends by itself at `until`."""
+    """A reservation of a bench or a unit. It ends by itself at `until`."""
 
     id: str
     bench: str | None
@@ -50,7 +50,7 @@ class ReservationView(BaseModel):
 
     @classmethod
     def of(cls, kept: Reservation) -> "ReservationView":
-        """As HTTP says it."""
+        """Convert a reservation to its HTTP view."""
         return copied(
             cls,
             kept,
@@ -61,7 +61,7 @@ class ReservationView(BaseModel):
 
 
 class ReservationPage(BaseModel):
-    """Reservations, newest first."""
+    """One page of reservations, newest first."""
 
     items: list[ReservationView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")
@@ -75,7 +75,7 @@ class ReservationPage(BaseModel):
 def reserve(
     body: ReservationSubmission, service: Service, response: Response, key: IdempotencyKey = None
 ) -> ReservationView:
-    """Keep a bench or a unit. One that somebody keeps already is refused, with the holder and the end."""
+    """Reserve a bench or a unit. One that is reserved already is refused, with the holder and the end."""
     kind = Reserved.UNIT if body.bench is None else Reserved.BENCH
     name = body.bench or body.unit or ""
     kept = service.queues.reserve(copied(ReservationRequest, body, kind=kind, name=name), key)
@@ -90,18 +90,18 @@ def list_reservations(
     after: After = None,
     limit: Limit = 50,
 ) -> ReservationPage:
-    """Reservations, newest first."""
+    """List the reservations, newest first."""
     page = service.stores.reservations.list(active_at=now() if active else None, after=after, limit=limit)
     return ReservationPage(items=[ReservationView.of(kept) for kept in page.items], next=page.next)
 
 
 @router.get("/{reservation_id}", responses=problems(404))
 def read_reservation(reservation_id: str, service: Service) -> ReservationView:
-    """One reservation."""
+    """Read one reservation by its id."""
     return ReservationView.of(service.stores.reservations.get(reservation_id))
 
 
 @router.delete("/{reservation_id}", responses=problems(404, 507))
 def end_reservation(reservation_id: str, service: Service) -> ReservationView:
-    """Give it back before its time: jobs that waited for it may start. One that is over stays as it is."""
+    """End a reservation before its time: jobs that waited for it may start. One that is over stays as it is."""
     return ReservationView.of(service.queues.give_back(reservation_id))

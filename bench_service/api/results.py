@@ -1,4 +1,4 @@
-"""Results: methods run on stored evidence, and every result by its id."""
+"""Routes of results: run a method on stored evidence, and read results by id."""
 
 from datetime import datetime
 from typing import Annotated, Any
@@ -18,7 +18,7 @@ router = APIRouter(prefix="/api/v1", tags=["analyses"])
 
 
 class AnalysisSubmission(Request):
-    """A method and what it is to work on."""
+    """Request to run a method: its name, its evidence and its parameters."""
 
     method: str = NAME
     recordings: list[str] = Field(default_factory=list[str], max_length=1000)
@@ -27,7 +27,7 @@ class AnalysisSubmission(Request):
 
 
 class Lineage(BaseModel):
-    """What made a number."""
+    """The lineage of a result: the recordings, calibrations and code that made it."""
 
     recordings: list[dict[str, str]] = Field(description="id and content hash of each recording, in order")
     calibrations: list[str]
@@ -65,7 +65,7 @@ class ResultView(BaseModel):
 
 
 class ResultPage(BaseModel):
-    """Results, newest first."""
+    """One page of results, newest first."""
 
     items: list[ResultView]
     next: str | None
@@ -91,12 +91,12 @@ def run_method(
 def list_results(
     service: Service, unit: Annotated[str | None, Query(max_length=100)] = None, after: After = None, limit: Limit = 50
 ) -> ResultPage:
-    """Results, newest first."""
+    """List the results, newest first."""
     page = service.stores.results.list(unit=unit, after=after, limit=limit)
     return ResultPage(items=[ResultView.of(result) for result in page.items], next=page.next)
 
 
 @router.get("/results/{result_id}", responses=problems(404))
 def read_result_by_id(result_id: str, service: Service) -> ResultView:
-    """One result with its lineage."""
+    """Read one result with its lineage."""
     return ResultView.of(service.stores.results.get(result_id))

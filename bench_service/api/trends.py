@@ -1,4 +1,4 @@
-"""Trends: a quantity of a unit over its results, with control limits."""
+"""Routes of trends: a quantity of a unit over its results, with control limits."""
 
 from typing import Annotated
 
@@ -24,5 +24,5 @@ def read_trend(
     same_parameters: Annotated[bool, Query(description="Only results with the newest one's parameters")] = False,
     limit: Annotated[int, Query(ge=2, le=500, description="The latest results")] = 100,
 ) -> TrendView:
-    """The quantity over the results that gave jobs their verdict: an individuals chart with Western Electric rules."""
+    """Read the trend of a quantity over the results that gave verdicts: a control chart with Western Electric rules."""
     return TrendView.of(service.campaigns.trend(serial, procedure, quantity, simulated, limit, same_parameters))

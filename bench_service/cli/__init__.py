@@ -1,1 +1,1 @@
-"""The command line, ``bench``: the same API in other words. Exit code 0 pass, 1 fail, 2 error."""
+"""Command line ``bench``: a client of the same API. Exit code 0 pass, 1 fail, 2 error."""

@@ -53,7 +53,7 @@ def stop(
 
 
 def of_bench(settings: Settings, bench: str | None) -> Settings:
-    """The settings of another bench. Raises `Refused` for a name that no bench can have."""
+    """Return the settings of another bench. Raises `Refused` for a name that no bench can have."""
     try:
         return Settings.model_validate({**settings.model_dump(), "bench_id": bench or settings.bench_id})
     except ValidationError as error:

@@ -76,7 +76,7 @@ def run_campaign(
 
 @campaigns.command("list")
 def list_campaigns(context: typer.Context, server: Server = None, as_json: AsJson = False) -> None:
-    """Campaigns by name."""
+    """List the campaigns by name."""
     from bench_service.cli.campaign_tables import campaign_table
 
     with connect(context.obj, server, drive=False) as client:
@@ -101,7 +101,7 @@ def add_campaign(
     ],
     server: Server = None,
 ) -> None:
-    """Store a campaign; what can never work is refused, what may not is warned of."""
+    """Store a campaign; impossible steps are refused, doubtful ones give warnings."""
     with connect(context.obj, server, drive=False) as client:
         headers = {"Content-Type": "application/json"}
         made = call(
@@ -165,7 +165,7 @@ def add_schedule(
 
 @schedules.command("list")
 def list_schedules(context: typer.Context, server: Server = None, as_json: AsJson = False) -> None:
-    """Schedules, newest first."""
+    """List the schedules, newest first."""
     from bench_service.cli.campaign_tables import schedule_table
 
     with connect(context.obj, server, drive=False) as client:
@@ -175,7 +175,7 @@ def list_schedules(context: typer.Context, server: Server = None, as_json: AsJso
 
 @schedules.command("remove")
 def remove_schedule(context: typer.Context, schedule: str, server: Server = None) -> None:
-    """Forget a schedule; its runs stay."""
+    """Delete a schedule; its runs are kept."""
     with connect(context.obj, server, drive=False) as client:
         answer(client, "DELETE", f"/api/v1/schedules/{segment(schedule)}")
 
@@ -189,7 +189,7 @@ def _write_junit(content: bytes, run_id: str, file: Path) -> None:
 
 
 def _step_parameters(texts: list[str]) -> dict[str, dict[str, Any]]:
-    """``step.name=value`` as step -> name -> value."""
+    """Convert ``step.name=value`` texts to step -> name -> value."""
     found: dict[str, dict[str, Any]] = {}
     for text in texts:
         path, value = parameter(text)
@@ -209,7 +209,7 @@ def _labels(texts: list[str]) -> dict[str, str]:
 
 
 def _all(client: "httpx.Client", path: str) -> list[dict[str, Any]]:
-    """Every page of a list."""
+    """Read every page of a list."""
     items: list[dict[str, Any]] = []
     query: dict[str, Any] = {"limit": 500}
     while True:

@@ -1,4 +1,4 @@
-"""One client for both ways: a server's address, or the same application in this process."""
+"""HTTP client for both ways: a server's address, or the same application in this process."""
 
 import tempfile
 from collections.abc import Generator, Sequence
@@ -15,20 +15,20 @@ if TYPE_CHECKING:
 
 TIMEOUT_S = 600.0
 NOT_NOW = (502, 503, 504)
-"""Statuses of a service that is not ready, and of a proxy whose service is away."""
+"""Status codes of a service that is not ready, and of a proxy whose service is away."""
 SHOWN = 120
-"""How much of an answer that nobody expected is shown [characters]."""
+"""Length to which an unexpected answer is cut when it is shown [characters]."""
 
 RESULT = ("id", "verdict", "document")
-"""What commands read of a result."""
+"""Fields of a result that commands read."""
 
 
 @contextmanager
 def connect(settings: Settings, server: str | None, drive: bool) -> Generator["httpx.Client"]:
-    """A client to `server`, or to an application in this process that lives as long as the block.
+    """Open a client to `server`, or to an application in this process that lives as long as the block.
 
-    `drive`: whether the embedded application is to run jobs, for which it must have the bench to itself.
-    Raises `Refused` where nobody answers, whatever in the block asks.
+    `drive`: true where the embedded application is to run jobs, for which it must have the bench to itself.
+    Raises `Refused` where no service answers a request made in the block.
     """
     import httpx
 
@@ -42,7 +42,7 @@ def connect(settings: Settings, server: str | None, drive: bool) -> Generator["h
 
 
 def _token(settings: Settings) -> dict[str, str]:
-    """The header with the service's token, where the settings have one. Raises `Refused`."""
+    """Build the header with the service's token, where the settings have one. Raises `Refused`."""
     try:
         token = settings.token()
     except BadSettings as error:
@@ -51,7 +51,7 @@ def _token(settings: Settings) -> dict[str, str]:
 
 
 def _address(server: str) -> "httpx.URL":
-    """Where the service is. Raises `Refused` for what no resolver would take."""
+    """Return the address of the service as a URL. Raises `Refused` for a host name that no resolver would take."""
     import httpx
 
     url = httpx.URL(server)
@@ -84,7 +84,7 @@ def _client(settings: Settings, server: str | None, drive: bool) -> Generator["h
 
 
 def call(client: "httpx.Client", method: str, path: str, fields: Sequence[str], **options: Any) -> Any:
-    """The JSON object of a good answer, with at least these fields. Raises `Refused` with what the service said."""
+    """Return the JSON object of a good answer that has these fields. Raises `Refused` with the service's reason."""
     response = answer(client, method, path, **options)
     found = _json(response)
     if not isinstance(found, dict) or not all(name in found for name in fields):
@@ -93,7 +93,7 @@ def call(client: "httpx.Client", method: str, path: str, fields: Sequence[str], 
 
 
 def answer(client: "httpx.Client", method: str, path: str, **options: Any) -> "httpx.Response":
-    """A good answer, whatever is in it. Raises `Refused` with what the service said, `Away` where it may yet answer."""
+    """Return a good answer, whatever it holds. Raises `Refused` with the service's reason, `Away` if it may return."""
     import httpx
 
     try:
@@ -109,7 +109,7 @@ def answer(client: "httpx.Client", method: str, path: str, **options: Any) -> "h
 
 
 def check(response: "httpx.Response") -> None:
-    """Raises `Refused` for an answer that is not good, with what the service said, and for one of something else."""
+    """Check that an answer is good. Raises `Refused` with the service's reason if it is an error or a web page."""
     if not response.is_success:
         response.read()
         raise (Away if response.status_code in NOT_NOW else Refused)(_sentence(response))
@@ -119,7 +119,7 @@ def check(response: "httpx.Response") -> None:
 
 
 def segment(name: str) -> str:
-    """A name as one segment of a path, whatever is in it."""
+    """Quote a name as one segment of a path, whatever is in it."""
     return quote(name, safe="")
 
 
@@ -128,7 +128,7 @@ def _away(error: "httpx.RequestError") -> Away:
 
 
 def _sentence(response: "httpx.Response") -> str:
-    """A problem document in words; of anything else, who answered it and how it begins."""
+    """Format a problem document as one sentence; of any other answer, its source and its first characters."""
     problem = _json(response)
     if isinstance(problem, dict):
         found = problem.get("errors")
@@ -149,14 +149,14 @@ def _no_service(response: "httpx.Response") -> str:
 
 
 def _beginning(response: "httpx.Response") -> str:
-    """Status and the first words, in one line."""
+    """Describe an answer by its status and first words, in one line."""
     text = " ".join(response.text.split())
     shown = text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
     return f"{response.status_code} {response.reason_phrase}: {shown or 'nothing'}"
 
 
 def _json(response: "httpx.Response") -> Any:
-    """What the answer holds; None where that is no JSON."""
+    """Parse the answer's body as JSON; None where it is no JSON."""
     try:
         return response.json()
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""The commands. Each says what it did to standard output, and what went wrong to standard error.
+"""The commands of the command line. Each prints its outcome to standard output, and errors to standard error.
 
 Tables and progress bars are imported by the commands that show them: a server that starts does not wait for them.
 """
@@ -33,7 +33,7 @@ app.add_typer(campaign_commands.schedules, name="schedule")
 
 
 def run_command_line(settings: Settings, arguments: list[str] | None = None) -> int:
-    """Run one command; its exit code: 0 pass, 1 fail, 2 error."""
+    """Run one command and return its exit code: 0 pass, 1 fail, 2 error."""
     try:
         code = app(arguments, standalone_mode=False, obj=settings)
     except (Refused, ServiceError) as error:
@@ -41,7 +41,7 @@ def run_command_line(settings: Settings, arguments: list[str] | None = None) -> 
         return 2
     except typer.Abort:
         return 2
-    except SystemExit as ended:  # whoever read the output has gone, or no server could start; 1 would be a verdict
+    except SystemExit as ended:  # the output was closed, or no server could start; 1 would be a verdict
         return 2 if ended.code else 0
     except Exception as error:
         if hasattr(error, "show") and hasattr(error, "exit_code"):  # a usage error of the command line itself
@@ -53,7 +53,7 @@ def run_command_line(settings: Settings, arguments: list[str] | None = None) -> 
 
 
 def _unforeseen(settings: Settings, error: Exception) -> None:
-    """One sentence of what nobody foresaw; where it happened is for the log."""
+    """Report an unexpected exception in one sentence; its traceback goes to the log."""
     from bench_service.cli.logs import set_up
 
     set_up(settings, "warning")

@@ -1,8 +1,8 @@
-"""The companion of a process that drives a bench: a supervisor in a process of its own, kept there while it drives.
+"""Companion of a process that drives a bench: a supervisor in a process of its own, restarted while it drives.
 
 A companion that ended is started again, whatever ended it, at a pace that falls while it does not last. One that left
-the bench to another supervisor comes back only once nobody has supervised the bench for a while: long enough for
-whoever keeps that other one to have started it again.
+the bench to another supervisor comes back only once the bench has been without supervisor for a while: long enough for
+the keeper of that other one to have started it again.
 """
 
 import logging
@@ -21,25 +21,25 @@ from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s
 
 LOOK_S = 0.25
-"""How often it is looked whether the companion lives [s]."""
+"""Interval between checks that the companion lives [s]."""
 AGAIN_S = 1.0
-"""At least so long from one start to the next [s], and twice as long after each that did not last."""
+"""Shortest time from one start to the next [s], doubled after each companion that did not last."""
 SLOWEST_S = 60.0
-"""At most so long [s]; a companion has lasted when it lived for this time."""
+"""Longest time from one start to the next [s]; a companion has lasted when it lived for this time."""
 UNSUPERVISED_S = 5.0
-"""How long nobody may supervise a bench that was left to another supervisor [s]."""
+"""Longest time that a bench left to another supervisor may be without one [s]."""
 LEAVE_S = 2.0
-"""How long a process that ends waits for its companion to see it [s]."""
+"""Time that a process that ends waits for its companion to notice it [s]."""
 
 Process = subprocess.Popen[bytes]
 log = logging.getLogger(__name__)
 
 
 class Companion:
-    """Starts a supervisor, and starts it again; it lives on its own."""
+    """Starts a supervisor process and restarts it when it ends; the process outlives this one."""
 
     def __init__(self, bench_id: str, spawn: Callable[[], Process], supervised: Callable[[], bool]) -> None:
-        """`spawn` starts a supervisor; `supervised`: whether anybody supervises the bench now."""
+        """`spawn` starts a supervisor; `supervised`: returns whether any process supervises the bench now."""
         self._bench_id = bench_id
         self._spawn = spawn
         self._supervised = supervised
@@ -49,7 +49,7 @@ class Companion:
         self._pause_s = AGAIN_S
 
     def look(self, now_s: float) -> None:
-        """Note its end, and start it if that is due."""
+        """Note the companion's end, and start it if that is due."""
         if self._process is not None:
             code = self._process.poll()
             if code is None:
@@ -62,13 +62,13 @@ class Companion:
             self._start(now_s)
 
     def leave(self) -> None:
-        """Wait a moment for its end; if it has work left it goes on alone."""
+        """Wait a moment for the companion's end; if it has work left, it goes on alone."""
         if self._process is None:
             return
         try:
             self._process.wait(LEAVE_S)
         except subprocess.TimeoutExpired:
-            self._process.returncode = 0  # nobody waits for it any more
+            self._process.returncode = 0  # no one waits for the process any more
 
     def _start(self, now_s: float) -> None:
         self._started_s = now_s
@@ -95,9 +95,9 @@ class Companion:
 
 @contextmanager
 def accompanied(settings: Settings, driving: Callable[[], bool]) -> Generator[None]:
-    """A supervisor beside this process that outlives the block if it must.
+    """Run the block with a supervisor process next to this one; it outlives the block if it must.
 
-    `driving`: whether this process drives the bench now: not before it has started, not while it ends.
+    `driving`: returns whether this process drives the bench now: not before it has started, not while it ends.
     """
     over = threading.Event()
     files = HostFiles(settings.devices_in(), settings.bench_id)
@@ -139,5 +139,5 @@ def _spawn(settings: Settings) -> Process:
 
 
 def log_of(settings: Settings) -> Path:
-    """Where the companion writes what it has to say."""
+    """Return the path of the companion's log file."""
     return settings.devices_in() / f"bench-{settings.bench_id}.supervisor.log"

@@ -1,7 +1,7 @@
-"""Connections that nobody uses must not keep a stop out: so many descriptors are kept for bench, database and files.
+"""Limit on idle connections, so that they cannot keep a stop out: bench, database and files have descriptors reserved.
 
-Where more connections come than there is room for, the oldest one that asks nothing is closed for each new one; one
-that has not said what it wants within `HEADERS_S` is closed anyway. A request that is at work is never cut.
+Where more connections come than there is room for, the oldest idle one is closed for each new one; one that has not
+sent its request within `HEADERS_S` is closed anyway. A request that is at work is never cut.
 """
 
 import asyncio
@@ -13,26 +13,26 @@ from contextlib import suppress
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 RESERVED = 256
-"""Descriptors that no connection gets."""
+"""Number of descriptors that are reserved, so that no connection gets them."""
 LEAST = 64
-"""So many connections there are in any case."""
+"""Smallest limit on connections, whatever the number of descriptors."""
 WANTED = 65_536
-"""Descriptors that the process asks the system for, as far as it may have them."""
+"""Number of descriptors that the process asks the system for, up to its hard limit."""
 HEADERS_S = 20.0
-"""How long a connection may take until its first request is whole up to its body [s]."""
+"""Time within which a connection's first request must have come, up to its body [s]."""
 AT_ONCE = 64
-"""So many connections are accepted before the first of them is looked at."""
+"""Number of connections that are accepted before the first of them is served."""
 QUEUE = 2048
-"""So many may wait at the door meanwhile."""
+"""Number of connections that may wait in the listening queue meanwhile."""
 
 log = logging.getLogger(__name__)
 
 
 class BoundedConnections(HttpToolsProtocol):
-    """uvicorn's protocol with an end to idle connections."""
+    """uvicorn's HTTP protocol with an end to idle connections."""
 
     most = WANTED
-    """How many connections there may be at once."""
+    """Largest number of connections at once."""
     _late: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -50,12 +50,12 @@ class BoundedConnections(HttpToolsProtocol):
 
     @property
     def _begun(self) -> bool:
-        """Whether a first request has come, as far as its body."""
+        """Return whether a first request has come, as far as its body."""
         return getattr(self, "cycle", None) is not None
 
     @property
     def idle(self) -> bool:
-        """Whether it asks nothing now."""
+        """Return whether the connection has no request at work now."""
         return not self._begun or self.cycle.response_complete
 
     def _end_if_idle(self) -> None:
@@ -64,7 +64,7 @@ class BoundedConnections(HttpToolsProtocol):
 
 
 _in_order: dict[BoundedConnections, None] = {}
-"""The open connections, oldest first."""
+"""Open connections of this process, oldest first."""
 
 
 def _end_oldest_idle() -> None:
@@ -76,7 +76,7 @@ def _end_oldest_idle() -> None:
 
 
 def raise_descriptors() -> int:
-    """Ask the system for as many descriptors as it gives; how many connections that leaves room for."""
+    """Raise the limit of descriptors as far as the system allows; return how many connections that leaves room for."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = WANTED if hard == resource.RLIM_INFINITY else min(WANTED, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:
@@ -87,7 +87,7 @@ def raise_descriptors() -> int:
 
 
 def lengthen_queue(sockets: list[socket.socket]) -> None:
-    """Let more connections wait than are accepted at once, so that none is turned away while the oldest are closed."""
+    """Let more connections wait than are accepted at once, so that none is refused while the oldest are closed."""
     for listening in sockets:
         with suppress(OSError), socket.socket(fileno=socket.dup(listening.fileno())) as same:
             same.listen(QUEUE)

@@ -1,4 +1,4 @@
-"""``make run``: calibrate and verify the simulated unit through the service, as an operator would."""
+"""The demonstration ``make run``: calibrate and verify the simulated unit through the service, as an operator would."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,4 +1,4 @@
-"""The end of a process that waits: SIGTERM and SIGINT set an event, and whoever waits for it ends in order."""
+"""Orderly end of a process that waits: SIGTERM and SIGINT set an event on which the process waits."""
 
 import signal
 import threading
@@ -6,7 +6,7 @@ from types import FrameType
 
 
 def ending_on_signals() -> threading.Event:
-    """An event that SIGTERM or SIGINT sets from now on. Must be called in the main thread."""
+    """Create an event that SIGTERM or SIGINT sets from now on. Must be called in the main thread."""
     ending = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:

@@ -1,4 +1,4 @@
-"""Files that a command reads and writes."""
+"""Reading and writing of files for commands."""
 
 import os
 from collections.abc import Generator
@@ -11,7 +11,7 @@ from bench_service.cli.refusal import Refused
 
 
 def text_of(file: Path) -> str:
-    """All of a text file. Raises `Refused`."""
+    """Read all of a text file. Raises `Refused`."""
     try:
         return file.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
@@ -19,13 +19,13 @@ def text_of(file: Path) -> str:
 
 
 def check_folder(file: Path) -> None:
-    """Raises `Refused` where there is no folder for the file: before there is anything to lose."""
+    """Check that the folder of a file exists, before there is anything to lose. Raises `Refused` where it does not."""
     if not file.absolute().parent.is_dir():
         raise Refused(f"{file} cannot be written: there is no folder {file.parent}")
 
 
 def clear_place(file: Path) -> None:
-    """No file of an earlier command is left here, to be taken for that of this one. Raises `Refused`."""
+    """Remove a file that an earlier command left, so that it cannot pass for this one's. Raises `Refused`."""
     check_folder(file)
     try:
         if file.exists() and not file.is_file():

@@ -1,4 +1,4 @@
-"""Where lines go and how they look: one handler for ours, the HTTP server's and the job engine's.
+"""Destination and format of log lines: one handler for the service's, the HTTP server's and the job engine's.
 
 `BENCH_LOG=json` writes one JSON object a line with what it is about as fields; without it, text for a person.
 """
@@ -13,22 +13,22 @@ from bench_service.telemetry.log_context import AddSubjects
 
 FIELDS = "{asctime} {levelname} {name} {message}"
 OWN_HANDLERS = ("uvicorn", "uvicorn.error", "uvicorn.access", "dbos")
-"""Loggers of libraries that bring a handler of their own, unless they find one; some put tracebacks into messages."""
+"""Loggers of libraries that install a handler of their own unless they find one; some put tracebacks into messages."""
 
 
 TRACE = "    | "
-"""Begins each line of a traceback: a message with a line break in it cannot look like a line of the log."""
+"""Prefix of each line of a traceback: a message with a line break in it cannot look like a line of the log."""
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 """Control characters, line separators of Unicode, and marks that change the direction of what follows."""
 
 
 def visible(text: str) -> str:
-    """Text with its control characters written as escapes, so that it stays one line and commands no terminal."""
+    """Escape the control characters of a text, so that it stays one line and commands no terminal."""
     return _CONTROL.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 class Lines(logging.Formatter):
-    """One line for a person, whatever is in its message; a traceback follows on marked lines of its own."""
+    """Format a record as one line for a person; a traceback follows on marked lines of its own."""
 
     def format(self, record: logging.LogRecord) -> str:
         about: dict[str, str] = getattr(record, "subjects", {})
@@ -70,7 +70,7 @@ def _json_lines() -> logging.Formatter:
     from pythonjsonlogger.json import JsonFormatter
 
     class JsonLines(JsonFormatter):
-        """What a line is about as fields of their own, beside time, level, logger and message."""
+        """Log lines as JSON: the record's own fields, and time, level, logger and message."""
 
         def format(self, record: logging.LogRecord) -> str:
             return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", super().format(record))

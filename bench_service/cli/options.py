@@ -1,4 +1,4 @@
-"""What several commands take and say in the same words."""
+"""Options and output functions that several commands share."""
 
 import json
 from contextlib import suppress
@@ -38,12 +38,12 @@ def parameter(text: str) -> tuple[str, Any]:
 
 
 def notice(text: str) -> None:
-    """Tell something on standard error that is no failure, above a progress bar where there is one."""
+    """Print a notice that is no failure on standard error, above a progress bar where there is one."""
     errors.print(text, style="yellow", soft_wrap=True)
 
 
 def announce(text: str) -> None:
-    """Say what a service does. One whose output goes to a full disk, or to nobody, goes on."""
+    """Print a line of a service's progress. A full disk or a closed output does not stop the service."""
     with suppress(OSError):
         print(text, flush=True)
 

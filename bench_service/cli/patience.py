@@ -1,4 +1,4 @@
-"""Waiting for a service that is away for a while: restarted, or behind a link that is down."""
+"""Retries while a service is away for a while: restarted, or behind a link that is down."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -7,18 +7,18 @@ from bench_service.cli.refusal import Away, Refused
 from bench_service.wall_clock import monotonic_s, now, pause
 
 PATIENCE_S = 60.0
-"""How long a service may be away [s]; a restart takes a few."""
+"""Time for which a service may be away [s]; a restart takes a few seconds."""
 AGAIN_S = 0.5
-"""How long to wait before it is asked again [s]."""
+"""Interval between two retries [s]."""
 
 Found = TypeVar("Found")
 
 
 def patiently(ask: Callable[[], Found], say: Callable[[str], object], goes_on: str) -> Found:
-    """What `ask` gives, asked again while the service is away; `ask` must change nothing.
+    """Call `ask` and return its answer; retry while the service is away. `ask` must change nothing.
 
-    `goes_on`: what becomes of that which is asked about when we give up, and how to look at it again.
-    Raises `Refused` with it after `PATIENCE_S`, and whatever else `ask` raises at once.
+    `goes_on`: sentence on what becomes of the job or run when retries end, and how to look at it again.
+    Raises `Refused` with it after `PATIENCE_S`, and any other exception of `ask` at once.
     """
     begun, begun_s = now(), monotonic_s()
     said = False

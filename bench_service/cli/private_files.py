@@ -30,7 +30,7 @@ def protect(settings: Settings) -> None:
 
 
 def mode_of_exports() -> int:
-    """Rights of a file that a person asked for."""
+    """Return the mode bits of a file that a person requested."""
     if not _given:
         os.umask(umask := os.umask(OTHERS))
         return 0o666 & ~umask
@@ -58,7 +58,7 @@ def _take_away(path: Path) -> None:
 
 
 def _database_file(settings: Settings) -> Path | None:
-    """The file of an SQLite database; None for Postgres."""
+    """Return the file of an SQLite database; None for Postgres."""
     scheme, _, rest = settings.database_url.partition(":///")
     file = rest.partition("?")[0]
     return Path(file) if scheme.startswith("sqlite") and file else None

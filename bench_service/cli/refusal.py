@@ -1,9 +1,9 @@
-"""What a command says when it cannot do what was asked."""
+"""Exceptions of a command that cannot do its work."""
 
 
 class Refused(Exception):
-    """The service refused, or cannot be reached; the message is fit for a person."""
+    """The service refused, or cannot be reached; the message is meant for a person."""
 
 
 class Away(Refused):
-    """Nobody answers, or a proxy says so, or the service that it is not ready: it may answer again soon."""
+    """The service is away: no answer, a proxy's error, or a service that is not ready; a retry may help."""

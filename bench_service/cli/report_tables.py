@@ -11,11 +11,11 @@ from bench_service.model.errors import NotFound
 from procedures.core.report import Cell, Table
 
 ROWS_MAX = 60
-"""Rows of a table that are printed; the page has them all."""
+"""Largest number of rows that are printed of a table; the page has them all."""
 
 
 def report_tables(method: str, document: dict[str, Any]) -> Iterator[ScreenTable]:
-    """Each table of a method's report on a result document; none where this version does not know the method."""
+    """Build each table of a method's report on a result; none where this version does not know the method."""
     try:
         entry = Catalogue().method(method)
     except NotFound:
@@ -40,7 +40,7 @@ def _shown(table: Table) -> ScreenTable:
 
 
 def _cell(value: Cell) -> str:
-    """Six significant digits of a number, a dash of nothing."""
+    """Format a number with six significant digits, an absent one as a dash."""
     if value is None:
         return "–"
     return f"{value:.6g}" if isinstance(value, float) else escape(str(value))

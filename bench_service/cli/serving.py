@@ -1,4 +1,4 @@
-"""The HTTP server, in this thread or beside it."""
+"""The HTTP server, in this thread or in one of its own."""
 
 import errno
 import signal
@@ -24,14 +24,14 @@ from bench_service.wall_clock import pause
 EMBEDDED = "embedded"
 """Name that commands give to a service in their own process, which they reach over a socket file."""
 GRACE_S = 3
-"""How long open connections may take to end at shutdown [s]."""
+"""Time that open connections may take to end at shutdown [s]."""
 
 
 class _Server(uvicorn.Server):
     """uvicorn's server, with a longer queue of connections, and exit code 0 after an orderly end on SIGTERM."""
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """End in order; uvicorn itself would raise SIGTERM again afterwards, and no clean-up at exit would run."""
+        """Shut down in order on SIGTERM; uvicorn itself would raise it again, and no clean-up at exit would run."""
         if sig == signal.SIGTERM:
             self.should_exit = True
         else:
@@ -46,7 +46,7 @@ class _Server(uvicorn.Server):
 def ready(
     settings: Settings, drive: bool = True, socket_file: Path | None = None, level: str = "warning"
 ) -> Generator[uvicorn.Server]:
-    """A server around an open service, ready to run; the service is closed at the end, or when the server shuts down.
+    """Open a server around a service, ready to run; the service is closed at the end, or when the server shuts down.
 
     `level`: from which on lines are logged, where the settings do not say.
     Raises `Refused` for an address that it may not listen on, `Misconfigured` for a token that cannot be used, and what
@@ -97,7 +97,7 @@ def _check_start(service: BenchService) -> None:
 
 
 def check_address(settings: Settings) -> None:
-    """Raises `Refused` for an address from which anybody could ask, with what it takes to listen there."""
+    """Check the address of the server. Raises `Refused` if anyone could reach it, with the settings it needs."""
     if not may_listen(settings):
         raise Refused(
             f"BENCH_HOST = {settings.host}: this service listens on another address than a loopback one only with a "
@@ -107,7 +107,7 @@ def check_address(settings: Settings) -> None:
 
 
 def check_port(settings: Settings) -> None:
-    """Raises `Refused` with a hint where the port is taken, and as `check_address`."""
+    """Check port and address. Raises `Refused` with a hint where the port is taken, and as `check_address`."""
     check_address(settings)
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -123,7 +123,7 @@ def check_port(settings: Settings) -> None:
 
 @contextmanager
 def serving(settings: Settings, drive: bool = True, socket_file: Path | None = None) -> Generator[None]:
-    """A server in a thread beside this one, answering from the first line of the block, its job engine running.
+    """Run a server in a thread of its own, answering from the first line of the block, its job engine running.
 
     Raises as `ready`, but before the block is entered.
     """

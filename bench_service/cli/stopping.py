@@ -1,7 +1,7 @@
-"""``bench stop``: stop a bench from its own host, whatever else works there. Imports no database and no numerics.
+"""The command ``bench stop``: stop a bench from its own host. Imports no database and no numerics.
 
-The word goes into the bench's stop channel. It needs neither API nor database nor a free byte of disk; who watches the
-channel acts, and where nobody does, the devices are made safe from here.
+The request goes into the bench's stop channel. It needs neither API nor database nor a free byte of disk; the process
+that watches the channel acts, and where no process does, the devices are made safe from here.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from bench_service.wall_clock import monotonic_s, pause
 
 LOOK_S = 0.02
 ALONE_S = 1.5
-"""After so long without an answer from worker or supervisor the devices are tried from here [s]."""
+"""Time without an answer from worker or supervisor after which this command makes the devices safe itself [s]."""
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,31}")
 HELP = (
     "Stop a bench on its own host, also without API, database and free disk. Not the hardware emergency stop. "
@@ -72,7 +72,7 @@ def stop_here(bench: str, folder: Path, reason: str, wait_s: float, say: Callabl
 
 
 def stop_command(arguments: Sequence[str], environ: Mapping[str, str]) -> int:
-    """``bench stop`` by itself, without the rest of the command line; its exit code.
+    """Run ``bench stop`` by itself, without the rest of the command line; return its exit code.
 
     Of the environment it reads what it needs: a setting that another command would refuse does not keep a stop out.
     """
@@ -93,7 +93,7 @@ def stop_command(arguments: Sequence[str], environ: Mapping[str, str]) -> int:
 
 
 def _say(line: str) -> None:
-    with suppress(OSError):  # nobody reads it, or its disk is full: the stop goes on
+    with suppress(OSError):  # the output is closed, or its disk is full: the stop goes on
         print(line, flush=True)
 
 
@@ -105,12 +105,12 @@ def _person() -> str:
 
 
 def _known(folder: Path, bench: str) -> bool:
-    """Whether the bench's devices were ever driven from this host."""
+    """Return whether the bench's devices were ever driven from this host."""
     return (folder / f"bench-{bench}.devices").exists()
 
 
 def _make_safe(folder: Path, bench: str) -> tuple[bool, str]:
-    """Over the devices' own link, where no other process has it; numerics are loaded here, and only here."""
+    """Make safe over the devices' own link, where no other process has it; numerics are loaded here, and only here."""
     from bench_service.bench.make_safe import over_new_link
     from bench_service.drivers.device_register import DeviceRegister
     from bench_service.drivers.registered import RegisteredDevices

@@ -1,4 +1,4 @@
-"""``bench supervise``. Imports no engine, no simulator, no numerics.
+"""The command ``bench supervise``. Imports no engine, no simulator, no numerics.
 
 It has a composition of its own, because that of the service loads what a supervisor must do without.
 """
@@ -27,14 +27,14 @@ from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 
 TAKE_OVER_S = 2.0
-"""How long a companion tries to become the supervisor [s]: one that is about to leave has left by then."""
+"""Time for which a companion tries to become the supervisor [s]: an earlier one that ends is gone by then."""
 log = logging.getLogger(__name__)
 SUPERVISED_ALREADY = 3
 """Exit code of a companion that leaves its bench to another supervisor."""
 
 
 def supervise(settings: Settings, companion: bool, say: Callable[[str], object]) -> int:
-    """Supervise the settings' bench until SIGTERM or SIGINT; the exit code. Raises `BenchBusy` where somebody does.
+    """Supervise the settings' bench until SIGTERM or SIGINT; the exit code. Raises `BenchBusy` if it is supervised.
 
     A companion then leaves it at that, and ends with `SUPERVISED_ALREADY`: one supervisor looks after every process
     that drives the bench.

@@ -1,4 +1,4 @@
-"""Tables for a terminal: coefficients beside the truth, checks beside their limits."""
+"""Tables for a terminal: coefficients next to the true values, checks next to their limits."""
 
 from typing import Any
 
@@ -35,7 +35,7 @@ def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]]
 
 
 def check_table(document: dict[str, Any]) -> Table:
-    """Each value against its limit."""
+    """Table of checks, each value next to its limit."""
     table = Table(title="Checks")
     for column in ("check", "value", "limit", "unit", "outcome"):
         table.add_column(column, justify="left" if column in ("check", "unit", "outcome") else "right")
@@ -49,13 +49,13 @@ def check_table(document: dict[str, Any]) -> Table:
 
 
 def show_warnings(document: dict[str, Any], to: Console) -> None:
-    """What a person should know before believing the result."""
+    """Print the warnings of a result, which a person should read before trusting it."""
     for warning in document.get("warnings", []):
         to.print(Text(f"warning: {warning}", style="yellow"), soft_wrap=True)
 
 
 def job_table(jobs: list[dict[str, Any]]) -> Table:
-    """Jobs, newest first."""
+    """Table of jobs, newest first."""
     table = Table()
     for column in ("job", "procedure", "unit", "state", "verdict", "stations", "submitted"):
         table.add_column(column, no_wrap=column == "job")

@@ -1,4 +1,4 @@
-"""Watching a job to its end, with a progress bar for a person."""
+"""Progress of a job until its end, with a progress bar for a person."""
 
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
 ENDED = ("succeeded", "failed", "cancelled", "interrupted")
 LOOK_S = 0.1
-"""How often to look [s]."""
+"""Interval between two polls of the service [s]."""
 LOOK_TIMEOUT_S = 15.0
-"""How long one look may take [s]: a service that hangs is away too."""
+"""Longest time that one poll may take [s]: a service that hangs counts as away."""
 JOB = ("id", "procedure", "unit", "state", "verdict", "progress", "page", "result", "error")
 CAMPAIGN_RUN = ("id", "campaign", "unit", "state", "verdict", "steps", "waiting", "reason", "warnings")
-"""What commands read of a job and of a campaign's run."""
+"""Fields of a job and of a campaign's run that commands read."""
 
 
 def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict[str, Any]:
-    """Follow a job until it has ended; the job as it then is. Raises `Refused` where the service is away for long."""
+    """Follow a job until it has ended; return its last state. Raises `Refused` where the service is away for long."""
     page = f"{str(client.base_url).rstrip('/')}{job['page']}"
     goes_on = f"The service has job {job['id']} and goes on with it: {page} shows it, `bench jobs` lists it"
     with _progress(console) as progress:
@@ -41,12 +41,12 @@ def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict
 
 
 def exit_code(verdict: str | None) -> int:
-    """0 pass, 1 fail, 2 everything else."""
+    """Return the exit code of a verdict: 0 pass, 1 fail, 2 everything else."""
     return {"pass": 0, "fail": 1}.get(verdict or "", 2)
 
 
 def watch_campaign(client: "httpx.Client", run: dict[str, Any], console: Console, goes_on: str) -> dict[str, Any]:
-    """Follow a campaign's run until it has ended; what it waits for is shown beside the bar.
+    """Follow a campaign's run until it has ended; the reason that it waits for is shown next to the bar.
 
     Raises `Refused` with `goes_on` where the service is away for long.
     """
@@ -65,6 +65,6 @@ def watch_campaign(client: "httpx.Client", run: dict[str, Any], console: Console
 
 
 def _progress(console: Console) -> Progress:
-    """Names and reasons come from people: no markup."""
+    """Build the progress bar; names and reasons come from people and are no markup."""
     name, doing = (TextColumn(text, markup=False) for text in ("{task.description}", "{task.fields[doing]}"))
     return Progress(name, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), doing, console=console)

@@ -1,4 +1,4 @@
-"""``bench worker``: the jobs of one bench, in a process without HTTP."""
+"""The command ``bench worker``: run the jobs of one bench, in a process without HTTP."""
 
 import threading
 from collections.abc import Callable

@@ -1,1 +1,1 @@
-"""Things that become a bench: the simulated one now, real devices beside it. One file a maker and device."""
+"""Drivers that mount a bench: the simulated one now, real devices later. One file for each maker and device."""

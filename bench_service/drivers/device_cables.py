@@ -1,7 +1,7 @@
-"""Links of a simulated bench's devices that are lost, for whoever wants them: a file for each, beside the register.
+"""Lost links of a simulated bench's devices, set by simulation or by hand: one file for each, next to the register.
 
-A cable that is out is out for every process, and for the next one too. `bench-<id>.<device>.lost` says that a device's
-cable is; whoever deletes the file plugs it in again, whoever makes one (`touch`) pulls it out.
+A cable that is out is out for every process, and for the next one too. `bench-<id>.<device>.lost` marks the cable of
+that device as out; a person plugs it in by deleting the file, and pulls it out by making one (`touch`).
 """
 
 import json
@@ -13,14 +13,14 @@ from procedures.bench.errors import Disconnected
 
 
 class DeviceCables:
-    """The cables of one bench's devices, which are named as in the devices' journal: "turntable", "imu", …"""
+    """Cables of one bench's devices, which are named as in the devices' journal: "turntable", "imu", …"""
 
     def __init__(self, folder: Path, bench_id: str) -> None:
         self._folder = folder
         self._bench_id = bench_id
 
     def file(self, device: str) -> Path:
-        """Where it lies that a device's link is lost, as long as it is."""
+        """Return the path of the file that exists while a device's link is lost."""
         return self._folder / f"bench-{self._bench_id}.{device}.lost"
 
     def cut(self, device: str, why: str, lasts_s: float | None = None) -> None:
@@ -38,14 +38,14 @@ class DeviceCables:
         partial.replace(path)
 
     def need(self, device: str) -> None:
-        """Raises `Disconnected` naming the device while its link is lost."""
+        """Check a device's cable. Raises `Disconnected` naming the device while its link is lost."""
         lost = self._lost(self.file(device))
         if lost is not None and (lost[0] is None or wall_clock.now() < lost[0]):
             why = f" ({lost[1]})" if lost[1] else ""
             raise Disconnected(f"the {device} cannot be reached: its link is lost{why}")
 
     def _lost(self, path: Path) -> tuple[datetime | None, str] | None:
-        """Until when (None: for good) and why; None where there is no file. One that a person made may be empty."""
+        """Read the loss's end (None: for good) and its reason; None without a file. A handmade file may be empty."""
         try:
             text = path.read_text(encoding="utf-8")
         except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""Faults that are put into a simulated bench's devices on purpose, for exercises: never into real ones."""
+"""Faults that are injected into a simulated bench's devices for exercises: never into real ones."""
 
 import json
 from collections.abc import Mapping
@@ -14,23 +14,23 @@ from bench_service.model.errors import Misconfigured
 from procedures.bench.errors import DeviceFault, Disconnected
 
 HANG_S = 3600.0
-"""How long a device that hangs says nothing [s]: longer than anybody waits."""
+"""Time for which a hanging device gives no answer [s]: longer than any caller waits."""
 
 
 class FaultRule(BaseModel):
-    """What may happen when a verb begins."""
+    """A fault that may occur when a verb begins."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     verb: str = Field(min_length=1)
-    """As in the devices' journal, with wildcards: "turntable.move_to", "supply.*", "imu.block" (each block)."""
+    """Verb as in the devices' journal, with wildcards: "turntable.move_to", "supply.*", "imu.block" (each block)."""
     kind: Literal["hang", "disconnect", "fault", "lost"]
     """No answer at all (the thread that asked is lost, as in a vendor's library), a link that a new one replaces, a
     fault of the device, or a link that is lost: a new one does not come about before the cable is plugged in again."""
     probability: float = Field(gt=0.0, le=1.0)
-    """Each time that the verb begins."""
+    """Probability of the fault at each begin of the verb."""
     lasts_s: float | None = Field(None, gt=0.0)
-    """Of a lost link: for how long [s, real time]; None: until a person deletes its file (see `device_cables`)."""
+    """Duration of a lost link [s, real time]; None: until a person deletes its file (see `device_cables`)."""
 
     @model_validator(mode="after")
     def _only_a_lost_link_lasts(self) -> "FaultRule":
@@ -40,7 +40,7 @@ class FaultRule(BaseModel):
 
 
 class FaultPlan(BaseModel):
-    """Which faults a bench's devices have, and the seed of their chance."""
+    """Faults of a bench's devices, and the seed of their random numbers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -64,7 +64,7 @@ class FaultPlan(BaseModel):
 
 
 class DeviceFaults:
-    """The faults of one opening of the devices; every opening has chances of its own, the same in each exercise."""
+    """Draw the faults of one opening of the devices; each has its own random numbers, the same in each exercise."""
 
     def __init__(self, plan: FaultPlan, opening: str, cables: DeviceCables) -> None:
         self._rules = plan.rules
@@ -72,7 +72,7 @@ class DeviceFaults:
         self._cables = cables
 
     def strike(self, verb: str, arguments: Mapping[str, Any]) -> None:
-        """Let happen what happens as a verb begins. Raises `DeviceFault`, `Disconnected`, or does not return."""
+        """Inject a fault, if one is due, as a verb begins. Raises `DeviceFault`, `Disconnected`, or does not return."""
         for rule in self._rules:
             if fnmatchcase(verb, rule.verb) and self._chance.random() < rule.probability:
                 if rule.kind == "hang":

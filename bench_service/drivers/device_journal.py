@@ -1,6 +1,6 @@
-"""What a bench's devices were asked, verb by verb and by whom: a witness that does not depend on any lock.
+"""Journal of the verbs asked of a bench's devices, with the process that asked: a witness that depends on no lock.
 
-One JSON line a verb, appended with one write; bounded by size. A full disk costs lines, never a job.
+One JSON line for each verb, appended with one write; bounded by size. A full disk costs lines, never a job.
 """
 
 import json
@@ -14,15 +14,15 @@ from typing import Any
 from bench_service import wall_clock
 
 ROTATE_BYTES = 2_000_000
-"""A journal of this size becomes an old one."""
+"""Size at which a journal becomes an old one [bytes]."""
 KEPT = 3
-"""How many old ones are kept."""
+"""Number of old journals that are kept."""
 
 log = logging.getLogger(__name__)
 
 
 class DeviceJournal:
-    """The journal of one bench; any process may append a line, whole lines never mix."""
+    """Journal of one bench; any process may append a line, whole lines never mix."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -30,10 +30,10 @@ class DeviceJournal:
         self._size = 0
         self._told = False
         self._cut = b""
-        """What ends a line that found no room for all of itself."""
+        """Bytes that end a line for which there was not room enough."""
 
     def write(self, verb: str, arguments: Mapping[str, Any], **more: Any) -> None:
-        """Append a line: when, which process, verb, arguments, and whatever else matters."""
+        """Append a line: time, process id, verb, arguments, and the fields of `more`."""
         entry = {"at": wall_clock.now().isoformat(), "pid": os.getpid(), "verb": verb, "arguments": dict(arguments)}
         line = json.dumps({**entry, **more}, separators=(",", ":"), default=str).encode() + b"\n"
         try:
@@ -51,7 +51,7 @@ class DeviceJournal:
         self._size += len(line)
 
     def rotate(self) -> None:
-        """Begin a new journal where this one is long enough; only for whoever has the devices' link."""
+        """Rotate the journal when it is long enough; only the holder of the devices' link may call it."""
         if self._size < ROTATE_BYTES:
             return
         self.close()
@@ -62,7 +62,7 @@ class DeviceJournal:
         self.path.replace(self._old(1))
 
     def entries(self) -> list[dict[str, Any]]:
-        """Every line that is kept, oldest first; without those that a full disk cut."""
+        """Read every line that is kept, oldest first; without those that a full disk cut."""
         found: list[dict[str, Any]] = []
         for file in [*(self._old(number) for number in range(KEPT, 0, -1)), self.path]:
             for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
@@ -71,7 +71,7 @@ class DeviceJournal:
         return found
 
     def close(self) -> None:
-        """Close the file; the next line opens it again."""
+        """Close the journal's file; the next line opens it again."""
         if self._file is not None:
             os.close(self._file)
             self._file = None

@@ -1,7 +1,7 @@
-"""What real devices keep by themselves, kept for a simulated bench: their state, and a link that admits one master.
+"""Register of a simulated bench's devices: the state that real devices keep themselves, and a link for one master.
 
 A real table goes on moving when the process that commanded it dies, and can be asked afterwards. A simulated table
-dies with its process, so what was commanded last is kept in a file beside the database. The file's lock is the link:
+dies with its process, so what was commanded last is kept in a file next to the database. The file's lock is the link:
 the kernel gives it to one process and takes it back at its death.
 """
 
@@ -32,7 +32,7 @@ class DeviceRegister:
         self.cables = DeviceCables(folder, bench_id)
 
     def read(self) -> DeviceState | None:
-        """The devices' state, without their link; None where no process of this host ever had it."""
+        """Read the devices' state without their link; None where no process of this host ever had it."""
         try:
             file = os.open(self.path, os.O_RDONLY | os.O_CLOEXEC)
         except FileNotFoundError:
@@ -43,7 +43,7 @@ class DeviceRegister:
             os.close(file)
 
     def open(self, by: str = "", job: str | None = None) -> "DeviceLink":
-        """Take the devices' link. Raises `DeviceBusy` naming who has it."""
+        """Open the devices' link. Raises `DeviceBusy` naming its present holder."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
@@ -52,7 +52,7 @@ class DeviceRegister:
             state = _read(file)
             os.close(file)
             holder = (state.by if state is not None else "") or "another process"
-            refusals = DeviceJournal(self.journal.path)  # closed again: whoever has the link may rotate the journal
+            refusals = DeviceJournal(self.journal.path)  # closed again: the holder of the link may rotate it
             refusals.write("link.refused", {"holder": holder})
             refusals.close()
             raise DeviceBusy(f"the devices of bench {self.bench_id!r} are driven by {holder}") from None
@@ -60,7 +60,7 @@ class DeviceRegister:
 
 
 class DeviceLink:
-    """The right to command a bench's devices, and the memory of what was commanded. Closed, it commands nothing."""
+    """Right to command a bench's devices, and the memory of the last commands. Closed, it commands nothing."""
 
     def __init__(self, file: int, journal: DeviceJournal, by: str, job: str | None) -> None:
         self._file: int | None = file
@@ -72,18 +72,18 @@ class DeviceLink:
 
     @property
     def is_open(self) -> bool:
-        """Whether it still commands."""
+        """Return whether the link is still open."""
         return self._file is not None
 
     def note(self, verb: str, arguments: dict[str, Any], **changes: Any) -> None:
-        """Write what is asked of the devices, and what that makes of them. Raises `Disconnected` once it is closed."""
+        """Write a demand on the devices, and the state that it leads to. Raises `Disconnected` once it is closed."""
         with self._mutex:
             if self._file is None:
                 raise Disconnected(f"{verb}: this process has given up the devices' link")
             self._note(self._file, verb, arguments, changes)
 
     def close(self) -> None:
-        """Give the link back; a second time does nothing. A device that still moves goes on moving."""
+        """Release the link; a second call does nothing. A device that still moves goes on moving."""
         with self._mutex:
             if self._file is not None:
                 self._note(self._file, "link.closed", {}, {"linked": False})
@@ -105,7 +105,7 @@ def _written(state: DeviceState) -> bytes:
 
 
 def _read(file: int) -> DeviceState | None:
-    """The state in a file; None in an empty one, which somebody is about to write."""
+    """Read the state in a file; None in an empty one, which another process is about to write."""
     try:
         document = read_record(file)
     except Unreadable:

@@ -1,4 +1,4 @@
-"""A bench whose devices are remembered in a register: what is asked of them is noted before they are asked."""
+"""A bench whose devices are remembered in a register: each demand is noted before the device receives it."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -12,22 +12,22 @@ from procedures.bench import SAFE_ORDER, Bench
 from procedures.bench.errors import Disconnected, OutOfRange
 
 READS = frozenset({"turntable.read_angles", "turntable.is_moving", "supply.is_on", "chamber.read"})
-"""Verbs that change nothing: not noted."""
+"""Verbs that change nothing and are not noted."""
 REMEMBERED = ("table", "powered", "chamber_target_c", "current_ma")
-"""What a demand changes as soon as it is made, and a refused one did not."""
+"""Fields of the state that change as soon as a demand is made; a refused demand does not change them."""
 SAFE: dict[str, Callable[[DeviceState], dict[str, Any]]] = {
     "turntable": lambda _: {"table": AT_REST, "angles_deg": None},
     "chamber": lambda state: {"chamber_target_c": state.chamber_ambient_c},
     "current_source": lambda _: {"current_ma": 0.0},
     "supply": lambda _: {"powered": False},
 }
-"""What a device is once it is made safe."""
+"""State of each device after it is made safe."""
 LOST = "as the bench's truth file has it"
-"""Why a link is lost that neither a person nor an exercise has lost."""
+"""Reason of a lost link that neither a person nor an exercise has lost."""
 
 
 class RegisterObserver:
-    """Turns verbs into the state that real devices would have, and keeps them from devices whose link is lost."""
+    """Turns verbs into the state that real devices would have, and stops verbs to devices whose link is lost."""
 
     def __init__(
         self,
@@ -37,7 +37,7 @@ class RegisterObserver:
         devices: frozenset[str],
         lost: Callable[[], frozenset[str]],
     ) -> None:
-        """`devices`: that are made safe; `lost`: those whose link the simulation has lost by now."""
+        """Observe `devices`, which are to be made safe; `lost`: returns those whose link the simulation has lost."""
         self._link = link
         self._cables = cables
         self._faults = faults
@@ -73,7 +73,7 @@ class RegisterObserver:
             self._faults.strike(verb, arguments)
 
     def end(self, verb: str, failure: BaseException | None) -> None:
-        """Note what became of a demand. One that was refused before anything moved changed nothing."""
+        """Note the outcome of a demand. One that was refused before anything moved changed nothing."""
         self._notice_losses()
         if verb in READS:
             return
@@ -90,7 +90,7 @@ class RegisterObserver:
         self._note_quietly(f"{verb}.failed", {"error": f"{type(failure).__name__}: {failure}"}, changes)
 
     def asked(self, device: str) -> None:
-        """A block is wanted: not noted, there are too many."""
+        """Check the link for a block and inject faults; the request is not noted, as there are too many."""
         self._reach(f"{device}.block")
         if self._faults is not None:
             self._faults.strike(f"{device}.block", {})
@@ -103,7 +103,7 @@ class RegisterObserver:
         self._cables.need(verb.partition(".")[0])
 
     def _notice_losses(self) -> None:
-        """What the simulation has lost is lost for whoever comes after it, too: even if nobody asked the device."""
+        """Record links that the simulation has lost, for later processes too, even if no verb went to the device."""
         fresh = self._lost() - self._cut
         for device in fresh:
             self._cables.cut(device, LOST)
@@ -126,13 +126,13 @@ class RegisterObserver:
         return changes
 
     def _note_quietly(self, verb: str, arguments: dict[str, Any], changes: dict[str, Any]) -> None:
-        """The failure that is being told matters more than a link that is gone by now."""
+        """Note a verb while another failure is reported: skip it if the link is gone, for that failure matters more."""
         if self._link.is_open:
             self._link.note(verb, arguments, **changes)
 
 
 class RegisteredBench(ObservedBench):
-    """A bench with the devices' link: as long as it is open, nobody else commands them."""
+    """A bench that holds the devices' link: while it is open, no other process commands them."""
 
     def __init__(
         self,
@@ -142,20 +142,20 @@ class RegisteredBench(ObservedBench):
         faults: DeviceFaults | None = None,
         lost: Callable[[], frozenset[str]] = frozenset,
     ) -> None:
-        """`lost`: which devices' links the simulation has lost by now."""
+        """Wrap a bench; `lost`: returns the devices whose links the simulation has lost by now."""
         devices = {"turntable", "supply"}
         devices |= {name for name in ("chamber", "current_source") if getattr(bench, name) is not None}
         super().__init__(bench, RegisterObserver(link, cables, faults, frozenset(devices), lost))
         self._link = link
 
     def close(self) -> None:
-        """Give the link back. A verb that is still under way finds it closed."""
+        """Release the devices' link. A verb that is still under way finds it closed."""
         self._link.close()
         super().close()
 
 
 class RegisteredDevices:
-    """`bench_service.bench.devices.BenchDevices` over a register: it needs no world, as real devices need no job."""
+    """Implements `bench_service.bench.devices.BenchDevices` by a register, without a world or a job."""
 
     def __init__(self, register: DeviceRegister) -> None:
         self._register = register
@@ -164,7 +164,7 @@ class RegisteredDevices:
         return self._register.read()
 
     def make_safe(self, by: str) -> DeviceState:
-        """Stop, lead to ambient, switch off. The simulated table of a dead process stops at once: where, is unknown.
+        """Stop, lead to ambient, switch off. The table of a dead process stops at once, at an unknown position.
 
         A device whose link is lost stays as it is, and keeps no other from being made safe. The job whose demands are
         undone stays known until the next one.
@@ -184,7 +184,7 @@ class RegisteredDevices:
             link.close()
 
     def _make_safe(self, link: DeviceLink, device: str) -> Disconnected | None:
-        """Make one device safe; why it could not be reached."""
+        """Make one device safe; return why it could not be reached."""
         try:
             self._register.cables.need(device)
         except Disconnected as lost:

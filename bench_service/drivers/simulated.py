@@ -1,4 +1,4 @@
-"""The simulated bench as a driver: the only file that imports the simulators."""
+"""Driver of the simulated bench: the only file that imports the simulators."""
 
 import re
 from collections.abc import Callable
@@ -32,14 +32,14 @@ if TYPE_CHECKING:
     from simulators.world import WorldConfig
 
 RANDOM_UNIT = re.compile(r"^RANDOM-(\d{1,9})$")
-"""Serial of a unit whose truth is drawn from the number in it: as many different units as a night needs."""
+"""Serial of a unit whose truth is drawn from the number in it: as many different units as a test needs."""
 
 
 T = TypeVar("T")
 
 
 def _loaded(path: Path, load: Callable[[Path], T]) -> T:
-    """A truth file. Raises `Misconfigured` naming it."""
+    """Load a truth file. Raises `Misconfigured` naming it."""
     try:
         return load(path)
     except (OSError, ValueError, TypeError) as error:
@@ -47,7 +47,7 @@ def _loaded(path: Path, load: Callable[[Path], T]) -> T:
 
 
 def _shipped_as(bench_id: str) -> BenchTruth:
-    """The shipped bench under another id; the unit on each of them is the same."""
+    """Return the shipped bench under another id; the unit on each of them is the same."""
     shipped = default_bench()
     return replace(shipped, description=replace(shipped.description, id=bench_id))
 
@@ -67,8 +67,8 @@ class SimulatedDriver:
     ) -> None:
         """Without a truth file a bench of any id is the shipped one under that id: a laboratory may have several.
 
-        `register`: where the devices' state outlives this process; without one, nobody else can make them safe.
-        `asking`: a person is asked what else the simulated operator does at once.
+        `register`: keeps the devices' state beyond this process; without one, no other process can make them safe.
+        `asking`: asks a person for each action that the simulated operator would otherwise do at once.
         Raises `Misconfigured` for a truth file that cannot be used, `NotMounted` for one of another bench.
         """
         self._asking = asking
@@ -85,7 +85,7 @@ class SimulatedDriver:
         return self._bench.description
 
     def mounted(self, serial: str | None = None) -> tuple[Unit, ...]:
-        """The unit of the truth file; a serial like RANDOM-7 is mounted by asking for it."""
+        """Return the unit of the truth file, and the drawn unit of a serial like RANDOM-7 where it is asked for."""
         units = [self._unit]
         if serial is not None and RANDOM_UNIT.match(serial):
             units.append(self._truth_of(serial))
@@ -122,17 +122,17 @@ class SimulatedDriver:
         return self._asked(RegisteredBench(bench, link, cables, faults, bench.lost_links), job)
 
     def _asked(self, bench: Bench, job: str | None) -> Bench:
-        """The bench with a person before the operator that it shows; the world within keeps its own."""
+        """Replace the simulated operator by a person in the bench that is shown; the world within keeps its own."""
         if self._asking is not None and job is not None:
             bench.operator = self._asking(job, bench.operator)
         return bench
 
     def device_state(self) -> DeviceState | None:
-        """What the register holds; None without one."""
+        """Read the devices' state from the register; None without one."""
         return None if self._register is None else RegisteredDevices(self._register).device_state()
 
     def make_safe(self, by: str) -> DeviceState:
-        """Over the register, without a world. Raises `DeviceBusy`, and `BenchError` without a register."""
+        """Open the devices over the register, without a world. Raises `DeviceBusy`; `BenchError` without register."""
         if self._register is None:
             raise BenchError("this bench keeps no register of its devices: only the job that drives it can stop them")
         return RegisteredDevices(self._register).make_safe(by)

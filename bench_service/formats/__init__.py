@@ -1,4 +1,4 @@
-"""Recordings as bytes: chunks at rest, files going out, files coming in; and JSON that everything can hold.
+"""Recordings as bytes: chunks in storage, export files, import files; and JSON that every store and client can hold.
 
 Knows no SQL, no HTTP and no jobs.
 """

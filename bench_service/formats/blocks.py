@@ -18,7 +18,7 @@ class Block:
     stamps: NDArray[np.int64] | Array | None
     values: Array
     stamp_s: float | None = None
-    """Seconds in one unit of the stamps, where the file's own type says so; None: as the description has it."""
+    """Seconds in one unit of the stamps, where the file's own type gives it; None: as the description has it."""
 
     def __len__(self) -> int:
         return len(self.values)

@@ -1,4 +1,4 @@
-"""How much a file may demand before it is refused: lines, columns, numbers, unpacked bytes, memory and time.
+"""Limits on the resources that a file may demand: lines, columns, numbers, unpacked bytes, memory and time.
 
 Compressed formats give a small file room to ask for a thousand times its size, so every bound is checked before the
 bytes are made. Must not know formats or processes.
@@ -12,9 +12,9 @@ LINE_BYTES = 256 * 1024
 COLUMNS = 4096
 """Most columns of a table, of which 65 can be read at once."""
 SHOWN_NAMES = 12
-"""So many column names are listed in a message."""
+"""Number of column names that a message lists at most."""
 SHOWN_CHARACTERS = 80
-"""So much of a cell or a name is quoted in a message."""
+"""Number of characters of a cell or a name that a message quotes at most."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class Bounds:
     memory_bytes: int = 250 * MEGABYTE
     """Memory of the process that reads, above what it takes idle."""
     time_s: float = 25.0
-    """For which the reading process may be waited for."""
+    """Time for which the reading process may be waited for [s]."""
 
     @classmethod
     def of(cls, file_bytes: int) -> "Bounds":
-        """The bounds of files that have so many bytes together."""
+        """Return the bounds of files with this total size [bytes]."""
         hundreds = max(1.0, file_bytes / (100 * MEGABYTE))
         return cls(
             cells=int(cls.cells * hundreds),
@@ -43,11 +43,11 @@ class Bounds:
 
 
 def quoted(text: str) -> str:
-    """A cell or a name as a message quotes it, shortened."""
+    """Shorten a cell or a name for a message."""
     return repr(text if len(text) <= SHOWN_CHARACTERS else text[: SHOWN_CHARACTERS - 1] + "…")
 
 
 def listed(names: list[str]) -> str:
-    """Column names as a message lists them: the first few, and how many there are."""
+    """List column names for a message: the first few, and how many there are."""
     shown = ", ".join(n if len(n) <= SHOWN_CHARACTERS else n[: SHOWN_CHARACTERS - 1] + "…" for n in names[:SHOWN_NAMES])
     return shown if len(names) <= SHOWN_NAMES else f"{shown}, … ({len(names)} columns)"

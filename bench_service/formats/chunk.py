@@ -19,19 +19,19 @@ RAW_BYTES = 2 * 1024 * 1024
 """Raw size of a full chunk: the payload stays under a megabyte for noise up to 10 bits, and decodes in milliseconds."""
 
 SampleType = np.dtype[np.int32] | np.dtype[np.float64]
-"""What a sample may be: counts, or values that a unit computed itself."""
+"""Type of a sample: counts, or values that a unit computed itself."""
 
 ENCODINGS = {"int32": "DELTA_BINARY_PACKED", "float64": "BYTE_STREAM_SPLIT"}
-"""How Parquet lays out a column, by the type of the samples."""
+"""Parquet encoding of a column, by the type of the samples."""
 
 
 class UnreadableChunk(Exception):
-    """The payload is not the chunk that was asked for."""
+    """The payload is not the requested chunk."""
 
 
 @dataclass(frozen=True)
 class ChunkPlace:
-    """What a chunk says of itself: whose samples, from which one on, at which rate."""
+    """Metadata of a chunk: its recording, its first sample and its rate."""
 
     recording_id: str
     start: int
@@ -39,17 +39,17 @@ class ChunkPlace:
 
 
 def sample_type(name: str) -> SampleType:
-    """The type of samples by its name, "int32" or "float64"."""
+    """Return the type of samples by its name, "int32" or "float64"."""
     return np.dtype(np.int32) if name == "int32" else np.dtype(np.float64)
 
 
 def rows_per_chunk(channels: int, dtype: SampleType) -> int:
-    """How many samples of each channel fill a chunk."""
+    """Number of samples of each channel that fill a chunk."""
     return max(1, RAW_BYTES // (channels * dtype.itemsize))
 
 
 def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> bytes:
-    """Samples, shape (n, channels), as Parquet with one column a channel."""
+    """Encode samples, shape (n, channels), as Parquet with one column for each channel."""
     encoding = ENCODINGS[samples.dtype.name]
     schema = pa.schema(
         [pa.field(name, pa.from_numpy_dtype(samples.dtype), nullable=False) for name in names],
@@ -73,7 +73,7 @@ def encode_chunk(samples: RawArray, names: Sequence[str], place: ChunkPlace) -> 
 
 
 def decode_chunk(payload: bytes, names: Sequence[str]) -> RawArray:
-    """The named channels of a chunk in that order, shape (n, len(names)). Raises `UnreadableChunk`."""
+    """Decode the named channels of a chunk in that order, shape (n, len(names)). Raises `UnreadableChunk`."""
     try:
         table = pq.ParquetFile(pa.BufferReader(payload)).read(columns=list(names), use_threads=False)
         columns = [table.column(name).to_numpy() for name in names]

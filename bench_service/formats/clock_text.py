@@ -22,7 +22,7 @@ _SECOND = 1_000_000_000
 
 
 class NoClock(Exception):
-    """A text is no time of a clock; `row` counts from 0 in what was given."""
+    """A text that is no clock time; `row` counts from 0 within the given texts."""
 
     def __init__(self, row: int, text: str) -> None:
         super().__init__(text)
@@ -31,7 +31,7 @@ class NoClock(Exception):
 
 
 def nanoseconds(texts: Any, fraction: Fraction) -> NDArray[np.int64]:
-    """Times [ns] of an Arrow array of texts, since midnight or, with a date, since 1970. Raises `NoClock`."""
+    """Convert an Arrow array of texts to times [ns], since midnight or, with a date, since 1970. Raises `NoClock`."""
     if fraction == "decimal" and texts.null_count == 0:
         fast = _cast(texts)
         if fast is not None:
@@ -40,7 +40,7 @@ def nanoseconds(texts: Any, fraction: Fraction) -> NDArray[np.int64]:
 
 
 def _cast(texts: Any) -> NDArray[np.int64] | None:
-    """Arrow's own reading, where it reads them all."""
+    """Convert texts by Arrow's own parser, where it reads all of them."""
     for kind in (pa.timestamp("ns"), pa.time64("ns")):
         try:
             return texts.cast(kind).cast(pa.int64()).to_numpy(zero_copy_only=False)
@@ -63,7 +63,7 @@ def _slowly(texts: Sequence[str | None], fraction: Fraction) -> list[int]:
 
 
 def _one(match: re.Match[str], fraction: Fraction) -> int:
-    """One time [ns]. Raises `ValueError` for a day that no calendar has."""
+    """Convert one time text [ns]. Raises `ValueError` for a day that no calendar has."""
     year, month, day, hour, minute, second, digits, sign, offset_h, offset_min = match.groups()
     days = date(int(year), int(month), int(day)).toordinal() - _EPOCH if year else 0
     seconds = days * 86_400 + int(hour or 0) * 3600 + int(minute) * 60 + int(second)

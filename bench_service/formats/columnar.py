@@ -40,7 +40,7 @@ _THRIFT_BYTES = 64 * MEGABYTE
 
 
 def is_columnar(stream: BinaryIO) -> bool:
-    """Whether a file is Parquet or Arrow, by its first bytes."""
+    """Return whether a file is Parquet or Arrow, by its first bytes."""
     stream.seek(0)
     start = stream.read(8)
     return start[:4] in (b"PAR1", b"\xff\xff\xff\xff") or start[:6] == b"ARROW1"
@@ -103,7 +103,7 @@ def _block(
 def _stamps(
     column: Any, name: str, asked: Column, description: ImportDescription, row: int
 ) -> tuple[NDArray[np.int64] | Array, float | None]:
-    """Stamps, and the seconds in one unit of them where their type says so."""
+    """Stamps of a column, and the seconds in one unit of them where their type defines it."""
     kind = column.type
     if column.null_count:
         at = row + int(np.flatnonzero(~column.is_valid().to_numpy(zero_copy_only=False))[0]) + 1
@@ -166,14 +166,14 @@ def _opened(
 
 
 def _require_bounded(metadata: Any, schema: Any, wanted: Sequence[int], name: str, bounds: Bounds) -> None:
-    """Raises `UnreadableFile` where the columns are too long, before one of them is unpacked."""
+    """Check the size of the columns before one is unpacked. Raises `UnreadableFile` where they are too long."""
     cells = metadata.num_rows * len(wanted)
     if cells > bounds.cells:
         raise UnreadableFile(
             name,
             f"{metadata.num_rows} rows of {len(wanted)} columns are {cells} numbers, at most {bounds.cells} are read",
         )
-    if metadata.num_columns != len(schema.names):  # nested columns: those that are wanted cannot be told apart here
+    if metadata.num_columns != len(schema.names):  # nested columns: the wanted ones cannot be identified here
         return
     unpacked = sum(
         metadata.row_group(group).column(index).total_uncompressed_size

@@ -1,4 +1,4 @@
-"""The hash that names what a recording says, however it is cut, compressed or stored.
+"""Hash that names the content of a recording, however it is cut, compressed or stored.
 
 SHA-256 over one JSON line that describes rate, sample type and channels (name, quantity, unit, scale, offset), and then
 the samples, little-endian, row by row. Must not know chunks, files or databases.
@@ -15,7 +15,7 @@ from procedures.core.recording import Channel, RawArray
 
 
 class ContentHash:
-    """The hash while samples arrive."""
+    """Content hash while samples arrive."""
 
     def __init__(self, channels: Sequence[Channel], rate_hz: float, dtype: SampleType) -> None:
         self._dtype = np.dtype(dtype).newbyteorder("<")
@@ -32,19 +32,19 @@ class ContentHash:
         self._sha.update(np.ascontiguousarray(samples, dtype=self._dtype).tobytes())
 
     def copy(self) -> "ContentHash":
-        """An independent continuation."""
+        """Return an independent continuation of the hash."""
         twin = object.__new__(ContentHash)
         twin._dtype = self._dtype
         twin._sha = self._sha.copy()
         return twin
 
     def hexdigest(self) -> str:
-        """The hash of what has arrived, as 64 hexadecimal digits."""
+        """Return the hash of all samples so far, as 64 hexadecimal digits."""
         return self._sha.hexdigest()
 
 
 def content_hash(channels: Sequence[Channel], rate_hz: float, samples: RawArray) -> str:
-    """The hash of a recording held in memory."""
+    """Compute the hash of a recording held in memory."""
     whole = ContentHash(channels, rate_hz, samples.dtype)
     whole.update(samples)
     return whole.hexdigest()

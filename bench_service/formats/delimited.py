@@ -1,4 +1,4 @@
-"""Columns of numbers out of delimited text, plain or gzipped, a block at a time.
+"""Reader of delimited text, plain or gzipped: columns of numbers, a block at a time.
 
 Arrow reads the numbers fast; where it stumbles, the piece is read again slowly to say which line is wrong and why.
 """
@@ -25,7 +25,7 @@ from procedures.core.arrays import Array
 _BLOCK_BYTES = 4 * 1024 * 1024
 _BLANKS = re.compile(rb"[ \t]+")
 _MARGINS = re.compile(rb"(?m)^\t|\t(?=\r?$)")
-"""Tabs at the ends of lines, in a text whose blanks are single tabs: on blanks it would take their square."""
+"""Tabs at the ends of lines, in a text with single tabs: on spaces this pattern would take quadratic time."""
 
 
 class _NotANumber(Exception):
@@ -35,7 +35,7 @@ class _NotANumber(Exception):
 def text_columns(
     stream: BinaryIO, name: str, columns: Sequence[Column], description: ImportDescription, bounds: Bounds
 ) -> Iterator[Block]:
-    """The named columns, block by block, the time first where the description has one. Raises `UnreadableFile`."""
+    """Read the named columns, block by block, the time first where the description has one. Raises `UnreadableFile`."""
     table = TextTable(stream, name, description, bounds)
     reader = _Reader(table, name, columns, description)
     for number, text in _pieces(table, description):
@@ -49,7 +49,7 @@ def text_columns(
 
 
 class _Reader:
-    """Makes blocks of whole lines of a table."""
+    """Converts whole lines of a table to blocks."""
 
     def __init__(self, table: TextTable, name: str, columns: Sequence[Column], description: ImportDescription) -> None:
         self._description = description
@@ -64,7 +64,7 @@ class _Reader:
         self._missing = description.gaps == "mark"
 
     def block(self, text: bytes) -> Block:
-        """The block of some whole lines. Raises `ArrowInvalid`, `_NotANumber`, `NoClock`."""
+        """Convert some whole lines to a block. Raises `ArrowInvalid`, `_NotANumber`, `NoClock`."""
         if self._blanks:
             text = _MARGINS.sub(b"", _BLANKS.sub(b"\t", text))
         parsed = self._parsed(text)
@@ -76,7 +76,7 @@ class _Reader:
         return Block(None if self._time is None else self._times(parsed.column(self._time)), values)
 
     def _parsed(self, text: bytes) -> Any:
-        """Arrow's table; a time column that holds integers stays so, until a piece has another number in it."""
+        """Parse text into Arrow's table; a time column of integers stays so until a piece has another number in it."""
         try:
             return self._read(text)
         except pa.ArrowInvalid:
@@ -113,7 +113,7 @@ class _Reader:
 
 
 def _pieces(table: TextTable, description: ImportDescription) -> Iterator[tuple[int, bytes]]:
-    """Whole lines of the rows that are wanted, with the number of the first. Raises `UnreadableFile`."""
+    """Yield whole lines of the wanted rows, with the number of the first. Raises `UnreadableFile`."""
     number, row = table.first_line, 1
     first, last = description.rows.first, description.rows.last
     while piece := table.text.piece(_BLOCK_BYTES):
@@ -134,5 +134,5 @@ def _pieces(table: TextTable, description: ImportDescription) -> Iterator[tuple[
 
 
 def _short(error: Exception) -> str:
-    """The beginning of what Arrow says: it repeats the line."""
+    """Shorten Arrow's message to its beginning: it repeats the line."""
     return str(error)[:200]

@@ -13,7 +13,7 @@ from procedures.core.recording import Channel, Quantity
 from procedures.core.unit import SERIAL
 
 Column = str | int
-"""By name, or by index from 0."""
+"""Column of a file by name, or by index from 0."""
 
 DELIMITERS = {",": b",", ";": b";", "tab": b"\t", "whitespace": b" "}
 
@@ -39,7 +39,7 @@ class _Strict(BaseModel):
 
 
 class ImportedChannel(_Strict):
-    """One channel: where it stands in the files, and what it means. ``value = scale·(raw − offset)`` in `unit`."""
+    """One channel: its column in the files, and its meaning. ``value = scale·(raw − offset)`` in `unit`."""
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,63}$", description="e.g. gyro_x")
     column: Column | None = Field(None, description="name, or index from 0; None: the column of the channel's name")
@@ -63,7 +63,7 @@ class ImportedChannel(_Strict):
 
     @property
     def is_accumulated(self) -> bool:
-        """Whether the steps of the column are stored, not its values."""
+        """Return whether the column's increments are stored, not its values."""
         return isinstance(self.quantity, Accumulated)
 
     def channel(self) -> Channel:
@@ -136,7 +136,7 @@ class ImportDescription(_Strict):
         return self
 
     def columns_of(self, file: int) -> tuple[Column, ...]:
-        """The columns that are read from a file, the time first where there is one."""
+        """List the columns that are read from a file, the time first where there is one."""
         time: tuple[Column, ...] = () if self.time_column is None else (self.time_column,)
         return (*time, *(c.source_column for c in self.channels if c.file == file))
 
@@ -146,5 +146,5 @@ class ImportDescription(_Strict):
         return SECONDS.get(self.time_unit, 1e-9)
 
     def declared(self) -> dict[str, Any]:
-        """As JSON, to be kept with the recording."""
+        """Return the description as JSON, to be kept with the recording."""
         return self.model_dump(mode="json", exclude_defaults=True)

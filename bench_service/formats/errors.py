@@ -1,13 +1,13 @@
-"""What a file that comes in can be refused for.
+"""Exceptions for files that are refused at import.
 
-UnreadableFile    a file is not what its description says: names the file, the line or row, and what was expected
+UnreadableFile    a file does not match its description: names the file, the line or row, and what was expected
 """
 
 from procedures.core.errors import DomainError
 
 
 class UnreadableFile(DomainError):
-    """A file is not what its description says."""
+    """A file that does not match its description."""
 
     def __init__(self, name: str, problem: str) -> None:
         super().__init__(f"{name}: {problem}")

@@ -1,4 +1,4 @@
-"""A recording going out as Arrow, Parquet or CSV, a block at a time: memory does not grow with its length.
+"""Export of a recording as Arrow, Parquet or CSV, a block at a time: memory does not grow with its length.
 
 Samples go out as they are stored, raw; scale, offset, unit and quantity of each channel, the rate and the content hash
 of the whole recording travel with them. ``value = scale·(raw − offset)``. Must not know where the blocks come from.
@@ -21,7 +21,7 @@ from procedures.core.recording import RawArray, RecordingInfo
 
 
 class ExportFormat(StrEnum):
-    """How a recording goes out."""
+    """File format of an exported recording."""
 
     ARROW = "arrow"
     PARQUET = "parquet"
@@ -29,7 +29,7 @@ class ExportFormat(StrEnum):
 
     @property
     def media_type(self) -> str:
-        """What HTTP calls it."""
+        """Return the format's media type for HTTP."""
         return {
             "arrow": "application/vnd.apache.arrow.stream",
             "parquet": "application/vnd.apache.parquet",
@@ -42,11 +42,11 @@ class Extract:
     """A part of a recording: some channels, samples start…stop (half open)."""
 
     info: RecordingInfo
-    """Of the whole recording, its channels those that go out."""
+    """Description of the whole recording, its channels limited to the exported ones."""
     start: int
     stop: int
     dtype: str
-    """"int32" or "float64"."""
+    """Sample type, "int32" or "float64"."""
 
 
 def extract(
@@ -56,7 +56,7 @@ def extract(
     start_s: float | None = None,
     stop_s: float | None = None,
 ) -> Extract:
-    """The part that is asked for, by names and by time since the first sample [s]; a sample belongs to its beginning.
+    """Select a part by names and by time since the first sample [s]; a sample belongs to its beginning.
 
     Raises `MissingChannel`, `BadParameter`.
     """
@@ -79,7 +79,7 @@ def _sample(info: RecordingInfo, field: str, moment_s: float) -> int:
 
 
 def export(part: Extract, blocks: Iterable[RawArray], form: ExportFormat) -> Iterator[bytes]:
-    """The bytes of a file. `blocks` are the samples of the part, in order, each (n, channels)."""
+    """Yield the bytes of a file. `blocks` are the samples of the part, in order, each (n, channels)."""
     writers: dict[ExportFormat, Callable[[Extract, Iterable[RawArray]], Iterator[bytes]]] = {
         ExportFormat.ARROW: _arrow,
         ExportFormat.PARQUET: _parquet,
@@ -89,7 +89,7 @@ def export(part: Extract, blocks: Iterable[RawArray], form: ExportFormat) -> Ite
 
 
 class _Outbox:
-    """A file that gives away what was written to it."""
+    """File object that hands out the bytes written to it."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []
@@ -100,7 +100,7 @@ class _Outbox:
         return len(data)
 
     def flush(self) -> None:
-        """Nothing waits."""
+        """Flush nothing: no data are buffered."""
 
     def close(self) -> None:
         self.closed = True
@@ -112,7 +112,7 @@ class _Outbox:
 
 
 def describe(part: Extract) -> dict[str, str]:
-    """What a reader of the file must know of the recording, as text."""
+    """Describe the recording for the reader of the file, as text."""
     info = part.info
     return {
         "recording": info.id,

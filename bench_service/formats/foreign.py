@@ -1,4 +1,4 @@
-"""Files of other kinds by their first bytes, each with the way to a table that can be read."""
+"""Detection of other file types by their first bytes, each with the way to a readable table."""
 
 _SAVE = "save it as CSV, Parquet or Arrow"
 _KINDS: tuple[tuple[bytes, str], ...] = (

@@ -1,4 +1,4 @@
-"""Recorded files coming in: columns of one or several files become the samples and the uniform rate of one recording.
+"""Import of recorded files: columns of one or several files become the samples and uniform rate of one recording.
 
 The files are read twice, a block at a time: once to check every number and every time step, once to hand the samples
 on. Nothing is interpolated: what does not fit is refused with file, row and the way out, and what is left out or
@@ -31,14 +31,14 @@ _NO_ROWS = np.empty(0, np.int64)
 
 @dataclass(frozen=True)
 class ImportFile:
-    """A file: its name for messages, and a stream that can be read from the beginning again and again."""
+    """A file to import: its name for messages, and a stream that can be read repeatedly from the beginning."""
 
     name: str
     stream: BinaryIO = field(repr=False)
 
 
 class Imported(Protocol):
-    """Files that were checked and fit together, wherever they are read."""
+    """Files that were checked and fit together, whichever process reads them."""
 
     @property
     def description(self) -> ImportDescription: ...

@@ -75,12 +75,12 @@ def spelled(unit: str) -> str:
 
 
 def allowed_units(quantity: Quantity) -> tuple[str, ...]:
-    """The units that a column of a quantity may be in; "count" says that its scale is not known yet."""
+    """Return the units that a column of a quantity may have; "count" means that its scale is not known yet."""
     return (*_SIZES[quantity], "count")
 
 
 def stored_channel(name: str, quantity: Quantity, unit: str, scale: float, offset: float) -> Channel:
-    """The channel of a column whose value in `unit` is ``scale·(raw − offset)``, in the unit that is stored.
+    """Convert a column's channel, ``scale·(raw − offset)`` in `unit`, to the unit that is stored.
 
     Raises `ValueError` for a unit that the quantity does not have, and for a scale of zero.
     """

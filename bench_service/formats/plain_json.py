@@ -10,13 +10,13 @@ from sys import float_info
 from typing import Any, NamedTuple
 
 DEPTH = 50
-"""How many lists and objects may lie in each other."""
+"""Largest depth of nested lists and objects."""
 A_TEXT = "text without the character NUL and without half of a surrogate pair is expected"
 A_NUMBER = f"a finite number is expected, -{float_info.max:.2g} … {float_info.max:.2g}"
 NOT_SO_DEEP = f"at most {DEPTH} lists and objects may lie in each other"
 
 _NESTING, _NUMBERS = (list, dict), (int, float)
-"""Tuples: a union would be made anew at each of a million looks."""
+"""Tuples of types for `isinstance`: a union would be built anew at each of a million calls."""
 _UNFIT = re.compile("[\x00\ud800-\udfff]")
 _ESCAPED = re.compile(r"\\u(0000|[dD][89a-fA-F])")
 
@@ -26,27 +26,27 @@ class Fault(NamedTuple):
 
     path: tuple[str | int, ...]
     value: object
-    """What is there; of a list or an object that lies too deep, only its kind."""
+    """The faulty value; only the kind of a list or an object that is nested too deeply."""
     allowed: str
 
 
 def fits(text: str) -> bool:
-    """Whether everything can hold a text."""
+    """Return whether every store and client can hold a text."""
     return _UNFIT.search(text) is None
 
 
 def is_finite(number: float) -> bool:
-    """Whether a double can hold a number: not NaN, no infinity, no integer of 400 digits."""
+    """Return whether a double can hold a number: not NaN, no infinity, no integer of 400 digits."""
     return -float_info.max <= number <= float_info.max
 
 
 def shown(text: str) -> str:
-    """A text as it can be told and written: what nothing can hold stands there as its escape."""
+    """Escape the characters of a text that some store or client cannot hold."""
     return _UNFIT.sub(lambda found: f"\\u{ord(found.group()):04x}", text)
 
 
 def faults(document: Any) -> Iterator[Fault]:
-    """What breaks the rule in a document that `json.loads` made, in its order."""
+    """Find the values that break the rule in a document that `json.loads` made, in its order."""
     if isinstance(document, _NESTING):
         yield from _faults_within(document, ())
     elif (allowed := _instead_of(document)) is not None:
@@ -67,23 +67,23 @@ def _faults_within(node: list[Any] | dict[str, Any], path: tuple[str | int, ...]
 
 
 def _instead_of(scalar: Any) -> str | None:
-    """What is allowed in the place of a value that breaks the rule."""
+    """Describe the allowed values in place of one that breaks the rule; None where it does not."""
     if isinstance(scalar, str):
         return None if fits(scalar) else A_TEXT
     return A_NUMBER if isinstance(scalar, _NUMBERS) and not is_finite(scalar) else None
 
 
 def read_back(stored: str | bytes) -> Any:
-    """A stored document. Where a service that did not know the rule let in what it forbids, its escape is given."""
+    """Parse a stored document. Values that an older version let in against the rule are given as their escapes."""
     text = stored if isinstance(stored, str) else stored.decode()
     found = json.loads(text)
     return mended(found) if _ESCAPED.search(text) else found
 
 
 def mended(node: Any, room: int = 2 * DEPTH) -> Any:
-    """A document with each text as it is shown, and without what lies so deep in it that no answer could hold it.
+    """Escape each text of a document, and cut branches that are nested too deeply for any answer.
 
-    `room`: levels; more than the rule's, as what was sent lies in documents of our own.
+    `room`: levels; more than the rule's, as the service nests the documents that clients sent in its own.
     """
     if isinstance(node, str):
         return shown(node)

@@ -9,7 +9,7 @@ from bench_service.formats.description import ImportedChannel
 from procedures.core.arrays import Array
 
 _AT_ONCE = 262_144
-"""Rows of NaN that are put in at once."""
+"""Number of rows of NaN that are inserted at once."""
 
 
 class Increments:

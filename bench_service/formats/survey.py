@@ -1,4 +1,4 @@
-"""The first pass over files that come in: what must be known of all samples before the first is stored."""
+"""First pass over imported files: the facts about all samples that are needed before the first is stored."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,14 +27,14 @@ class Findings:
     count: int
     """Rows of the recording, those that are put in for gaps counted, those that are left out not."""
     dtype: type[np.int32] | type[np.float64]
-    """Integers where all values are."""
+    """Integers where all values are integers."""
     clock: ClockFindings | None
-    """None: there is no time column."""
+    """Findings about the time column; None: there is none."""
     warnings: tuple[str, ...]
 
 
 class Survey:
-    """Checks rows as they are read."""
+    """Checks rows of all files as they are read."""
 
     def __init__(self, names: Sequence[str], description: ImportDescription, bounds: Bounds) -> None:
         self._names = names
@@ -49,7 +49,7 @@ class Survey:
         self._outside: str | None = None
 
     def close(self) -> None:
-        """Give the room of the time column back."""
+        """Free the memory of the time column."""
         if self._clock is not None:
             self._clock.close()
 
@@ -99,7 +99,7 @@ class Survey:
             )
 
     def _are_counts(self, values: Array) -> bool:
-        """Whether all values are whole numbers; notes the first that does not fit."""
+        """Return whether all values are whole numbers; notes the first that does not fit."""
         rows = values[1:] if self._increments.columns and not self._count else values
         if not np.array_equal(rows, np.rint(rows)):
             return False

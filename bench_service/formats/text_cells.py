@@ -1,4 +1,4 @@
-"""The first line of a piece of text that is wrong, why, and the way out."""
+"""Diagnosis of the first wrong line in a piece of text, with the reason and the way out."""
 
 import math
 import re
@@ -25,7 +25,7 @@ def first_fault(
     indices: Sequence[int],
     description: ImportDescription,
 ) -> str | None:
-    """The fault of the first bad line of a piece whose first line has that number; None: nothing is seen."""
+    """Describe the fault in the first bad line of a piece; `first_line` numbers its first line; None: none is found."""
     for number, line in enumerate(text.splitlines(keepends=True), first_line):
         if len(line) > LINE_BYTES:
             raise too_long(table.name, number)
@@ -53,7 +53,7 @@ def _width(number: int, line: bytes, cells: int, width: int, description: Import
 
 
 def _cell(cell: str, name: str, is_time: bool, description: ImportDescription) -> str | None:
-    """Why a cell is no number, or no time; None: it is one."""
+    """Describe why a cell is no number, or no time; None: it is one."""
     if is_time and description.time_unit == "clock":
         if LOOKS_LIKE_CLOCK.match(cell):
             return None

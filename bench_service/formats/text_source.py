@@ -1,4 +1,4 @@
-"""The text of a file as lines of UTF-8 that end with LF: unpacked, decoded, and never more of it than is allowed.
+"""Text of a file as lines of UTF-8 that end with LF: unpacked, decoded, and within the bounds.
 
 Reads gzip, UTF-8 with or without a mark, UTF-16 in both orders, and lines that end with LF, CR LF or CR.
 """
@@ -13,9 +13,9 @@ from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.foreign import foreign_kind
 
 PIECE_BYTES = 1024 * 1024
-"""So much is unpacked at once."""
+"""Number of bytes that are unpacked at once."""
 GLANCE_BYTES = 64 * 1024
-"""So much is looked at to find how the text is written."""
+"""Number of bytes from which the encoding is detected."""
 
 
 class TextSource:
@@ -37,7 +37,7 @@ class TextSource:
         self._begin()
 
     def _begin(self) -> None:
-        """Find out how the text is written. Raises `UnreadableFile` for a file of another kind."""
+        """Detect the encoding of the text. Raises `UnreadableFile` for a file of another kind."""
         glance = b""
         while len(glance) < GLANCE_BYTES and (more := self._read(GLANCE_BYTES - len(glance))):
             glance += more
@@ -78,7 +78,7 @@ class TextSource:
         return text.replace(b"\r", b"\n") if self._cr else text
 
     def fill(self, size: int) -> None:
-        """Have at least so many bytes at hand, or all that there are."""
+        """Buffer at least `size` bytes, or all that there are."""
         parts, have = [self._buffer], len(self._buffer)
         while have < size and not self._ended:
             part = self._lines(self._decoded(self._read(PIECE_BYTES)))
@@ -87,16 +87,16 @@ class TextSource:
         self._buffer = b"".join(parts)
 
     def glance(self) -> bytes:
-        """The text at hand, without taking it."""
+        """Return the buffered text without taking it."""
         return self._buffer
 
     @property
     def is_over(self) -> bool:
-        """Whether all that remains is at hand."""
+        """Return whether all remaining text is in memory."""
         return self._ended
 
     def line(self, number: int) -> bytes:
-        """The next line with its end; empty at the end of the text. Raises `UnreadableFile` for one without an end."""
+        """Return the next line with its end; empty at the end of the text. Raises `UnreadableFile` if it has none."""
         self.fill(LINE_BYTES)
         end = self._buffer.find(b"\n", 0, LINE_BYTES) + 1
         if not end and len(self._buffer) >= LINE_BYTES:
@@ -106,7 +106,7 @@ class TextSource:
         return taken
 
     def piece(self, size: int) -> bytes:
-        """Whole lines, about `size` bytes of them; empty at the end. A line may be cut where it is too long."""
+        """Return whole lines, about `size` bytes; empty at the end. A line may be cut where it is too long."""
         self.fill(size)
         if self._ended:
             taken, self._buffer = self._buffer, b""
@@ -117,12 +117,12 @@ class TextSource:
 
 
 def too_long(name: str, number: int) -> UnreadableFile:
-    """The refusal of a line without an end."""
+    """Build the refusal of a line without an end."""
     return UnreadableFile(name, f"line {number} has more than {LINE_BYTES} bytes: it is no table of text")
 
 
 def _encoding(start: bytes) -> str | None:
-    """UTF-16 by its mark, or by every second byte being nought; None: text whose delimiters are bytes."""
+    """Detect UTF-16 by its mark, or by every second byte being zero; None: text whose delimiters are bytes."""
     if start[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
         return "utf-16"
     sample = start[:512]

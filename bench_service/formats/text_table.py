@@ -1,4 +1,4 @@
-"""The head of a delimited text: where its table begins, what its columns are called, how wide its lines are.
+"""Head of a delimited text: the beginning of its table, its column names, the width of its lines.
 
 The width of most lines is the law; a first line that differs is blamed itself.
 """
@@ -38,7 +38,7 @@ class TextTable:
             raise UnreadableFile(name, f"has {self.width} columns, at most {COLUMNS} are read")
 
     def cells(self, line: bytes) -> list[bytes]:
-        """The cells of a line, quotes kept."""
+        """Split a line into its cells, quotes kept."""
         bare = line.rstrip(b"\r\n")
         if self._delimiter == b" ":
             return bare.split()
@@ -94,7 +94,7 @@ class TextTable:
         return [line + b"\n" for line in lines] if any(lines) else []
 
     def _comments(self, lines: Sequence[bytes], rows: Sequence[list[bytes]], header: bool) -> int:
-        """How many lines at the beginning are comments; the last of them may be the names."""
+        """Count the comment lines at the beginning; the last of them may be the names."""
         count = 0
         while count < len(lines) and lines[count][:1] in (b"#", b"%"):
             count += 1
@@ -107,7 +107,7 @@ class TextTable:
         return count
 
     def _require_width(self, first: Sequence[list[bytes]], lines: int) -> None:
-        """Raises `UnreadableFile` where the first line of data is narrower or wider than most."""
+        """Check the first line of data. Raises `UnreadableFile` where it is narrower or wider than most lines."""
         if first and len(first[0]) != self.width and lines > 2:
             raise UnreadableFile(
                 self.name,
@@ -116,7 +116,7 @@ class TextTable:
             )
 
     def _match_names(self, data: Sequence[list[bytes]]) -> None:
-        """As many names as columns, but for a delimiter at the end of each line. Raises `UnreadableFile`."""
+        """Check that there are as many names as columns, but for a delimiter at the end. Raises `UnreadableFile`."""
         names = self.names or []
         if not data:
             self.width = len(names)
@@ -142,7 +142,7 @@ class TextTable:
         )
 
     def indices(self, columns: Sequence[Column]) -> list[int]:
-        """Where the columns stand. Raises `UnreadableFile`."""
+        """Find the indices of the columns. Raises `UnreadableFile`."""
         present = listed(self.names) if self.names else f"0 … {self.width - 1}"
         found: list[int] = []
         for column in columns:
@@ -175,7 +175,7 @@ class TextTable:
         return ""
 
     def _wide(self) -> str:
-        """A guess of the delimiter where each line is one cell."""
+        """Guess the delimiter where each line is one cell."""
         if self.width != 1:
             return ""
         line = self.text.glance().split(b"\n", 1)[0][:LINE_BYTES]
@@ -208,7 +208,7 @@ def _name(cell: bytes) -> str:
 
 
 def _same(name: str, wanted: str) -> bool:
-    """Whether a column is the one that is asked for: # and % before the first of the names do not belong to it."""
+    """Return whether a column has the requested name: # and % before the first of the names do not belong to it."""
     return name == wanted or name.lstrip(MARKERS + " \t") == wanted.strip().lstrip(MARKERS + " \t") != ""
 
 

@@ -1,1 +1,1 @@
-"""Pages for an eye: plain HTML with plots, made from the same results that the API gives."""
+"""HTML pages of the service: plain HTML with plots, made from the same results that the API gives."""

@@ -1,4 +1,4 @@
-"""The pages around campaigns: what there is, a run step by step, a quantity's trend."""
+"""Routes of the campaign pages: the overview, a run step by step, a quantity's trend."""
 
 from urllib.parse import quote, urlencode
 
@@ -16,7 +16,7 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 def _explanation(run: CampaignRun) -> str:
-    """What a run's state means to a person."""
+    """Explain a run's state in a sentence for the page."""
     if run.waiting:
         return f"It waits: {run.waiting}."
     if run.state is JobState.QUEUED:
@@ -28,7 +28,7 @@ def _explanation(run: CampaignRun) -> str:
 
 @router.get("/campaigns")
 def campaigns_page(request: Request) -> HTMLResponse:
-    """Campaigns, schedules, the latest runs."""
+    """Page of campaigns, schedules and the latest runs."""
     service = service_of(request)
     return templates.TemplateResponse(
         request,
@@ -43,7 +43,7 @@ def campaigns_page(request: Request) -> HTMLResponse:
 
 @router.get("/campaign-runs/{run_id}")
 def campaign_run_page(run_id: str, request: Request) -> HTMLResponse:
-    """A run: its steps, what each said, what it waits for."""
+    """Page of a campaign run: its steps, their results, and the reason that it waits for."""
     run = service_of(request).stores.campaigns.run(run_id)
     missed = {step.name: [c for c in step.checks if not c.passed] for step in run.steps}
     done = sum(s.finished_at is not None or s.state is StepState.SKIPPED for s in run.steps)
@@ -53,7 +53,7 @@ def campaign_run_page(run_id: str, request: Request) -> HTMLResponse:
 
 @router.get("/units/{serial}/trend")
 def trend_page(serial: str, request: Request, query: TrendQuery) -> HTMLResponse:
-    """A quantity over the unit's results; without one, what there is to choose from."""
+    """Page of a quantity's trend over the unit's results; without a quantity, the list of those to choose from."""
     service = service_of(request)
     choice = wanted_trend(service, serial, query)
     chart = trend_of(service, serial, choice)

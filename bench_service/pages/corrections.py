@@ -1,4 +1,4 @@
-"""A correction set as a table. Knows how people read it; not where it is kept."""
+"""Tables of a correction set. Knows how people read it; not where it is stored."""
 
 from procedures.core.converter import ConverterTriad, Normalised
 from procedures.core.report import Cell, Table

@@ -1,4 +1,4 @@
-"""The API's document as a page, from files of an installed package: it needs no other host."""
+"""API documentation as a page, from files of an installed package: it needs no other host."""
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
@@ -16,11 +16,11 @@ POLICY = (
 
 @router.get("/docs")
 def docs(request: Request) -> HTMLResponse:
-    """Every operation of the API, to be read and tried."""
+    """Page of every operation of the API, to be read and tried."""
     return templates.TemplateResponse(request, "docs.html", headers={"Content-Security-Policy": POLICY})
 
 
 @router.get("/redoc")
 def redoc() -> RedirectResponse:
-    """The older address of the same document."""
+    """Redirect from the older address of the same document."""
     return RedirectResponse("/docs", status_code=308)

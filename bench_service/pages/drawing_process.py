@@ -1,4 +1,4 @@
-"""What a process of drawings is made of: matplotlib, and nothing of the service."""
+"""Entry point of a drawing process: it loads matplotlib, and nothing of the service."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from bench_service.pages import figures
 
 
 def open_drawing() -> Run:
-    """See `WorkProcesses`: each piece of work is a figure, and gives its SVG document."""
+    """Prepare a drawing process, see `WorkProcesses`: each piece of work is a figure, and gives its SVG document."""
     figures.drawn_here(figures.SMALLEST)  # load matplotlib before the first one is waited for
 
     def run(_: str, arguments: tuple[Any, ...]) -> str:

@@ -1,4 +1,4 @@
-"""A `Figure` of the domain as an SVG, drawn by matplotlib. Imported beside the first answers, not before.
+"""Drawing of a `Figure` of the domain as SVG by matplotlib. Imported while the first requests are served, not before.
 
 Margins are fixed and logarithmic axes have their labels and fine grid from here: laying out and typesetting them is
 what takes matplotlib most of its time, and a static run has twenty plots.
@@ -24,34 +24,34 @@ MARGINS = {"left": 0.12, "right": 0.985, "bottom": 0.15, "top": 0.97}
 COLOURS = ("#1f5fa8", "#c2410c", "#15803d", "#7c3aed", "#a16207", "#0e7490")
 MARKS = ("o", "^", "s", "D", "v", "P")
 MOST_DECADES = 12
-"""Of a logarithmic axis: what lies further below its greatest value is not shown."""
+"""Decades that a logarithmic axis shows at most: values further below its greatest one are left out."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 SMALLEST = Figure("", "", "", (Series("", (0.0, 1.0), (0.0, 1.0)),))
 _elsewhere: list[WorkProcesses] = []
-"""The process that draws, where it is not this one."""
+"""The processes that draw, where it is not this one."""
 
 
 def warm_up() -> None:
-    """Load matplotlib where it draws, so that nobody waits for it at the first plot."""
+    """Load matplotlib in the processes that draw, so that the first plot is not delayed."""
     svg(SMALLEST)
 
 
 def draw_in(processes: WorkProcesses | None) -> None:
-    """From now on draw in another process; None: in this one."""
+    """Draw in another process from now on; None: in this one."""
     _elsewhere[:] = [] if processes is None else [processes]
 
 
 SALT = "bench"
-"""Of the names inside a drawing: drawn again, a figure is the same to the byte."""
+"""Salt of the ids inside an SVG: a figure that is drawn again is the same to the byte."""
 _DRAWING = Lock()
 """matplotlib's settings are global: two drawings at once would take each other's."""
 
 
 @lru_cache(maxsize=200)
 def svg(figure: Figure) -> str:
-    """The figure as an SVG document; drawn once, because a result never changes."""
+    """Return the figure as an SVG document; drawn once, because a result never changes."""
     for processes in _elsewhere:
         try:
             return processes.result("svg", figure)
@@ -61,7 +61,7 @@ def svg(figure: Figure) -> str:
 
 
 def drawn_here(figure: Figure) -> str:
-    """The figure as an SVG document, drawn by this process."""
+    """Draw the figure as an SVG document in this process."""
     with _DRAWING:
         return _drawn(figure)
 
@@ -94,7 +94,7 @@ def _drawn(figure: Figure) -> str:
 
 
 def _draw(axes: "Axes", series: Series, colour: str, mark: str) -> None:
-    """One series in its style; error bars where it has them."""
+    """Draw one series in its style; error bars where it has them."""
     if series.style == "reference":
         axes.plot(series.x, series.y, linestyle="--", linewidth=1.0, color="#444444", label=series.name)
         return

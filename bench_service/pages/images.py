@@ -1,4 +1,4 @@
-"""Figures as images: a page names them, a browser fetches them one by one and keeps them.
+"""Figures as image files: a page names them, and a browser fetches them one by one and caches them.
 
 A page has each figure at hand when it is made, and puts it aside for the request that follows. Where it is not there
 any more (another process answers, many pages came between), the figure is made again from the stored result.
@@ -20,13 +20,13 @@ from procedures.core.report import Figure, Report
 router = APIRouter(include_in_schema=False)
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; sandbox"
-"""A drawing has styles in place; opened alone it runs nothing."""
+"""Content-Security-Policy of a drawing: it has styles in place; opened alone it runs nothing."""
 MOST = 200
-"""So many figures are put aside: those of about ten pages, as many as are kept drawn."""
+"""Number of figures that are kept: those of about ten pages, as many as are kept drawn."""
 
 
 class FigureShelf:
-    """The figures of the latest pages, by version."""
+    """Figures of the latest pages, by version."""
 
     def __init__(self, most: int = MOST) -> None:
         self._figures: OrderedDict[str, Figure] = OrderedDict()
@@ -34,7 +34,7 @@ class FigureShelf:
         self._mutex = Lock()
 
     def put(self, figure: Figure, code_version: str) -> str:
-        """Put a figure aside; its version changes with its content, and with the code that draws it."""
+        """Keep a figure for its request; its version changes with its content, and with the code that draws it."""
         version = hashlib.sha256(f"{code_version}\n{figure!r}".encode()).hexdigest()[:16]
         with self._mutex:
             self._figures[version] = figure
@@ -44,7 +44,7 @@ class FigureShelf:
         return version
 
     def get(self, version: str | None) -> Figure | None:
-        """The figure of a version, where it is still here."""
+        """Return the figure of a version, where it is still kept."""
         with self._mutex:
             return None if version is None else self._figures.get(version)
 
@@ -53,13 +53,13 @@ SHELF = FigureShelf()
 
 
 def report_figures(report: Report) -> list[Figure]:
-    """The figures of a report, in order."""
+    """Return the figures of a report, in order."""
     return [section for section in report.sections if isinstance(section, Figure)]
 
 
 @router.get("/results/{result_id}/figures/{number}.svg")
 def result_figure(result_id: str, number: int, request: Request) -> Response:
-    """A figure of a result's report, by its number from 1."""
+    """Image of a figure of a result's report, by its number from 1."""
     figure = SHELF.get(request.query_params.get("v"))
     if figure is None:
         service = service_of(request)
@@ -72,7 +72,7 @@ def result_figure(result_id: str, number: int, request: Request) -> Response:
 
 @router.get("/units/{serial}/trend.svg")
 def trend_image(serial: str, request: Request, query: TrendQuery) -> Response:
-    """The chart of a quantity over a unit's results."""
+    """Image of the chart of a quantity over a unit's results."""
     figure = SHELF.get(request.query_params.get("v"))
     if figure is None:
         figure = trend_of(service_of(request), serial, wanted_trend(service_of(request), serial, query)).figure

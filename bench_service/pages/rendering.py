@@ -1,4 +1,4 @@
-"""What every page is made with: templates, the filters in them, and the service behind the request."""
+"""Rendering shared by all pages: templates, the filters in them, and the service behind the request."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ templates = Jinja2Templates(Path(__file__).parent / "templates")
 
 
 def number(value: Any) -> str:
-    """A cell as a reader wants it: six significant digits, a dash for what is absent."""
+    """Format a cell for a reader: six significant digits, a dash for what is absent."""
     if value is None:
         return "–"
     if isinstance(value, bool):
@@ -26,5 +26,5 @@ templates.env.filters["asset"] = asset
 
 
 def service_of(request: Request) -> BenchService:
-    """What the application was made for."""
+    """Return the service that the application serves."""
     return request.app.state.service

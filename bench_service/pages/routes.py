@@ -1,4 +1,4 @@
-"""The pages: what the bench is doing, a job, a result, a unit."""
+"""Routes of the HTML pages: benches with their activity, jobs, results, units."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ _VERBS = {
     JobState.PAUSED: (("resume", "Resume"), ("cancel", "Cancel")),
     JobState.INTERRUPTED: (("resume", "Resume"), ("cancel", "Cancel")),
 }
-"""What a person can do to a job, by its state."""
+"""Actions that a person can take on a job, by its state."""
 
 
 def _page(request: Request, name: str, **context: Any) -> HTMLResponse:
@@ -33,7 +33,7 @@ def _page(request: Request, name: str, **context: Any) -> HTMLResponse:
 
 
 def _reported(service: BenchService, result: StoredResult) -> dict[str, Any]:
-    """A result with its report: tables as they are, figures with the address of their image."""
+    """Result with its report: tables as they are, figures with the address of their image."""
     report = service.catalogue.report(result)
     sections: list[dict[str, Any]] = []
     number = 0
@@ -48,7 +48,7 @@ def _reported(service: BenchService, result: StoredResult) -> dict[str, Any]:
 
 
 def _noise_rows(unit: Unit) -> list[list[str]]:
-    """A row a channel: its noise coefficients in the units people read, a dash for what is absent."""
+    """Noise coefficients, one row for each channel, in the units people read, a dash for what is absent."""
     rows: list[list[str]] = []
     for triad, rate_unit in (("gyro", "rad/s"), ("accelerometer", "m/s^2")):
         record = unit.triad(triad)
@@ -62,7 +62,7 @@ def _noise_rows(unit: Unit) -> list[list[str]]:
 
 
 def _explanation(job: Job) -> str:
-    """What a job's state means to the person in front of the bench."""
+    """Explain a job's state in a sentence for the page."""
     nothing = "The bench was made safe first: the table at rest, the unit off."
     if job.state is JobState.PAUSED:
         return (
@@ -86,7 +86,7 @@ def _explanation(job: Job) -> str:
 
 @router.get("/")
 def home(request: Request) -> HTMLResponse:
-    """The benches, their units, the latest jobs."""
+    """Page of the benches, their units and the latest jobs."""
     service = service_of(request)
     queued = service.stores.queue.lengths()
     return _page(
@@ -110,7 +110,7 @@ def home(request: Request) -> HTMLResponse:
 
 @router.get("/benches/{bench_id}/stops")
 def stops_page(bench_id: str, request: Request, after: str | None = None) -> HTMLResponse:
-    """The stops of a bench, newest first: who stopped it and why, who released it with which remark."""
+    """Page of a bench's stops, newest first: each with author, reason, release and remark."""
     service = service_of(request)
     service.benches.description(bench_id)
     page = service.stores.benches.stops(bench_id, after=after)
@@ -119,7 +119,7 @@ def stops_page(bench_id: str, request: Request, after: str | None = None) -> HTM
 
 @router.get("/jobs/{job_id}")
 def job_page(job_id: str, request: Request) -> HTMLResponse:
-    """A job: progress, stations, recordings, and its result once there is one."""
+    """Page of a job: progress, stations, recordings, and its result once there is one."""
     service = service_of(request)
     last_event, _ = service.stores.jobs.last_event(job_id)  # before the job: what comes later reloads the page
     job = service.stores.jobs.get(job_id)
@@ -144,14 +144,14 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
 
 @router.get("/results/{result_id}")
 def result_page(result_id: str, request: Request) -> HTMLResponse:
-    """A result: verdict, checks, tables, plots, lineage."""
+    """Page of a result: verdict, checks, tables, plots, lineage."""
     service = service_of(request)
     return _page(request, "result.html", **_reported(service, service.stores.results.get(result_id)))
 
 
 @router.get("/units/{serial}")
 def unit_page(serial: str, request: Request) -> HTMLResponse:
-    """A unit: its record, its calibrations and its correction sets."""
+    """Page of a unit: its record, its calibrations and its correction sets."""
     service = service_of(request)
     unit = service.stores.units.unit(serial)
     return _page(

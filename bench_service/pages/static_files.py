@@ -1,4 +1,4 @@
-"""Scripts and style sheets of the pages: our own, and those of the installed package that shows the API's document."""
+"""Scripts and style sheets of the pages: the service's, and those of the package that shows the API's document."""
 
 import hashlib
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ router = APIRouter(include_in_schema=False)
 MEDIA_TYPES = {"css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
 OWN = ("page.css", "act.js", "live.js", "reload.js", "choose.js", "docs.js", "icon.svg")
 OF_PACKAGE = ("swagger-ui.css", "swagger-ui-bundle.js")
-"""Files that the package `fastapi-offline` carries."""
+"""Names of the files that the package `fastapi-offline` carries."""
 
 
 @dataclass(frozen=True)
 class StaticFile:
-    """A file as it is sent."""
+    """A static file with its content and media type."""
 
     content: bytes
     media_type: str
@@ -29,7 +29,7 @@ class StaticFile:
 
 @cache
 def static_file(name: str) -> StaticFile:
-    """A file by its name. Raises `NotFound`."""
+    """Find a file by its name. Raises `NotFound`."""
     if name in OWN:
         folder = files("bench_service.pages")
     elif name in OF_PACKAGE:
@@ -41,7 +41,7 @@ def static_file(name: str) -> StaticFile:
 
 
 def asset(name: str) -> str:
-    """The address of a file, with its version: a browser asks for it once."""
+    """Return the address of a file, with its version: a browser fetches it once."""
     return f"/static/{name}?v={static_file(name).version}"
 
 

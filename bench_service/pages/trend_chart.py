@@ -1,4 +1,4 @@
-"""A quantity of a unit over its results, as a chart. Knows how it is drawn; not who asks for it."""
+"""Chart of a quantity of a unit over its results. Knows how it is drawn; must not know which page shows it."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -14,7 +14,7 @@ from procedures.core.units import DISPLAY
 
 @dataclass(frozen=True)
 class WantedTrend:
-    """A quantity to look at, as the address of its page has it."""
+    """Choice of a quantity, as the address of its page has it."""
 
     procedure: Annotated[str, Query(max_length=100)] = "calibration_12_orientations"
     quantity: Annotated[str, Query(max_length=200)] = ""
@@ -27,7 +27,7 @@ TrendQuery = Annotated[WantedTrend, Depends(WantedTrend)]
 
 @dataclass(frozen=True)
 class TrendChoice:
-    """A quantity that there is, and the others of the same result."""
+    """A quantity that exists, and the others of the same result."""
 
     quantity: str
     names: tuple[str, ...]
@@ -44,7 +44,7 @@ class TrendChart:
 
 
 def wanted_trend(service: BenchService, serial: str, query: WantedTrend) -> TrendChoice:
-    """The quantity that is asked for, or else the first of the newest result. Raises `NotFound` for no such unit."""
+    """Choose the requested quantity, or else the first of the newest result. Raises `NotFound` for no such unit."""
     service.stores.units.unit(serial)
     kind = service.benches.description(service.benches.default()).simulated
     simulated = kind if query.simulated is None else query.simulated
@@ -63,7 +63,7 @@ def trend_of(service: BenchService, serial: str, choice: TrendChoice) -> TrendCh
 
 
 def trend_figure(trend: Trend) -> Figure | None:
-    """The chart: values with their uncertainty, centre, limits, and the points that break a rule; None without any."""
+    """Draw values with their uncertainty, centre, limits, and the points that break a rule; None without points."""
     if not trend.points:
         return None
     unit, size = DISPLAY.get(trend.unit, (trend.unit, 1.0))

@@ -1,4 +1,4 @@
-"""Memory in SQL: SQLite on one machine, Postgres for many, the same code. Knows no HTTP and no job engine.
+"""Stores in SQL: SQLite on one machine, Postgres for many, the same code. Knows no HTTP and no job engine.
 
 `open_stores` is the way in; `acquire_lease` is the right to drive a bench. Every error of the database leaves here as
 `StorageFull` or `StorageFailure`. A supervisor takes lease and database alone: what stores load, it does without.
@@ -17,7 +17,7 @@ __all__ = ["BenchLease", "Database", "acquire_lease", "engine_database", "lease_
 
 
 def open_stores(database_url: str) -> "tuple[Stores, Database]":
-    """All memory behind a URL, brought to the newest form; `Database.dispose` closes it. Raises `StorageFailure`."""
+    """Open all stores behind a URL, in the newest form; `Database.dispose` closes it. Raises `StorageFailure`."""
     from bench_service.persistence.stores import open_stores as opened
 
     return opened(database_url)

@@ -1,7 +1,7 @@
-"""Campaigns, their runs and schedules in SQL. A run or a schedule is a document; columns beside it are for searching.
+"""Campaigns, their runs and schedules in SQL. A run or a schedule is a document; further columns serve searches.
 
-Who changes one says what was read; the row is locked while that is compared (`FOR UPDATE`; on SQLite the writing
-transaction itself), so of two processes one wins and the other reads again.
+A change is given with the version that was read; the row is locked while that is compared (`FOR UPDATE`; on SQLite the
+writing transaction itself), so of two processes one wins and the other reads again.
 """
 
 from datetime import datetime
@@ -28,7 +28,7 @@ OPEN = tuple(state.value for state in JobState if state not in FINAL)
 
 
 class SqlCampaignStore:
-    """`bench_service.campaigns.stores.CampaignStore`."""
+    """SQL implementation of `bench_service.campaigns.stores.CampaignStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -25,9 +25,9 @@ from bench_service.formats.plain_json import read_back
 from bench_service.model.errors import StorageFailure, StorageFull, UnfitValue
 
 BUSY_S = 30.0
-"""How long a writer waits for another one."""
+"""Longest time that a writer waits for another one [s]."""
 LEAVE_S = 1.0
-"""How long the end waits for connections that are in use [s]."""
+"""Longest time that `dispose` waits for connections that are in use [s]."""
 TCP = {
     "connect_timeout": 10,
     "keepalives_idle": 5,
@@ -52,7 +52,7 @@ class Conflict(StorageFailure):
 
 
 class Database:
-    """One database: short reading and writing transactions, with its errors in our words."""
+    """Short reading and writing transactions of one database, with its errors as `StorageFull` or `StorageFailure`."""
 
     def __init__(self, engine: Engine) -> None:
         self.engine = engine
@@ -62,13 +62,13 @@ class Database:
 
     @contextmanager
     def read(self) -> Generator[Session, None, None]:
-        """Reads only. On SQLite all of them see one moment; on Postgres each statement sees its own."""
+        """Open a reading transaction. On SQLite all its reads see one moment; on Postgres each statement its own."""
         with storage_errors(), Session(self._reading_engine) as session:
             yield session
 
     @contextmanager
     def write(self) -> Generator[Session, None, None]:
-        """A transaction that commits at the end, or leaves nothing behind. Raises `StorageFull`, `StorageFailure`."""
+        """Open a transaction that commits at the end, or leaves nothing. Raises `StorageFull`, `StorageFailure`."""
         news: list[str] = []
         with storage_errors(), Session(self._writing_engine, expire_on_commit=False) as session, session.begin():
             session.info[_NEWS] = news
@@ -78,17 +78,17 @@ class Database:
                 tell(subject)
 
     def on_news(self, tell: Callable[[str], None]) -> None:
-        """From now on call `tell` after each commit with every subject that was announced in it; it may not raise."""
+        """Register `tell`, called after each commit with every subject that was announced in it; it may not raise."""
         self._tell.append(tell)
 
     @contextmanager
     def write_connection(self) -> Generator[Connection, None, None]:
-        """The same for work below the tables: migrations."""
+        """Open a writing transaction below the tables, for migrations."""
         with storage_errors(), self._writing_engine.begin() as connection:
             yield connection
 
     def one_at_a_time(self, session: Session, what: str) -> None:
-        """In a writing transaction: go on only once no other one that said the same words is open.
+        """Wait in a writing transaction until no other one with the same `what` is open.
 
         On SQLite writers queue for the whole database anyway.
         """
@@ -97,7 +97,7 @@ class Database:
             session.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": key})
 
     def free_bytes(self) -> int | None:
-        """Room on the disk of an SQLite file; None where the database is elsewhere."""
+        """Free space on the disk of an SQLite file [bytes]; None where the database is elsewhere."""
         file = self.engine.url.database
         return None if self.is_postgres or not file else shutil.disk_usage(Path(file).parent).free
 
@@ -106,7 +106,7 @@ class Database:
         return self.engine.dialect.name == "postgresql"
 
     def dispose(self) -> None:
-        """Close all connections; one that a thread still reads over is waited for, as nobody would close it later."""
+        """Close all connections; wait for those that a thread still reads over, since no one would close them later."""
         pool, deadline = self.engine.pool, wall_clock.monotonic_s() + LEAVE_S
         while isinstance(pool, QueuePool) and pool.checkedout() > 0 and wall_clock.monotonic_s() < deadline:
             wall_clock.pause(0.01)
@@ -114,12 +114,12 @@ class Database:
 
 
 def announce(session: Session, subject: str) -> None:
-    """Once this writing transaction is committed, who wants to know is told of a subject: see `Database.on_news`."""
+    """Announce a subject to the listeners of `Database.on_news` once this writing transaction is committed."""
     session.info[_NEWS].append(subject)
 
 
 def connect(database_url: str) -> Database:
-    """A database by its URL; the file and folder of an SQLite one are made. Raises `StorageFailure`."""
+    """Open a database by its URL; file and folder of an SQLite one are created. Raises `StorageFailure`."""
     with storage_errors():
         url = make_url(database_url)
         if url.get_backend_name() == "sqlite":
@@ -184,7 +184,7 @@ def _switch_to_wal(engine: Engine) -> None:
 
 @contextmanager
 def storage_errors() -> Generator[None, None, None]:
-    """Every error of the database, or of its driver, as `StorageFull`, `Conflict` or `StorageFailure`."""
+    """Translate every error of the database or its driver to `StorageFull`, `Conflict` or `StorageFailure`."""
     try:
         yield
     except IntegrityError as error:
@@ -218,7 +218,7 @@ def as_storage_error(error: Exception) -> Exception:
 
 
 def is_full(error: BaseException | None) -> bool:
-    """Whether a driver's error says that there is no room left."""
+    """Return whether a driver's error means that there is no room left."""
     if isinstance(error, sqlite3.Error):
         code = getattr(error, "sqlite_errorcode", 0)
         return code in _SQLITE_FULL or code & 0xFF == sqlite3.SQLITE_FULL

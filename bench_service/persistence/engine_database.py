@@ -1,8 +1,8 @@
-"""Where the job engine of a bench keeps its own books: a file beside our SQLite file, or a schema of the same Postgres
+"""Database of a bench's job engine: a file next to the service's SQLite file, or a schema of the same Postgres
 database, which the engines of all benches share.
 
-On SQLite the books are written with ``synchronous=NORMAL``: a power cut may take back their last entries, and then a
-step is done again, which every step allows; what we acknowledge ourselves is written with FULL.
+On SQLite the engine writes with ``synchronous=NORMAL``: a power cut may take back its last entries, and then a
+step is done again, which every step allows; the service's own database, whose writes it acknowledges, uses FULL.
 
 Under Python 3.12 and newer the engine asks SQLite for the time as ``unixepoch('subsec')``, also in the defaults of its
 tables. An SQLite library older than 3.42 does not know that modifier and answers NULL, so our connections bring the
@@ -18,7 +18,7 @@ from bench_service import wall_clock
 from bench_service.persistence.database import TCP, connect
 
 KNOWS_SUBSEC = (3, 42, 0)
-"""The first version of SQLite whose ``unixepoch`` has milliseconds."""
+"""First version of SQLite whose ``unixepoch`` has milliseconds."""
 
 
 class _Books(sqlite3.Connection):

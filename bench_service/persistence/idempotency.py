@@ -1,4 +1,4 @@
-"""A create that is asked twice makes one thing: the client's key is kept with what it made, in the same transaction."""
+"""Idempotency keys: a repeated create makes one object, since its key is stored in the same transaction."""
 
 from collections.abc import Callable
 from datetime import datetime
@@ -14,11 +14,11 @@ from bench_service.persistence.tables.jobs import IdempotencyKeyRow
 T = TypeVar("T")
 
 _RIVALS = 32
-"""Each conflict means that some rival committed, so who has this many rivals at once still comes through."""
+"""Number of retries after conflicts: each means that a rival committed, so up to this many rivals are survived."""
 
 
 class SqlKeyStore:
-    """`bench_service.jobs.stores.KeyStore`."""
+    """SQL implementation of `bench_service.jobs.stores.KeyStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -31,7 +31,7 @@ class SqlKeyStore:
 
 
 def made_before(session: Session, idempotency: Idempotency | None, kind: str) -> str | None:
-    """The id of what the key made, or None. Raises `IdempotencyConflict` for a key of another request."""
+    """Return the id of what the key made, or None. Raises `IdempotencyConflict` for a key of another request."""
     if idempotency is None:
         return None
     row = session.get(IdempotencyKeyRow, idempotency.key)
@@ -43,7 +43,7 @@ def made_before(session: Session, idempotency: Idempotency | None, kind: str) ->
 
 
 def remember(session: Session, idempotency: Idempotency | None, kind: str, made_id: str, at: datetime) -> None:
-    """Keep the key with what it makes; a rival with the same key waits here, and then fails with `Conflict`."""
+    """Store the key with its object's id; a rival with the same key waits here, and then fails with `Conflict`."""
     if idempotency is not None:
         session.add(
             IdempotencyKeyRow(
@@ -54,7 +54,7 @@ def remember(session: Session, idempotency: Idempotency | None, kind: str, made_
 
 
 def again_after_conflict(work: Callable[[], T]) -> T:
-    """Do a transaction; where a rival won the race, do it again, now seeing what the rival made."""
+    """Retry a transaction after each conflict; the retry sees the row that the rival made."""
     for _ in range(_RIVALS):
         try:
             return work()

@@ -1,4 +1,4 @@
-"""Bringing a database to the newest form of the tables, at start. Knows Alembic; must not know what tables hold.
+"""Migration of a database to the newest form of its tables, at start. Knows Alembic; must not know what tables hold.
 
 All of it is one writing transaction, so of two processes that start at once the second waits and finds the work done.
 Alembic is imported only where there is work: a service that starts on a database of its own version does without.
@@ -27,7 +27,7 @@ def upgrade_to_head(database: Database) -> None:
 
 
 def _head() -> str:
-    """The newest revision: the number that begins the last script's name."""
+    """Return the newest revision: the number that begins the last script's name."""
     scripts = sorted(SCRIPTS.glob("versions/[0-9][0-9][0-9][0-9]_*.py"))
     if not scripts:
         raise StorageFailure(f"the folder of migrations is missing: {SCRIPTS}")
@@ -35,7 +35,7 @@ def _head() -> str:
 
 
 def _revision(connection: Connection) -> str | None:
-    """What the database says of its own form; None for an empty one."""
+    """Read the revision of the database; None for an empty one."""
     if not inspect(connection).has_table("alembic_version"):
         return None
     return connection.scalar(text("SELECT version_num FROM alembic_version"))

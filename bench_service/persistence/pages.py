@@ -1,4 +1,4 @@
-"""Lists, newest first: ids sort by time, so the cursor of the next page is the last id of this one."""
+"""Pages of lists, newest first: ids sort by time, so the cursor of the next page is the last id of this one."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar

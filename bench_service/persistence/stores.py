@@ -1,4 +1,4 @@
-"""Putting the stores together: one database, all stores. Must not know who uses them."""
+"""Construction of the stores: one database, all stores. Must not know their callers."""
 
 from bench_service.campaigns.stores import Stores
 from bench_service.persistence.bench.live_store import SqlLiveStore
@@ -20,7 +20,7 @@ from bench_service.persistence.telemetry.tally_store import SqlTallyStore
 
 
 def open_stores(database_url: str) -> tuple[Stores, Database]:
-    """All memory behind a URL, brought to the newest form; `Database.dispose` closes it. Raises `StorageFailure`."""
+    """Open all stores behind a URL, in the newest form; `Database.dispose` closes it. Raises `StorageFailure`."""
     database = connect(database_url)
     try:
         upgrade_to_head(database)
@@ -31,7 +31,7 @@ def open_stores(database_url: str) -> tuple[Stores, Database]:
 
 
 def stores_of(database: Database) -> Stores:
-    """The stores of a database that is in the newest form."""
+    """Build the stores of a database that is in the newest form."""
     return Stores(
         jobs=SqlJobStore(database),
         queue=SqlQueueStore(database),

@@ -1,4 +1,4 @@
-"""How the unit's outputs follow the temperatures of its parts: pure functions of the nodes.
+"""Response of the unit's outputs to the temperatures of its parts: pure functions of the nodes.
 
 Everything is a departure from what the unit is with all nodes at `REFERENCE_C`. Written without sight of the inverse
 that the analysis uses.
@@ -28,7 +28,7 @@ MA_PER_NOMINAL = CURRENT_MA_PER_G / units.STANDARD_GRAVITY
 
 @dataclass(frozen=True)
 class Response:
-    """What temperature does to the three accelerometer and three gyro channels, each (n, 3).
+    """Response of the three accelerometer and three gyro channels to temperature, each (n, 3).
 
     Nominal accelerometer output of a bias b and a through-put a = (K·f)_i [m/s²]:
     ``U = converter_gain·(b + sensor_gain·a + sensor_added) + converter_added``; of a gyro ``U + gyro_added``.
@@ -47,14 +47,14 @@ class Response:
 
 
 def response(truth: UnitThermalTruth, temperatures_c: Array) -> Response:
-    """The response at node temperatures (n, 8) in the order of `NODES` [°C]."""
+    """Compute the response at node temperatures (n, 8) in the order of `NODES` [°C]."""
     gain, added = accelerometers(truth.accelerometers, temperatures_c)
     converter_gain, zero = converters(truth.converter, temperatures_c[:, CONVERTER])
     return Response(gain, added, converter_gain, zero, gyros(truth.gyro, temperatures_c))
 
 
 def accelerometers(truths: Sequence[AccelerometerThermalTruth], temperatures_c: Array) -> tuple[Array, Array]:
-    """Gain 1/(1 + A) and added −B [m/s²] of each channel, (n, 3) both."""
+    """Compute gain 1/(1 + A) and added −B [m/s²] of each channel, (n, 3) both."""
     departure = temperatures_c - REFERENCE_C
     case, block, board = (departure[:, [node]] for node in (CASE, BLOCK, CONVERTER))
     share = np.array([t.block_share for t in truths])
@@ -81,7 +81,7 @@ def converter_codes(truth: ConverterTruth, current_ma: Array, board_c: Array) ->
 
 
 def gyros(truth: GyroThermalTruth, temperatures_c: Array) -> Array:
-    """What a failing perimeter control lets through, (n, 3) [rad/s]; zero for a healthy one."""
+    """Residue that a failing perimeter control lets through, (n, 3) [rad/s]; zero for a healthy one."""
     return np.array(truth.fault_residue_rad_s_c) * (temperatures_c[:, GYRO] - REFERENCE_C)
 
 

@@ -1,7 +1,7 @@
-"""The chamber's port, and the unit's heat and thermometers beside it: implements `procedures.bench.chamber.Chamber`.
+"""Chamber device with the unit's heat and thermometers: implements `procedures.bench.chamber.Chamber`.
 
-Knows the bench's clock only as a number of ticks that pass. Temperatures are made once a second; what the unit's
-outputs make of them, and what its sensors sent, hold from the end of that second to the end of the next.
+Knows the bench's clock only as a number of ticks that pass. Temperatures are made once a second; their effect on the
+unit's outputs, and the codes of its sensors, hold from the end of that second to the end of the next.
 """
 
 from collections.abc import Callable
@@ -23,22 +23,22 @@ from simulators.truth.thermal import NODES, ChamberFault, ChamberTruth, UnitTher
 
 @dataclass(frozen=True)
 class Warmth:
-    """What some ticks did: temperatures and codes of every whole second that ended within them."""
+    """Thermal outcome of some ticks: temperatures and codes of every whole second that ended within them."""
 
     temperatures_c: Array
-    """(n, 8) in the order of `NODES`."""
+    """Node temperatures, (n, 8), in the order of `NODES` [°C]."""
     codes: Codes
-    """(n, 5) in the order of `THERMOMETERS`."""
+    """Sensor codes, (n, 5), in the order of `THERMOMETERS`."""
     end_ticks: tuple[int, ...]
-    """At which of the ticks, 1 … ticks, each second ended."""
+    """Ticks, 1 … ticks, at which each second ended."""
     before_c: Array
-    """(8,), at the end of the last second before these ticks: they hold until the first one ends."""
+    """Node temperatures (8,) at the end of the last second before these ticks: they hold until the first one ends."""
     codes_before: Codes
-    """(5,), of that same second."""
+    """Sensor codes (5,) of that same second."""
 
 
 class SimChamber:
-    """Chamber, unit's heat, thermometers. `advance` is what the world's clock moves."""
+    """Device of chamber, unit's heat and thermometers. The world's clock calls `advance`."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class SimChamber:
         faults: tuple[ChamberFault, ...] = (),
         limits: ChamberLimits | None = None,
     ) -> None:
-        """`rate_hz`: ticks of the clock in a second; `now_s`: bench time; `limits`: None: all that the truth allows."""
+        """Build the chamber device. `rate_hz`: ticks in a second; `now_s`: bench time; `limits`: None: the truth's."""
         self.truth, self.unit = chamber, unit
         self.plant = ChamberPlant(chamber, unit.network, seed)
         self.thermometers = Thermometers(unit.thermometers, seed, chamber.ambient_c)
@@ -79,35 +79,35 @@ class SimChamber:
         self.plant.command(temperature_c, ramp_c_min / 60.0)
 
     async def read(self) -> ChamberReading:
-        """What the chamber says of itself; see the port."""
+        """Read the chamber's own report of its state; see the port."""
         self._need_link()
         s = self.plant.state
         set_point = s.control_reading_c if s.target_c is None else s.set_point_c
         return ChamberReading(self._now_s(), s.control_reading_c, set_point, s.target_c, s.door_open, s.tripped)
 
     async def make_safe(self) -> None:
-        """To ambient; a chamber that has tripped or stands open stays off."""
+        """Lead the chamber to ambient; a chamber that has tripped or stands open stays off."""
         self._need_link()
         if not (self.plant.state.tripped or self.plant.state.door_open):
             self.plant.command(self._limits.ambient_c, self._limits.ramp_c_min / 60.0)
 
     def unit_power(self, on: bool) -> None:
-        """The unit's supply was switched: from the next second on it heats itself, or no more."""
+        """Note that the unit's supply was switched: from the next second on it heats itself, or no more."""
         self.plant.state.unit_on = on
 
     def set_door(self, is_open: bool) -> None:
-        """What a person does, for instance to turn the unit over between two runs. Open, the plant stops."""
+        """Open or close the door, as a person does to turn the unit over between two runs. Open, the plant stops."""
         self.plant.state.door_open = is_open
         if is_open:
             self.plant.switch_off()
 
     def reset_limiter(self) -> None:
-        """Reset by hand after an over-temperature: for tests, in a person's place; nothing in the service can do it."""
+        """Reset by hand after an over-temperature, in a person's place: for tests; nothing in the service can do it."""
         self.plant.state.tripped = False
         self.plant.switch_off()
 
     def advance(self, ticks: int) -> Warmth:
-        """Let whole ticks pass; cheap where no second ends within them."""
+        """Advance whole ticks; cheap where no second ends within them."""
         per_second = self._rate_hz * STEP_S
         first = int(self._ticks / per_second + 1e-9)
         seconds = int((self._ticks + ticks) / per_second + 1e-9) - first
@@ -118,7 +118,7 @@ class SimChamber:
         return Warmth(path, self.thermometers.read(first, path), ends, before, codes_before)
 
     def _pieces(self, first: int, seconds: int) -> list[Array]:
-        """Node temperatures of so many seconds, cut where something breaks."""
+        """Compute node temperatures of the next seconds, cut where a fault begins."""
         cuts = {min(max(int(f.from_s / STEP_S) - first, 0), seconds) for f in self.faults}
         edges = sorted({0, seconds} | cuts)
         pieces = [np.empty((0, len(NODES)))]
@@ -133,12 +133,12 @@ class SimChamber:
                 self.plant.fail(fault.name)
 
     def response(self, temperatures_c: Array) -> Response:
-        """What the unit's outputs make of node temperatures (n, 8)."""
+        """Compute the response of the unit's outputs to node temperatures (n, 8)."""
         return response(self.unit, temperatures_c)
 
     @property
     def link_lost(self) -> bool:
-        """Whether nobody reaches it any more, whatever it does."""
+        """Return whether the link to the chamber is lost, whatever the chamber does."""
         return any(f.name == "link_lost" and f.from_s <= self._now_s() for f in self.faults)
 
     def _need_link(self) -> None:
@@ -146,7 +146,7 @@ class SimChamber:
             raise Disconnected("the chamber does not answer")
 
     def checkpoint(self) -> dict[str, Any]:
-        """State to resume from, JSON-ready."""
+        """State of the device to resume from, JSON-ready."""
         return {
             "ticks": self._ticks,
             "plant": self.plant.checkpoint(),

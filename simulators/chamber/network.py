@@ -1,4 +1,4 @@
-"""Lumps of heat: chamber air, walls, and the unit's case, converter, accelerometer block and three gyro blocks.
+"""Thermal network of lumps: chamber air, walls, and the unit's case, converter, accelerometer block and gyro blocks.
 
 ``C·dT/dt = G·T + …``, linear in eight temperatures, discretised exactly (matrix exponential): inputs that hold for a
 step (heater, powers, room) as steps, the air's wandering at the unit's place as a straight line through it (first-order
@@ -18,7 +18,7 @@ INPUTS = ("heater_w", "ambient_c", "place_c", "unit_on")
 controller, and the unit's power (0 or 1)."""
 HEATER, AMBIENT, PLACE, POWER = range(len(NODES), len(NODES) + len(INPUTS))
 RAMPED = PLACE
-"""The input that moves along a straight line."""
+"""Input that moves along a straight line within a step."""
 
 
 def rates(chamber: ChamberTruth, unit: NetworkTruth, door_open: bool) -> tuple[Array, Array]:
@@ -56,13 +56,13 @@ def rates(chamber: ChamberTruth, unit: NetworkTruth, door_open: bool) -> tuple[A
 
 @dataclass(frozen=True)
 class Step:
-    """One exact step: ``T(t + Δ) = M·[T(t), u, u_ramped(t + Δ)]``, M of shape (8, 13)."""
+    """One exact time step: ``T(t + Δ) = M·[T(t), u, u_ramped(t + Δ)]``, M of shape (8, 13)."""
 
     matrix: Array
 
     @classmethod
     def of(cls, a: Array, b: Array, step_s: float) -> "Step":
-        """Van Loan's exponential: ``exp([[A, B, 0], [0, 0, ramp], [0, 0, 0]]·Δ)`` gives held and ramped parts alike."""
+        """Discretise by Van Loan: ``exp([[A, B, 0], [0, 0, ramp], [0, 0, 0]]·Δ)`` gives held and ramped parts alike."""
         from scipy.linalg import expm  # half a second to import: a service that starts does not wait for it
 
         nodes, inputs = b.shape
@@ -75,5 +75,5 @@ class Step:
 
 
 def steady(a: Array, b: Array, u: Array) -> Array:
-    """Temperatures at which nothing changes any more, (8,) [°C], for inputs (4,) held for ever."""
+    """Compute the steady temperatures, (8,) [°C], for inputs (4,) held for ever."""
     return np.asarray(np.linalg.solve(a, -b @ u), dtype=np.float64)

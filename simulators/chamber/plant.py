@@ -1,4 +1,4 @@
-"""The chamber's plant: set point generator, controller, heater and cooler, limiter, door; and the heat in the unit.
+"""Plant of the chamber: set point generator, controller, heater and cooler, limiter, door; and the heat in the unit.
 
 Goes in whole seconds; knows neither the bench's clock nor the port. The same seed gives the same temperatures in
 whatever pieces time passes, and after a resume.
@@ -16,26 +16,26 @@ from simulators.truth.thermal import NODES, ChamberTruth, NetworkTruth
 
 STEP_S = 1.0
 BLOCK_STEPS = 600
-"""Random numbers are drawn for so many steps at a time."""
+"""Number of steps for which random numbers are drawn at a time."""
 SQRT_2 = sqrt(2.0)
 
 
 @dataclass
 class PlantState:
-    """All that goes on from one second to the next, JSON-ready by `ChamberPlant.checkpoint`."""
+    """State that goes on from one second to the next, JSON-ready by `ChamberPlant.checkpoint`."""
 
     temperatures_c: list[float]
-    """Of `NODES`."""
+    """Temperatures in the order of `NODES` [°C]."""
     step: int = 0
     target_c: float | None = None
-    """None: heater and cooler are off."""
+    """Target of the controller [°C]; None: heater and cooler are off."""
     ramp_c_s: float = 0.0
     set_point_c: float = 0.0
     integral_w: float = 0.0
     wander: float = 0.0
-    """Unit normal state of the air's fluctuation."""
+    """State of the air's fluctuation, a unit normal number."""
     place_c: float = 0.0
-    """Air at the unit less air at the controller, at the present moment."""
+    """Temperature of the air at the unit less that at the controller, at the present moment [°C]."""
     control_reading_c: float = 0.0
     unit_on: bool = False
     door_open: bool = False
@@ -45,10 +45,10 @@ class PlantState:
 
 
 class ChamberPlant:
-    """Chamber and unit as bodies of heat."""
+    """Chamber and unit as a network of thermal capacities."""
 
     def __init__(self, chamber: ChamberTruth, unit: NetworkTruth, seed: int) -> None:
-        """Everything at the room's temperature, plant off, unit off."""
+        """Start with everything at the room's temperature, plant off, unit off."""
         self.truth = chamber
         self.state = PlantState([chamber.ambient_c] * len(NODES), place_c=0.0, control_reading_c=chamber.ambient_c)
         self._steps = {door: Step.of(*rates(chamber, unit, door), STEP_S).matrix for door in (False, True)}
@@ -59,7 +59,7 @@ class ChamberPlant:
         self._offset, self._band = chamber.place_offset_c, chamber.fluctuation_c
 
     def run(self, steps: int) -> Array:
-        """Let so many seconds pass; node temperatures at the end of each, (steps, 8) [°C]."""
+        """Advance some seconds; return the node temperatures at the end of each, (steps, 8) [°C]."""
         s = self.state
         nodes, z = len(NODES), np.empty(len(NODES) + len(INPUTS) + 1)
         z[:nodes], z[AMBIENT], z[POWER] = s.temperatures_c, self.truth.ambient_c, float(s.unit_on)
@@ -118,11 +118,11 @@ class ChamberPlant:
         s.target_c, s.ramp_c_s = target_c, ramp_c_s
 
     def switch_off(self) -> None:
-        """No more heating and cooling; the chamber drifts to the room's temperature."""
+        """Switch heating and cooling off; the chamber drifts to the room's temperature."""
         self.state.target_c = None
 
     def fail(self, what: str) -> None:
-        """Something of the plant breaks and stays so; what the plant does not know leaves it as it is."""
+        """Apply a fault of the plant for good; a name that the plant does not know changes nothing."""
         if what not in self.state.failed:
             self.state.failed.append(what)
 

@@ -1,4 +1,4 @@
-"""The unit's own temperature sensors: lag, offset, noise, quantization; and how they fail.
+"""Temperature sensors of the unit: lag, offset, noise, quantization; and their faults.
 
 ``y' = (T − y)/lag`` between whole seconds, T a straight line; ``code = round((y + offset + noise)/step)``.
 """
@@ -16,7 +16,7 @@ from simulators.truth import Array, KeyedBlocks
 from simulators.truth.thermal import THERMOMETERS, ThermometerTruth
 
 DISCONNECTED_CODE = -32768
-"""What a sensor sends that is not there: the least of 16 bits."""
+"""Code of a sensor that is disconnected: the smallest number of 16 bits."""
 COLUMNS = (CASE, CONVERTER, *range(GYRO.start, GYRO.stop))
 """Nodes on which the sensors sit, in the order of `THERMOMETERS`."""
 
@@ -24,10 +24,10 @@ Codes = NDArray[np.int32]
 
 
 class Thermometers:
-    """Five sensors read once a second."""
+    """Five temperature sensors read once a second."""
 
     def __init__(self, truths: Sequence[ThermometerTruth], seed: int, start_c: float) -> None:
-        """All of them in equilibrium at `start_c`."""
+        """Start with all sensors in equilibrium at `start_c`."""
         self.truths = tuple(truths)
         self._draws = [KeyedBlocks(seed, "thermometer", name) for name in THERMOMETERS]
         self._block, self._normal = -1, np.empty((0, len(self.truths)))
@@ -76,7 +76,7 @@ class Thermometers:
         return driven
 
     def _noise(self, first: int, count: int) -> Array:
-        """Standard normal numbers of so many seconds, (count, 5)."""
+        """Draw standard normal numbers for `count` seconds, (count, 5)."""
         rows: list[Array] = []
         at = first
         while at < first + count:
@@ -89,7 +89,7 @@ class Thermometers:
         return np.concatenate(rows)
 
     def checkpoint(self) -> dict[str, Any]:
-        """State to resume from, JSON-ready."""
+        """State of the sensors to resume from, JSON-ready."""
         return {
             "lagged": self._lagged.tolist(),
             "before": self._before.tolist(),
@@ -98,7 +98,7 @@ class Thermometers:
         }
 
     def resume(self, state: dict[str, Any]) -> None:
-        """Go on from a checkpoint."""
+        """Go on from the state of a checkpoint."""
         self._lagged, self._before = np.array(state["lagged"]), np.array(state["before"])
         self._last = [int(code) for code in state["last"]]
         self.sent = np.array(state["sent"], dtype=np.int32)

@@ -1,1 +1,1 @@
-"""The precision current source of the converter's bench."""
+"""Simulated precision current source of the converter's bench."""

@@ -1,4 +1,4 @@
-"""A precision current source: implements `procedures.bench.current_source.CurrentSource`."""
+"""Precision current source: implements `procedures.bench.current_source.CurrentSource`."""
 
 from math import isfinite
 from typing import Any
@@ -10,7 +10,7 @@ from procedures.bench.errors import OutOfRange
 from simulators.truth import Array, CurrentSourceTruth, KeyedBlocks
 
 BLOCK_TICKS = 1000
-"""Random numbers are drawn for so many ticks at a time."""
+"""Number of ticks for which random numbers are drawn at a time."""
 
 
 class SimCurrentSource:
@@ -27,18 +27,18 @@ class SimCurrentSource:
         return self._limits
 
     async def set_current(self, current_ma: float) -> None:
-        """Give this current from now on; see the port."""
+        """Set the current from now on; see the port."""
         most = self._limits.maximum_ma
         if not (isfinite(current_ma) and abs(current_ma) <= most):
             raise OutOfRange(f"current_ma = {current_ma!r} is outside {-most:g} … {most:g}")
         self._set_ma = current_ma
 
     async def make_safe(self) -> None:
-        """No current."""
+        """Set the current to zero."""
         self._set_ma = 0.0
 
     def currents_ma(self, first_tick: int, ticks: int) -> Array:
-        """What it truly gives during ticks of bench time, (ticks,); the same whatever the pieces."""
+        """True currents during ticks of bench time, (ticks,) [mA]; the same whatever the pieces."""
         given = self._set_ma * (1.0 + 1e-6 * self.truth.gain_error_ppm) + self.truth.zero_error_ma
         blocks = range(first_tick // BLOCK_TICKS, (first_tick + ticks - 1) // BLOCK_TICKS + 1)
         noise = np.concatenate([self._draws.at(block).standard_normal(BLOCK_TICKS) for block in blocks])
@@ -46,9 +46,9 @@ class SimCurrentSource:
         return given + self.truth.noise_ma * noise[skip : skip + ticks]
 
     def checkpoint(self) -> dict[str, Any]:
-        """State to resume from."""
+        """State of the device, from which it can resume."""
         return {"set_ma": self._set_ma}
 
     def resume(self, state: dict[str, Any]) -> None:
-        """Go on from a checkpoint."""
+        """Go on from the state of a checkpoint."""
         self._set_ma = float(state["set_ma"])

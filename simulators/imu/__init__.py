@@ -1,1 +1,1 @@
-"""The simulated unit: from true motion to integer counts."""
+"""Simulated inertial unit: from true motion to integer counts."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from simulators.truth import Array, KeyedBlocks
 
 Fixed = NDArray[np.int64]
-"""Fixed-point numbers; of what size is said where they are used."""
+"""Fixed-point numbers; the code that uses them defines the size of one step."""
 
 
 class Blocks:
@@ -42,12 +42,12 @@ class Blocks:
             at += step
 
     def forget(self) -> None:
-        """Make the next block anew, whichever it is."""
+        """Discard the kept block, so that the next one is made anew."""
         self._block = -1
 
 
 class Dither:
-    """Random part of a counter's dither: what is added to each of its readings before it rounds down.
+    """Random part of a counter's dither: the number added to each of its readings before it rounds down.
 
     Triangular and non-subtractive: the sum of two uniform numbers, each one pulse wide, independent at every reading.
     With it the first two moments of a reading's whole error do not depend on the input (Lipshitz, Wannamaker and
@@ -59,7 +59,7 @@ class Dither:
     WIDTH_BITS = 16
 
     def __init__(self, key: tuple[int, int, str], ticks: int, fraction_bits: int) -> None:
-        """`key`: seed, launch number, triad's name; values come as multiples of 2^−fraction_bits pulse, in 0 … 2."""
+        """Set up the streams. `key`: seed, launch number, triad; values: multiples of 2^−fraction_bits pulse, 0 … 2."""
         self._streams = [KeyedBlocks(*key, channel, "dither") for channel in range(3)]
         self._words = -(-ticks // 2)
         self._ticks = ticks

@@ -1,6 +1,6 @@
-"""What temperature does to a unit's outputs while some ticks pass: constant from one whole second to the next.
+"""Effect of temperature on a unit's outputs while some ticks pass: constant from one whole second to the next.
 
-Knows neither temperatures nor why; whoever wires the world asks the chamber's physics.
+Knows neither temperatures nor why; the code that wires the world asks the chamber's physics.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from simulators.imu.counter import Counts
 from simulators.truth import Array
 
 Lengths = NDArray[np.intp]
-"""Ticks of pieces of time that follow one another, (pieces,)."""
+"""Lengths of consecutive pieces of time in ticks, (pieces,)."""
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,10 @@ class Drift:
     lengths: Lengths
     sensor_gain: Array
     sensor_added: Array
-    """[rate]"""
+    """Addition to the sensor's output before its noise [rate]."""
     gain: Array
     added: Array
-    """[rate]"""
+    """Addition to the converter's output [rate]."""
 
     def sensed(self, bias: Array, through: Array) -> Array:
         """The sensor's own output (3, ticks) [rate] of b (3,) and a, (3, ticks) or (3, 1) where it is at rest."""
@@ -38,7 +38,7 @@ class Drift:
         return bias[:, None] + self._held(self.sensor_gain) * through + self._held(self.sensor_added)
 
     def convert(self, increments: Array, rate_hz: float) -> None:
-        """What the converter makes of increments (3, ticks) [rate·s], in place."""
+        """Apply the converter's gain and addition to increments (3, ticks) [rate·s], in place."""
         increments *= self._held(self.gain)
         increments += self._held(self.added / rate_hz)
 
@@ -48,13 +48,13 @@ class Drift:
 
 @dataclass(frozen=True)
 class Climate:
-    """What some ticks do to both triads, None: nothing; and what the unit's temperature sensors say meanwhile."""
+    """Effect of some ticks on both triads, None: nothing; and the codes of the unit's temperature sensors meanwhile."""
 
     gyro: Drift | None
     accelerometer: Drift
     codes: Counts
-    """(pieces, 5)"""
+    """Codes of the temperature sensors, (pieces, 5)."""
 
     def codes_at_ticks(self) -> Counts:
-        """Codes held at the sample rate, (ticks, 5)."""
+        """Repeat the codes at the sample rate, (ticks, 5)."""
         return np.repeat(self.codes, self.accelerometer.lengths, axis=0)

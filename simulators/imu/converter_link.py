@@ -22,14 +22,14 @@ Codes = Callable[[int, Array, Array], Array]
 """(channel, currents (n,) [mA], board temperatures (n,) [°C]) -> codes a cycle (n,), not yet whole."""
 CURRENT_CHANNELS = tuple(Channel(f"converter_{axis}", Quantity.SPECIFIC_FORCE, "count") for axis in AXES)
 FULL_SCALE = 2**15 - 1
-"""The converter has 16 bits; beyond them it stays at the end."""
+"""Full scale of the converter's 16 bits; beyond it the code is clipped."""
 
 
 class ConverterLink:
-    """Three channels of codes and the board's own thermometer."""
+    """Data link with three channels of codes and the board's own thermometer."""
 
     def __init__(self, truth: UnitTruth, clock: SimClock, launch: Callable[[], int], codes: Codes) -> None:
-        """`launch` says which power-up this is, 0 while the converter is off."""
+        """Connect to the clock; `launch` returns the number of the power-up, 0 while the converter is off."""
         self._clock, self._codes = clock, codes
         self._tapes = Tapes(clock, launch)
         thermometer = next(c for c in temperature_channels(truth) if c.name == "temperature_converter")
@@ -45,17 +45,17 @@ class ConverterLink:
         return self._clock.rate_hz
 
     def power_up(self, _launch: int) -> None:
-        """Begin a launch."""
+        """Begin a new launch at tick zero."""
         self._ticks = 0
 
     def power_down(self) -> None:
-        """End of the launch; recordings in progress find the converter gone."""
+        """End the launch; recordings in progress find the converter gone."""
         self._tapes.stop()
 
     def feel(self, ticks: int, current_ma: Callable[[], Array], lengths: Lengths, board_c: Array, sent: Counts) -> None:
-        """Some ticks: currents (ticks,) on demand, and pieces of so many ticks at board temperatures and codes sent.
+        """Pass some ticks: currents (ticks,) on demand, lengths of pieces, their board temperatures, and codes sent.
 
-        Codes are a function of current, temperature and moment alone, so none are made that nobody records.
+        Codes are a function of current, temperature and moment alone, so none are made while no recording runs.
         """
         self._ticks += ticks
         if not self._tapes.running:
@@ -81,7 +81,7 @@ class ConverterLink:
         return Stream(self._channels, self.rate_hz, start / self.rate_hz, blocks, station, launched_s)
 
     def checkpoint(self) -> dict[str, Any]:
-        """State to resume from."""
+        """State of the link, from which it can resume."""
         return {"ticks": self._ticks}
 
     def resume(self, launch: int, state: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""The counter at the end of a channel: from increments to whole pulses, nothing lost between them."""
+"""Counter at the end of a channel: from increments to whole pulses, nothing lost between them."""
 
 from math import ldexp
 
@@ -18,7 +18,7 @@ Counts = NDArray[np.int32]
 
 
 class Counter:
-    """Three counters. Reading j is ``⌊φ + Θ_j/LSB + d_j⌋``, a count the difference of two readings.
+    """Three angle or velocity counters. Reading j is ``⌊φ + Θ_j/LSB + d_j⌋``, a count the difference of two readings.
 
     The sum φ + Θ/LSB is kept in units of 2⁻³² pulse, so that it is exact in any grouping; the rounding of an increment
     to that unit is at most 4e-8 pulse a second at 400 Hz. Sums may wrap round: differences of 32-bit readings do not
@@ -41,12 +41,12 @@ class Counter:
 
     @property
     def phase(self) -> list[int]:
-        """The carried fraction of each channel, 0 … 2³² − 1."""
+        """Return the carried fraction of each channel, 0 … 2³² − 1."""
         return [int(p) & ((1 << FRACTION_BITS) - 1) for p in self._sum]
 
     @property
     def ahead(self) -> list[int]:
-        """By how many pulses the dither raised the last reading of each channel: 0, 1 or 2."""
+        """Number of pulses by which the dither raised the last reading of each channel: 0, 1 or 2."""
         return [int(a) for a in (self._reading - (self._sum >> FRACTION_BITS).astype(np.int32))]
 
     def resume(self, phase: list[int], ahead: list[int]) -> None:

@@ -1,4 +1,4 @@
-"""The unit's data link on a simulated bench: implements `procedures.bench.imu.Imu`."""
+"""Data link of the unit on a simulated bench: implements `procedures.bench.imu.Imu`."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,7 +16,7 @@ from simulators.truth import UnitTruth, temperature_channels, unit_channels
 
 
 class SimImu:
-    """A unit that counts from power-up to power-down, whether or not anybody reads it."""
+    """A unit that counts from power-up to power-down, whether or not a recording runs."""
 
     def __init__(
         self,
@@ -27,9 +27,9 @@ class SimImu:
         thermal: bool = False,
         block_s: float | None = None,
     ) -> None:
-        """`launch` says which power-up this is, 0 while the unit is off; `thermal`: it will be told its climate.
+        """Connect to the clock; `launch` returns the number of the power-up, 0 while the unit is off.
 
-        `block_s`: length of a recording's blocks instead of ten seconds.
+        `thermal`: the unit receives a climate; `block_s`: length of a recording's blocks instead of ten seconds.
         """
         self.truth = truth
         self._thermal = thermal
@@ -50,14 +50,14 @@ class SimImu:
         return self._clock.rate_hz
 
     def power_up(self, launch: int) -> None:
-        """Begin a launch: new run-to-run coefficients, noise from time zero."""
+        """Begin a new launch: new run-to-run coefficients, noise from time zero."""
         self._ticks = 0
         self._sensors = {
             name: TriadSensor(self.truth.triad(name), self.rate_hz, (self._seed, launch, name)) for name in TRIADS
         }
 
     def power_down(self) -> None:
-        """End of the launch; recordings in progress find the unit gone."""
+        """End the launch; recordings in progress find the unit gone."""
         self._sensors = {}
         self._tapes.stop()
 
@@ -100,7 +100,7 @@ class SimImu:
         return Stream(channels, self.rate_hz, start / self.rate_hz, blocks, station, launched_s)
 
     def sensor(self, triad: str) -> TriadSensor:
-        """A triad of the present launch. Raises `NotPowered`."""
+        """Return a triad of the present launch. Raises `NotPowered`."""
         self._tapes.need_power()
         return self._sensors[triad]
 

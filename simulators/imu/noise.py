@@ -31,7 +31,7 @@ MEMBERS_PER_DECADE = 2
 
 @dataclass(frozen=True)
 class GaussMarkovBank:
-    """Unit-variance members: `times_s` relaxation times (M,), `decay` over a cell, weights of a cell's mean."""
+    """Unit-variance Gauss-Markov members: relaxation times `times_s` (M,), `decay` over a cell, weights of its mean."""
 
     times_s: Array
     decay: Array
@@ -50,7 +50,7 @@ class GaussMarkovBank:
 def cell_mean(ratio: Array) -> tuple[Array, Array, Array]:
     """``e^{−r}``, h and the residue's variance of a unit Gauss-Markov process at r = Δ/τ.
 
-    Variance of the mean ``2(r − 1 + e^{−r})/r²`` less what the ends tell, ``2h²(1 + e^{−r})``; r/6 for small r.
+    Variance of the mean ``2(r − 1 + e^{−r})/r²`` less the ends' part of it, ``2h²(1 + e^{−r})``; r/6 for small r.
     """
     decay = np.exp(-ratio)
     weight = np.tanh(0.5 * ratio) / ratio
@@ -72,7 +72,7 @@ class TriadNoise:
     """Noise of one triad during one launch. Time goes forward only."""
 
     def __init__(self, truth: TriadTruth, rate_hz: float, key: tuple[int, int, str]) -> None:
-        """`key`: seed, launch number, triad's name."""
+        """Set up a triad's noise. `key`: seed, launch number, triad's name."""
         self.rate_hz = rate_hz
         self.cell_ticks = max(1, ceil(CELL_S * rate_hz))
         self.cell_s = self.cell_ticks / rate_hz
@@ -90,7 +90,7 @@ class TriadNoise:
 
     @property
     def block_ticks(self) -> int:
-        """Ticks of a canonical block."""
+        """Number of ticks of a canonical block."""
         return self._blocks.ticks
 
     def add_increments(self, total: Array, tick: int) -> None:
@@ -98,7 +98,7 @@ class TriadNoise:
         self._blocks.add_to(total, tick)
 
     def increments(self, tick: int, ticks: int) -> Array:
-        """That noise alone, shape (3, ticks) [rate·s]."""
+        """Return the noise alone, shape (3, ticks) [rate·s]."""
         total = np.zeros((3, ticks))
         self.add_increments(total, tick)
         return total
@@ -129,7 +129,7 @@ class TriadNoise:
         return {"block": self._start.block, "bank": self._start.bank.tolist(), "walk": self._start.walk.tolist()}
 
     def resume(self, state: dict[str, Any]) -> None:
-        """Go on from a checkpoint."""
+        """Go on from the state of a checkpoint."""
         bank = np.array(state["bank"], dtype=np.float64).reshape(-1, 3)
         self._next = SlowState(int(state["block"]), bank, np.array(state["walk"], dtype=np.float64))
         self._start = self._next
@@ -143,7 +143,7 @@ class TriadNoise:
         return self._streams[name].at(block)
 
     def _draws(self, process: str, shape: tuple[int, ...], block: int) -> Array:
-        """Standard normal, channel by channel, shape (*shape, 3)."""
+        """Draw standard normal numbers, channel by channel, shape (*shape, 3)."""
         return np.stack([self._rng(c, process, block).standard_normal(shape) for c in range(3)], axis=-1)
 
     def _first_state(self) -> SlowState:
@@ -154,7 +154,7 @@ class TriadNoise:
         return SlowState(0, bank, np.zeros(3))
 
     def _fill_block(self, block: int, noise: Array) -> None:
-        """Noise increments of one canonical block into `noise`, shape (3, ticks of a block)."""
+        """Write the noise increments of one canonical block to `noise`, shape (3, ticks of a block)."""
         slow_block, part = divmod(block, CELLS_PER_SLOW_BLOCK // CELLS_PER_WHITE_BLOCK)
         slow = self._slow_rates(slow_block)
         cells = slow[:, part * CELLS_PER_WHITE_BLOCK : (part + 1) * CELLS_PER_WHITE_BLOCK]
@@ -167,7 +167,7 @@ class TriadNoise:
         self._residue.add_block(block, noise)
 
     def _slow_rates(self, block: int) -> Array:
-        """Cell means of all slow processes in one slow block, shape (3, CELLS_PER_SLOW_BLOCK) [rate]."""
+        """Compute the cell means of all slow processes in one slow block, shape (3, CELLS_PER_SLOW_BLOCK) [rate]."""
         while self._slow_block != block:
             if self._next.block > block:
                 raise ValueError(f"noise block {block} has passed: time goes forward only")
@@ -229,7 +229,7 @@ class TriadNoise:
 
 
 class DitherResidue:
-    """What the notch filter leaves of the mechanical dither: ``A·sin(2πft + φ)`` on each channel's integrated output.
+    """Residue of the mechanical dither after the notch filter: ``A·sin(2πft + φ)`` on each channel's integrated output.
 
     φ is drawn anew for each launch. Seen at the ticks only, so a frequency above half the sample rate shows itself
     where it folds to. An increment is ``2A·sin(πf/r)·cos(2πf(k + ½)/r + φ)`` (tick k, rate r); within a block it is a

@@ -22,14 +22,14 @@ TRIADS = ("gyro", "accelerometer")
 
 @dataclass(frozen=True)
 class Coefficients:
-    """What is true of a triad during one launch. SI, *rate* as in `TriadTruth`; `bias` (3,), `matrix` (3, 3)."""
+    """True coefficients of a triad during one launch. SI, *rate* as in `TriadTruth`; `bias` (3,), `matrix` (3, 3)."""
 
     bias: Array
     matrix: Array
     asymmetry: Array
-    """Relative, (3,)."""
+    """Relative scale-factor asymmetry of each channel, (3,)."""
     quadratic: Array
-    """[1/rate], (3,)."""
+    """Quadratic coefficient of each channel [1/rate], (3,)."""
 
     def output(self, v: Array) -> Array:
         """Noise-free nominal output of inputs of shape (n, 3) [rate], as (3, n)."""
@@ -37,7 +37,7 @@ class Coefficients:
         return self.bias[:, None] + through + even
 
     def through(self, v: Array) -> Array:
-        """What inputs of shape (n, 3) put through without the bias, (3, n) [rate]."""
+        """Output for inputs of shape (n, 3) without the bias, (3, n) [rate]."""
         through, even = self._through(v)
         return through + even
 
@@ -49,7 +49,7 @@ class Coefficients:
 
 
 def launch_coefficients(truth: TriadTruth, seed: int, launch: int, triad: str) -> Coefficients:
-    """Coefficients of launch number `launch`: bias and each row of K move by their run-to-run draws."""
+    """Draw the coefficients of launch number `launch`: bias and each row of K move from run to run."""
     draw = keyed_generator(seed, launch, triad, "run to run").standard_normal(6)
     bias = np.array(truth.bias) + truth.bias_run_to_run_sd * draw[:3]
     factor = 1.0 + truth.scale_factor_run_to_run_sd_ppm * units.PPM * draw[3:]
@@ -62,10 +62,10 @@ def launch_coefficients(truth: TriadTruth, seed: int, launch: int, triad: str) -
 
 
 class TriadSensor:
-    """One triad during one launch: coefficients, noise, counter."""
+    """One triad during one launch, with coefficients, noise and counter."""
 
     def __init__(self, truth: TriadTruth, rate_hz: float, key: tuple[int, int, str]) -> None:
-        """`key`: seed, launch number, triad's name."""
+        """Begin a launch of the triad. `key`: seed, launch number, triad's name."""
         self.coefficients = launch_coefficients(truth, *key)
         self.noise = TriadNoise(truth, rate_hz, key)
         self._rate_hz = rate_hz
@@ -109,11 +109,11 @@ class TriadSensor:
         return self._rest[1]
 
     def checkpoint(self) -> dict[str, Any]:
-        """State to resume from, JSON-ready."""
+        """State of the triad to resume from, JSON-ready."""
         return {"phase": self.counter.phase, "ahead": self.counter.ahead, "noise": self.noise.checkpoint()}
 
     def resume(self, state: dict[str, Any]) -> None:
-        """Go on from a checkpoint."""
+        """Go on from the state of a checkpoint."""
         self.noise.resume(state["noise"])
         self.counter.resume(state["phase"], state["ahead"])
 

@@ -1,4 +1,4 @@
-"""Counts between the sensors that make them and the recordings that want them."""
+"""Buffers of counts between the sensors that make them and the recordings that read them."""
 
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ BLOCK_S = 10.0
 
 @dataclass
 class Tape:
-    """Counts that a recording wants and has not handed on yet: of its first channels, as many as it has."""
+    """Buffer of counts that a recording has not read yet: of its first channels, as many as it has."""
 
     columns: int
     blocks: list[Counts] = field(default_factory=list)
@@ -22,12 +22,12 @@ class Tape:
     broken: bool = False
 
     def put(self, counts: Counts) -> None:
-        """The next counts, (ticks, channels)."""
+        """Append the next counts, (ticks, channels)."""
         self.blocks.append(counts if counts.shape[1] == self.columns else np.array(counts[:, : self.columns]))
         self.held += len(counts)
 
     def take(self, count: int) -> Counts:
-        """The oldest counts, at most so many ticks."""
+        """Take the oldest counts, at most `count` ticks."""
         whole = np.concatenate(self.blocks) if len(self.blocks) != 1 else self.blocks[0]
         self.blocks = [whole[count:]] if len(whole) > count else []
         self.held = len(whole) - count
@@ -35,25 +35,25 @@ class Tape:
 
 
 class Tapes:
-    """The recordings of one data link that are being made."""
+    """The running recordings of one data link."""
 
     def __init__(self, clock: SimClock, launch: Callable[[], int], block_s: float | None = None) -> None:
-        """`launch` says which power-up this is, 0 while the unit is off; `block_s`: of blocks instead of `BLOCK_S`."""
+        """Connect to the clock; `launch` returns the power-up's number, 0: off; `block_s` replaces `BLOCK_S`."""
         self._clock, self._launch, self._block_s = clock, launch, block_s
         self.running: list[Tape] = []
 
     def stop(self) -> None:
-        """The unit lost its power: what runs is broken."""
+        """Break the running recordings, because the unit lost its power."""
         for tape in self.running:
             tape.broken = True
 
     def need_power(self, tape: Tape | None = None) -> None:
-        """Raises `NotPowered`, also for a recording through which the unit was switched off."""
+        """Check that the unit has power. Raises `NotPowered`, also if it was off at any time during the recording."""
         if self._launch() == 0 or (tape is not None and tape.broken):
             raise NotPowered("the unit is switched off")
 
     async def blocks(self, samples: int, start: int, columns: int) -> AsyncIterator[Counts]:
-        """Blocks of a recording that began at tick `start`; time passes while they are read."""
+        """Yield the blocks of a recording that began at tick `start`; time passes while they are read."""
         if self._clock.ticks != start:
             raise DeviceFault("samples were lost: time passed between the recording's beginning and its first reading")
         tape = Tape(columns)

@@ -1,1 +1,1 @@
-"""The person at a simulated bench: what no device can do is done when asked for, in some minutes of bench time."""
+"""Simulated person at a bench, who does on request what no device can, in some minutes of bench time."""

@@ -14,7 +14,7 @@ from simulators.truth import Array, OperatorTruth, keyed_generator
 
 
 def seat_lean_rad(truth: OperatorTruth, seed: int, setting: int) -> Array:
-    """How the unit leans in its seat after setting number `setting` (1, 2, …): rotation vector in its axes, (3,)."""
+    """Lean of the unit in its seat after setting `setting` (1, 2, …): rotation vector in its axes, (3,) [rad]."""
     return truth.fixture_tilt_sd_arcsec * units.ARCSEC * keyed_generator(seed, "seat", block=setting).standard_normal(3)
 
 
@@ -30,14 +30,14 @@ class SimOperator:
         door: Callable[[bool], None],
         place: Callable[[TableAngles, Array], None],
     ) -> None:
-        """`is_on`: whether the unit has power; `door(open)`; `place(angles, lean)`: the unit stands so from now on."""
+        """Wire the operator to the bench. `is_on`: the unit has power; `door(open)`; `place(angles, lean)`: seat it."""
         self._truth, self._seed, self._clock = truth, seed, clock
         self._is_on, self._door, self._place = is_on, door, place
         self.settings = 0
-        """How often the unit was set by hand."""
+        """Number of times that the unit was set by hand."""
 
     async def set_by_hand(self, angles: TableAngles, request: str) -> None:
-        """Set the unit; see the port. The words of `request` are for a person's eye.
+        """Set the unit by hand; see the port. The words of `request` are meant for a person.
 
         Raises `DeviceFault` while the unit is on or the table moves, `OutOfRange`. Even cancelled it closes the door.
         """
@@ -57,9 +57,9 @@ class SimOperator:
             raise DeviceFault("the unit is on: it is switched off before it is set by hand")
 
     def checkpoint(self) -> dict[str, Any]:
-        """State to resume from."""
+        """State of the operator, from which it can resume."""
         return {"settings": self.settings}
 
     def resume(self, state: dict[str, Any]) -> None:
-        """Go on from a checkpoint."""
+        """Go on from the state of a checkpoint."""
         self.settings = int(state["settings"])

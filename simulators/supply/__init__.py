@@ -1,1 +1,1 @@
-"""The simulated supply."""
+"""Simulated power supply of the unit."""

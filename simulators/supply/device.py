@@ -1,4 +1,4 @@
-"""A supply that counts the unit's launches: implements `procedures.bench.supply.Supply`."""
+"""Supply that counts the unit's launches: implements `procedures.bench.supply.Supply`."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,7 +14,7 @@ class SimSupply:
         self._power_down: Callable[[], None] = lambda: None
 
     def connect(self, power_up: Callable[[int], None], power_down: Callable[[], None]) -> None:
-        """What is called when the unit gets and loses its power."""
+        """Register the functions to call when the unit gets and loses its power."""
         self._power_up = power_up
         self._power_down = power_down
 
@@ -23,14 +23,14 @@ class SimSupply:
         return self.launches if self._on else 0
 
     async def switch_on(self) -> None:
-        """Power to the unit: a new launch, unless it is on."""
+        """Switch the unit on: a new launch, unless it is on."""
         if not self._on:
             self._on = True
             self.launches += 1
             self._power_up(self.launches)
 
     async def switch_off(self) -> None:
-        """No power to the unit."""
+        """Switch the unit's power off."""
         if self._on:
             self._on = False
             self._power_down()
@@ -43,7 +43,7 @@ class SimSupply:
         await self.switch_off()
 
     def checkpoint(self) -> dict[str, Any]:
-        """State to resume from."""
+        """State of the supply, from which it can resume."""
         return {"launches": self.launches, "on": self._on}
 
     def resume(self, state: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""What is true of the simulated world: values, the files they live in, and chance keyed by seed."""
+"""True values of the simulated world, the files that hold them, and random numbers keyed by seed."""
 
 from simulators.truth.chance import KeyedBlocks, keyed_generator
 from simulators.truth.data_sheet import declared_unit, temperature_channels, unit_channels

@@ -1,4 +1,4 @@
-"""Chance, keyed: each number is a function of the seed and of what it is for, never of what was drawn before."""
+"""Random numbers by key: each is a function of the seed and of its purpose, never of what was drawn before."""
 
 from hashlib import blake2b
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 
 def keyed_generator(seed: int, *labels: object, block: int = 0) -> np.random.Generator:
-    """A generator of its own for (seed, labels, block).
+    """Return an independent generator for (seed, labels, block).
 
     Philox-4x64: the key is a hash of seed and labels, the block number stands in the highest word of the counter,
     so that 2^192 draws lie between two blocks.

@@ -1,4 +1,4 @@
-"""What a laboratory would know of a simulated unit beforehand: its channels and its noise, as they truly are."""
+"""Declaration of a simulated unit, as a laboratory would know it beforehand: its channels and its true noise."""
 
 from procedures.core import units
 from procedures.core.noise import NoiseCoefficients
@@ -9,7 +9,7 @@ from simulators.truth.values import TriadTruth, UnitTruth
 
 
 def unit_channels(truth: UnitTruth) -> tuple[Channel, ...]:
-    """Six channels of increments, gyros first; the nominal scale of each is the weight of its pulse."""
+    """Describe six channels of increments, gyros first; the nominal scale of each is the weight of its pulse."""
     gyros = zip(GYRO, truth.gyro.pulse, strict=True)
     accelerometers = zip(ACCELEROMETER, truth.accelerometer.pulse, strict=True)
     return (
@@ -19,13 +19,13 @@ def unit_channels(truth: UnitTruth) -> tuple[Channel, ...]:
 
 
 def temperature_channels(truth: UnitTruth) -> tuple[Channel, ...]:
-    """Five channels in the order of `THERMOMETERS`; the scale of each is the step of its sensor [°C]."""
+    """Describe five channels in the order of `THERMOMETERS`; the scale of each is the step of its sensor [°C]."""
     sensors = zip(THERMOMETERS, truth.thermal.thermometers, strict=True)
     return tuple(Channel(f"temperature_{name}", Quantity.TEMPERATURE, "degC", t.step_c) for name, t in sensors)
 
 
 def declared_unit(truth: UnitTruth, averaging_time_s: float = 70.0, sample_rate_hz: float | None = None) -> Unit:
-    """The unit's data sheet: channels, noise coefficients and run-to-run stability as they truly are."""
+    """Build the unit's data sheet: channels, noise coefficients and run-to-run stability as they truly are."""
 
     def record(triad: TriadTruth) -> TriadRecord:
         columns = zip(

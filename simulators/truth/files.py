@@ -1,4 +1,4 @@
-"""Truth files: TOML in the units people read, each key with its unit, each refusal with field, value and range."""
+"""Truth files in TOML, in the units people read: each key with its unit, each refusal with field, value and range."""
 
 from dataclasses import fields, replace
 from importlib.resources import files
@@ -105,7 +105,7 @@ def _triad(name: str, table: Table) -> TriadTruth:
 
 
 def parse_unit(text: str) -> UnitTruth:
-    """A unit's truth from TOML text. Raises `TruthError`."""
+    """Parse a unit's truth from TOML text. Raises `TruthError`."""
     document = read_document(text)
     check_keys("unit", document, {"serial", "sample_rate_hz", "thermal", *KEYS}, {"serial", *KEYS})
     triads = {name: _triad(name, document[name]) for name in KEYS}
@@ -148,7 +148,7 @@ def _description(table: Table) -> BenchDescription:
 
 
 def _axis(where: str, table: Any) -> AxisLimits:
-    """Four numbers, and whether the axis has slip rings; none where it is not said."""
+    """Read an axis: four numbers, and whether it has slip rings; it has none where the key is absent."""
     continuous = table.get("continuous", False) if isinstance(table, dict) else False
     if not isinstance(continuous, bool):
         raise TruthError(f"{where}.continuous = {continuous!r} must be true or false")
@@ -158,10 +158,10 @@ def _axis(where: str, table: Any) -> AxisLimits:
 
 
 def parse_bench(text: str) -> BenchTruth:
-    """A bench's truth from TOML text. Raises `TruthError`.
+    """Parse a bench's truth from TOML text. Raises `TruthError`.
 
-    Without `site_truth` the declared site is the true one; chamber and operator are as in the code where nothing is
-    said of them. A `description` without a chamber is a bench without one.
+    Without `site_truth` the declared site is the true one; chamber and operator keep the defaults of the code where the
+    text has no values. A `description` without a chamber is a bench without one.
     """
     document = read_document(text)
     check_keys("bench", document, {"description", *BENCH_TRUTHS}, {"description"})
@@ -179,7 +179,7 @@ def parse_bench(text: str) -> BenchTruth:
 
 
 def _faults(tables: Any) -> tuple[ChamberFault, ...]:
-    """Named faults of the chamber, each with the moment of bench time from which it is there."""
+    """Read the named faults of the chamber, each with the bench time at which it begins."""
     if not isinstance(tables, list):
         raise TruthError(f"chamber_faults = {tables!r} must be a list of tables")
     found: list[ChamberFault] = []
@@ -193,22 +193,22 @@ def _faults(tables: Any) -> tuple[ChamberFault, ...]:
 
 
 def load_unit(path: Path) -> UnitTruth:
-    """A unit's truth from a file."""
+    """Load a unit's truth from a file."""
     return parse_unit(path.read_text(encoding="utf-8"))
 
 
 def load_bench(path: Path) -> BenchTruth:
-    """A bench's truth from a file."""
+    """Load a bench's truth from a file."""
     return parse_bench(path.read_text(encoding="utf-8"))
 
 
 def default_unit() -> UnitTruth:
-    """The unit that is shipped, "SIM-0001"."""
+    """Return the shipped unit, "SIM-0001"."""
     return parse_unit(_shipped("default_unit.toml"))
 
 
 def default_bench() -> BenchTruth:
-    """The bench that is shipped, "sim"."""
+    """Return the shipped bench, "sim"."""
     return parse_bench(_shipped("default_bench.toml"))
 
 

@@ -1,4 +1,4 @@
-"""Units and tables drawn by a seed: as many different ones as a night or a Monte Carlo needs."""
+"""Units and tables drawn by a seed: as many different ones as a Monte Carlo run needs."""
 
 import numpy as np
 
@@ -23,7 +23,7 @@ def _matrix(rng: np.random.Generator, diagonal: float, diagonal_sd: float, cross
 
 
 def _redraw(rng: np.random.Generator, base: TriadTruth, bias: Vector, matrix: Matrix) -> TriadTruth:
-    """Another unit of the same kind: its own bias and matrix; noise coefficients within ±20 % of the kind's.
+    """Draw a unit of the same kind: its own bias and matrix; noise coefficients within ±20 % of the kind's.
 
     What decays from power-up is left out: populations are judged against the theory of noise that is stationary.
     """
@@ -49,7 +49,7 @@ def _redraw(rng: np.random.Generator, base: TriadTruth, bias: Vector, matrix: Ma
 
 
 def random_unit_truth(seed: int) -> UnitTruth:
-    """A unit of the default's kind, drawn: spreads are those between the channels of thesis tables 5.1 and 5.2.
+    """Draw a unit of the default's kind: spreads are those between the channels of thesis tables 5.1 and 5.2.
 
     Gyro: bias 0.1 deg/h, scale 0.3 %, cross terms 0.004. Accelerometer: bias 0.1 m/s², scale 0.84 ± 3 %, cross 0.004.
     """
@@ -69,7 +69,7 @@ def random_table_truth(
     pointing_sd_arcsec: float = 0.0,
     level_sd_arcsec: float = 0.0,
 ) -> TableTruth:
-    """A table drawn from its declared standard uncertainties, all flaws independent and normal."""
+    """Draw a table from its declared standard uncertainties, all flaws independent and normal."""
     draw = keyed_generator(seed, "table truth").standard_normal(5)
     return TableTruth(
         outer_middle_nonorthogonality_arcsec=float(orthogonality_sd_arcsec * draw[0]),

@@ -25,7 +25,7 @@ class Key:
 
 
 def check_keys(where: str, table: Table, known: set[str], needed: set[str]) -> None:
-    """No key that is not known, and every one that is needed."""
+    """Check the keys of a table: no unknown key, and every required one."""
     for key in table:
         if key not in known:
             raise TruthError(f"{where}.{key} = {table[key]!r} is not known; known are {', '.join(sorted(known))}")
@@ -34,7 +34,7 @@ def check_keys(where: str, table: Table, known: set[str], needed: set[str]) -> N
 
 
 def read_value(where: str, value: Any, key: Key) -> Any:
-    """A value of a key in SI, each number inside the key's range."""
+    """Read the value of a key in SI, each number inside the key's range."""
     if key.shape == "flag":
         if not isinstance(value, bool):
             raise TruthError(f"{where} = {value!r} must be true or false")
@@ -51,7 +51,7 @@ def read_value(where: str, value: Any, key: Key) -> Any:
 
 
 def read_record(kind: type[Any], where: str, table: Any, needed: set[str]) -> Any:
-    """A flat record of numbers from a table of the same names."""
+    """Read a flat record of numbers from a table of the same names."""
     numbers = _numbers(where, table, {f.name for f in fields(kind)}, needed)
     try:
         return kind(**numbers)
@@ -60,7 +60,7 @@ def read_record(kind: type[Any], where: str, table: Any, needed: set[str]) -> An
 
 
 def read_changes(default: T, where: str, table: Any, keys: Mapping[str, Key] | None = None) -> T:
-    """A record with what a table says of it, the rest as in another; `keys`: None: flat numbers by the same names."""
+    """Replace the values of a record that a table gives; `keys`: None: flat numbers by the same names."""
     if keys is None:
         changes = _numbers(where, table, {f.name for f in fields(cast(Any, default))}, set())
     else:
@@ -84,7 +84,7 @@ def _table(where: str, table: Any) -> Table:
 
 
 def read_document(text: str) -> dict[str, Any]:
-    """The tables of a TOML text."""
+    """Parse the tables of a TOML text."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as refusal:
@@ -92,13 +92,13 @@ def read_document(text: str) -> dict[str, Any]:
 
 
 def record_lines(name: str, record: Any) -> list[str]:
-    """A flat record as a table; what is infinite, "never", is left out."""
+    """Write a flat record as a table; infinite values, "never", are left out."""
     values = {f.name: getattr(record, f.name) for f in fields(record)}
     return ["", f"[{name}]", *(f"{k} = {_number_text(v)}" for k, v in values.items() if not isinf(v))]
 
 
 def keyed_lines(name: str, record: Any, keys: Mapping[str, Key]) -> list[str]:
-    """A record as a table of its keys, in their units."""
+    """Write a record as a table of its keys, in their units."""
     return ["", f"[{name}]", *(f"{k} = {_value_text(getattr(record, v.attribute), v.size)}" for k, v in keys.items())]
 
 

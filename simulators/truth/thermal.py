@@ -1,4 +1,4 @@
-"""What is true of the chamber, of the unit's heat, of its thermometers, and of how it feels temperature.
+"""True values of the chamber, of the unit's heat and thermometers, and of the temperature's effect on the unit.
 
 Knows numbers and their allowed ranges. Thesis 4.2.1 gives the chamber's make, its ±1 °C over the place and ±0.5 °C in
 time; everything else of chamber and heat is ours, after a 1 m³ chamber and a unit of some 12 kg. Temperatures in °C.
@@ -11,14 +11,14 @@ from simulators.truth.chance import keyed_generator
 from simulators.truth.ranges import ZERO, TruthError, Vector, check_fields, within
 
 REFERENCE_C = 20.0
-"""Node temperature at which nothing of the temperature's effect is left: the thesis's normal conditions (3.2.2)."""
+"""Node temperature at which every effect of temperature is zero: the thesis's normal conditions (3.2.2) [°C]."""
 NODES = ("air", "walls", "case", "converter", "accelerometer_block", "gyro_x", "gyro_y", "gyro_z")
 THERMOMETERS = ("case", "converter", "gyro_x", "gyro_y", "gyro_z")
 
 
 @dataclass(frozen=True)
 class ChamberTruth:
-    """The chamber: its heat, its controller, its flaws."""
+    """True values of the chamber: its heat, its controller, its flaws."""
 
     ambient_c: float = 22.0
     air_j_k: float = 8.0e3
@@ -28,25 +28,25 @@ class ChamberTruth:
     walls_to_ambient_w_k: float = 5.0
     heating_w: float = 4000.0
     cooling_w: float = 4000.0
-    """Most that the plant can bring and take [W]; too little of it, and a set point is never reached."""
+    """Largest power that the plant can heat and cool with [W]; with too little, a set point is never reached."""
     proportional_w_k: float = 400.0
     integral_s: float = 300.0
     least_c: float = -60.0
     most_c: float = 100.0
-    """Range of set points."""
+    """Lowest and highest set point [°C]."""
     ramp_c_min: float = 5.0
     """Fastest ramp of the set point, up and down."""
     limiter_low_c: float = -70.0
     limiter_high_c: float = 110.0
-    """The over-temperature limiter's own thermostat cuts the plant off beyond them and stays so."""
+    """Limits of the over-temperature limiter's own thermostat, which cuts the plant off for good beyond them."""
     fluctuation_c: float = 0.5
-    """Air at the unit's place wanders within ± this (thesis: WEISS 1000)."""
+    """Amplitude within which the air at the unit's place wanders (thesis: WEISS 1000)."""
     fluctuation_s: float = 60.0
-    """Correlation time of that."""
+    """Correlation time of the air's wandering."""
     place_offset_c: float = 0.6
     """Air at the unit's place less that at the controller's sensor; within ±1 °C (thesis: WEISS 1000)."""
     door_open_w_k: float = 150.0
-    """Air to the room through the open door."""
+    """Conductance from the air to the room through the open door."""
     control_sensor_noise_c: float = 0.01
 
     def __post_init__(self) -> None:
@@ -70,7 +70,7 @@ CHAMBER_FAULTS = ("heater_stuck", "control_sensor_stuck", "cooling_lost", "heati
 
 @dataclass(frozen=True)
 class ChamberFault:
-    """Something of the chamber breaks at a moment of bench time and stays broken."""
+    """A fault of the chamber that begins at a moment of bench time and stays."""
 
     name: str
     from_s: float
@@ -89,7 +89,7 @@ class NetworkTruth:
     converter_j_k: float = 150.0
     accelerometer_block_j_k: float = 800.0
     gyro_j_k: float = 1500.0
-    """Each of three."""
+    """Heat capacity of each of the three gyro blocks [J/K]."""
     air_to_case_w_k: float = 8.0
     case_to_converter_w_k: float = 0.25
     """With its capacity a lag of 600 s behind the case: the thermometers of thesis fig. 3.15."""
@@ -114,12 +114,12 @@ class ThermometerTruth:
     offset_c: float = 0.0
     lag_s: float = 5.0
     noise_c: float = 0.03
-    """Standard deviation of one reading."""
+    """Standard deviation of the noise of one reading."""
     step_c: float = 0.0625
     stuck_from_s: float = float("inf")
-    """From this moment of bench time it sends its last code for ever."""
+    """Bench time from which the sensor sends its last code for ever."""
     disconnected_from_s: float = float("inf")
-    """From this moment it sends `DISCONNECTED_CODE`."""
+    """Bench time from which the sensor sends `DISCONNECTED_CODE`."""
 
     def __post_init__(self) -> None:
         check_fields("thermometer", self, {"offset_c": (-50.0, 50.0), "lag_s": (0.0, 3600.0), "noise_c": (0.0, 10.0)})
@@ -130,7 +130,7 @@ class ThermometerTruth:
 
 @dataclass(frozen=True)
 class AccelerometerThermalTruth:
-    """How one accelerometer channel feels temperature, as departures from `REFERENCE_C` of two nodes.
+    """Effect of temperature on one accelerometer channel, as departures from `REFERENCE_C` of two nodes.
 
     A force-rebalance pendulum answers with the current that its torquer needs: force over torquer constant. So
     ``V = f/(1 + A) − B`` with A the relative change of the torquer's constant and B the balancing rest force, each
@@ -147,7 +147,7 @@ class AccelerometerThermalTruth:
     bias_dynamic: tuple[float, float] = (0.0, 0.0)
     """B's d1 [m/s²/°C] and d2 [m/s²/°C²]."""
     block_share: float = 0.0
-    """Which structure: 0 the case, where the sensor is, 1 the accelerometer block inside, which has none."""
+    """Structure that counts: 0 the case, where the sensor is, 1 the accelerometer block inside, which has none."""
 
     def __post_init__(self) -> None:
         within("accelerometer_thermal.block_share", self.block_share, 0.0, 1.0)
@@ -161,10 +161,10 @@ class ConverterTruth:
     """One channel of the signal converter: ``code = K0·Fc(c)·I + N0 + Fs(c)`` a cycle (thesis 3.8–3.13), c as above."""
 
     codes_a_ma: float = 2184.0
-    """K0: 16 bits over ±15 mA [1/mA]."""
+    """Codes per current K0 [1/mA]: 16 bits over ±15 mA."""
     zero_code: float = 12.0
     scale_drift: tuple[float, float] = (1.5e-5, 2.0e-8)
-    """Fc − 1: [1/°C] and [1/°C²]. Ours: a voltage reference of 15 ppm/°C."""
+    """Drift of the scale, Fc − 1: [1/°C] and [1/°C²]. Ours: a voltage reference of 15 ppm/°C."""
     zero_drift: tuple[float, float] = (0.02, 1.0e-4)
     """Fs [codes/°C] and [codes/°C²]. Ours."""
 
@@ -188,11 +188,11 @@ _BETA_DYNAMIC = ((-7.208e-5, 3.484e-10), (-1.3906e-4, -3.3388e-8), (1.1243e-5, 2
 _ALPHA_STATIC = ((4.153e-6, 3.3265e-9), (-5.010e-5, 8.053e-9), (-5.6175e-6, 8.2675e-9))
 _ALPHA_DYNAMIC = ((-6.0141e-5, 1.6292e-8), (-5.3030e-5, 1.6158e-8), (-5.6567e-5, 1.6626e-8))
 SPAN_C = 40.0
-"""From the reference to −20 and to +60 °C."""
+"""Spans from the reference to −20 and to +60 °C."""
 
 
 def default_accelerometers() -> tuple[AccelerometerThermalTruth, AccelerometerThermalTruth, AccelerometerThermalTruth]:
-    """The default channels; see the comment above for what is the thesis's and what ours."""
+    """Build the default channels; see the comment above for what is the thesis's and what ours."""
     found: list[AccelerometerThermalTruth] = []
     for (cold, hot), dynamic, still, moving in zip(_BEFORE, _BETA_DYNAMIC, _ALPHA_STATIC, _ALPHA_DYNAMIC, strict=True):
         linear = (hot + cold) / 3.0 / (2.0 * SPAN_C) - dynamic[0]
@@ -203,7 +203,7 @@ def default_accelerometers() -> tuple[AccelerometerThermalTruth, AccelerometerTh
 
 @dataclass(frozen=True)
 class UnitThermalTruth:
-    """All that temperature is to one unit."""
+    """True values of temperature and its effects for one unit."""
 
     network: NetworkTruth = field(default_factory=NetworkTruth)
     accelerometers: tuple[AccelerometerThermalTruth, AccelerometerThermalTruth, AccelerometerThermalTruth] = field(
@@ -222,7 +222,7 @@ class UnitThermalTruth:
         ThermometerTruth(offset_c=-0.5),
         ThermometerTruth(offset_c=0.1),
     )
-    """In the order of `THERMOMETERS`."""
+    """Sensors in the order of `THERMOMETERS`."""
 
     def __post_init__(self) -> None:
         if len(self.thermometers) != len(THERMOMETERS):
@@ -230,11 +230,11 @@ class UnitThermalTruth:
 
 
 def random_thermal_truth(seed: int) -> UnitThermalTruth:
-    """Another unit of the default's kind.
+    """Draw another unit of the default's kind.
 
     Each coefficient times a normal number of mean 1 and spread 0.3, each β with a spread of 1e-4 m/s²/°C besides;
-    thermometers' offsets of 0.5 °C, the network within ±20 %, lags within ±1 %: a second of lag that nobody knows of
-    would move the linear coefficients by several of their uncertainties.
+    thermometers' offsets of 0.5 °C, the network within ±20 %, lags within ±1 %: an unknown lag of one second would move
+    the linear coefficients by several of their uncertainties.
     """
     rng, base = keyed_generator(seed, "thermal truth"), UnitThermalTruth()
 

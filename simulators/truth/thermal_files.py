@@ -1,4 +1,4 @@
-"""A unit's heat in its truth file: ``[thermal.…]``, all of it optional; what is not said is as in `thermal`.
+"""Thermal part of a unit's truth file: ``[thermal.…]``, all of it optional; absent values are as in `thermal`.
 
 Pairs are a linear and a square term, of the named unit for each °C and for each °C² from the reference temperature.
 """
@@ -29,11 +29,11 @@ CONVERTER_KEYS = {
     "zero_drift_codes": Key("zero_drift", 1.0, -1e4, 1e4, "pair"),
 }
 GYRO_KEYS = {"fault_residue_deg_h": Key("fault_residue_rad_s_c", units.DEG_PER_HOUR, -1e4, 1e4)}
-"""For each °C: what a failing perimeter control lets through."""
+"""Residue that a failing perimeter control lets through, for each °C."""
 
 
 def read_thermal(table: Any) -> UnitThermalTruth:
-    """The truth of a table ``thermal``. Raises `TruthError`."""
+    """Read the truth of a table ``thermal``. Raises `TruthError`."""
     if not isinstance(table, dict):
         raise TruthError(f"thermal = {table!r} must be a table")
     given, default = cast(Mapping[str, Any], table), UnitThermalTruth()
@@ -59,7 +59,7 @@ def read_thermal(table: Any) -> UnitThermalTruth:
 
 
 def thermal_lines(truth: UnitThermalTruth) -> list[str]:
-    """The same back to text."""
+    """Write the thermal truth back to lines of text."""
     lines = record_lines("thermal.network", truth.network)
     for name, one in zip(_names("accelerometer", AXES), truth.accelerometers, strict=True):
         lines += keyed_lines(f"thermal.{name}", one, ACCELEROMETER_KEYS)

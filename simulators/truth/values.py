@@ -1,4 +1,4 @@
-"""The truth of one simulated bench and one simulated unit, as frozen values.
+"""True values of one simulated bench and one simulated unit, as frozen values.
 
 Knows numbers and their allowed ranges; knows neither files nor motion.
 """
@@ -16,7 +16,7 @@ from simulators.truth.thermal import ChamberFault, ChamberTruth, UnitThermalTrut
 
 @dataclass(frozen=True)
 class SiteTruth:
-    """What gravity and the Earth's rotation really are on the bench."""
+    """True gravity and true rotation of the Earth at the bench."""
 
     latitude_deg: float
     gravity_m_s2: float
@@ -33,24 +33,24 @@ class SiteTruth:
 
 @dataclass(frozen=True)
 class TableTruth:
-    """How the table differs from an ideal one. All angles in arcsec; all zero is the ideal table.
+    """Deviations of the table from an ideal one. All angles in arcsec; all zero is the ideal table.
 
     With ``R_a(φ)`` a right-hand turn about axis a, ``W`` the wobble of an axis and B the base, the attitude is
     ``rot_enu_b = B · W_o·R_y(outer) · R_x(ε_om) · W_m·R_z(middle) · R_y(ε_mi) · W_i·R_x(inner)``.
     """
 
     outer_middle_nonorthogonality_arcsec: float = 0.0
-    """ε_om: the middle axis z is turned by it about x; its angle with the outer axis is 90° + ε_om."""
+    """Angle ε_om: the middle axis z is turned by it about x; its angle with the outer axis is 90° + ε_om."""
     middle_inner_nonorthogonality_arcsec: float = 0.0
-    """ε_mi: the inner axis x is turned by it about y; its angle with the middle axis is 90° + ε_mi."""
+    """Angle ε_mi: the inner axis x is turned by it about y; its angle with the middle axis is 90° + ε_mi."""
     base_tilt_north_arcsec: float = 0.0
-    """The outer axis leans by it to the north."""
+    """Tilt of the outer axis to the north."""
     base_tilt_east_arcsec: float = 0.0
-    """The outer axis leans by it to the east."""
+    """Tilt of the outer axis to the east."""
     azimuth_error_arcsec: float = 0.0
     """True heading of x at zero angles minus the declared azimuth, clockwise from north."""
     pointing_sd_arcsec: float = 0.0
-    """Each axis stops this far (standard deviation) from what its encoder says, anew at each move."""
+    """Standard deviation by which each axis stops off its encoder's reading, drawn anew at each move."""
     outer_wobble_arcsec: float = 0.0
     """The axis sways in its bearing by amplitude·sin(angle): outer about z, middle about x, inner about y."""
     middle_wobble_arcsec: float = 0.0
@@ -74,10 +74,10 @@ class TableTruth:
 
 @dataclass(frozen=True)
 class OperatorTruth:
-    """How well and how fast the person at the bench sets the unit by hand. Ours."""
+    """Accuracy and speed of the person at the bench who sets the unit by hand. Ours."""
 
     fixture_tilt_sd_arcsec: float = 300.0
-    """The seat in a chamber is a manual table: about each of its axes the unit leans by so much, anew each time."""
+    """Standard deviation of the unit's lean about each axis of its seat, a manual table, drawn anew each time."""
     set_by_hand_s: float = 300.0
     """Bench time from the door's opening to its closing; the unit is set halfway."""
 
@@ -94,7 +94,7 @@ class CurrentSourceTruth:
     gain_error_ppm: float = 4.0
     zero_error_ma: float = 5e-5
     noise_ma: float = 2e-4
-    """Standard deviation within one cycle of the converter."""
+    """Standard deviation of the noise within one cycle of the converter."""
 
     def __post_init__(self) -> None:
         ranges = {"gain_error_ppm": (-1e5, 1e5), "zero_error_ma": (-1.0, 1.0), "noise_ma": (0.0, 1.0)}
@@ -103,7 +103,7 @@ class CurrentSourceTruth:
 
 @dataclass(frozen=True)
 class BenchTruth:
-    """A bench: what is true of its site, table, chamber and operator, and what its laboratory declares of them.
+    """True values of a bench's site, table, chamber and operator, and the description that its laboratory declares.
 
     A description without a chamber is a bench without one, whatever `chamber` says.
     """
@@ -137,44 +137,44 @@ class TriadTruth:
     """
 
     bias: Vector
-    """b [rate]."""
+    """Bias b of each channel [rate]."""
     matrix: Matrix
-    """K, output per input, dimensionless."""
+    """Matrix K, output per input, dimensionless."""
     quantization: Vector
-    """Q [rate·s]: standard deviation of a reading's whole error; the pulse follows, see `pulse`."""
+    """Quantization Q [rate·s]: standard deviation of a reading's whole error; the pulse follows, see `pulse`."""
     random_walk: Vector = ZERO
-    """N [rate·√s]."""
+    """Random walk coefficient N [rate·√s]."""
     bias_instability: Vector = ZERO
-    """B [rate]."""
+    """Bias instability coefficient B [rate]."""
     rate_random_walk: Vector = ZERO
-    """K_rrw [rate/√s]."""
+    """Rate random walk coefficient K_rrw [rate/√s]."""
     rate_ramp: Vector = ZERO
-    """R [rate/s]."""
+    """Rate ramp coefficient R [rate/s]."""
     startup: Vector = ZERO
     """Amplitude of the start-up transient [rate]."""
     startup_time_s: float = 200.0
     self_heating_1: Vector = ZERO
     """Self-heating as thesis 3.1.3 fits it, ``A₁·exp(−t/T₁) + A₂·exp(−t/T₂)`` from power-up: A₁ [rate]."""
     self_heating_1_time_s: float = 1200.0
-    """T₁."""
+    """Time constant T₁ of the first self-heating [s]."""
     self_heating_2: Vector = ZERO
-    """A₂ [rate]."""
+    """Amplitude A₂ of the second self-heating [rate]."""
     self_heating_2_time_s: float = 5400.0
-    """T₂."""
+    """Time constant T₂ of the second self-heating [s]."""
     dithered: bool = True
-    """Whether a triangular dither of one pulse either way precedes the counter, a new one at each reading."""
+    """True where a triangular dither of one pulse either way precedes the counter, a new one at each reading."""
     dither_residue: Vector = ZERO
     """Amplitude of the mechanical dither's residue on the integrated output, after the notch filter [rate·s]."""
     dither_frequency_hz: Vector = ZERO
-    """Its frequency; above half the sample rate it is seen folded."""
+    """Frequency of the mechanical dither [Hz]; above half the sample rate it appears folded."""
     scale_factor_asymmetry_ppm: Vector = ZERO
-    """Scale factor for positive less that for negative input."""
+    """Difference of the scale factors for positive and negative input."""
     scale_factor_nonlinearity_ppm: Vector = ZERO
-    """Quadratic term: relative change of the output at the reference input."""
+    """Relative change of the output at the reference input by the quadratic term."""
     nonlinearity_reference: float = units.STANDARD_GRAVITY
-    """The reference input [rate]."""
+    """Reference input of the nonlinearity [rate]."""
     bias_run_to_run_sd: float = 0.0
-    """[rate]."""
+    """Standard deviation of the bias from run to run [rate]."""
     scale_factor_run_to_run_sd_ppm: float = 0.0
     flicker_band_s: tuple[float, float] = (0.5, 1.0e5)
     """Shortest and longest relaxation time of the bias instability."""
@@ -220,7 +220,7 @@ class TriadTruth:
 
     @property
     def transients(self) -> tuple[tuple[Vector, float], ...]:
-        """All that decays from power-up: amplitudes [rate] and times [s] of start-up and self-heating."""
+        """List everything that decays from power-up: amplitudes [rate] and times [s] of start-up and self-heating."""
         return (
             (self.startup, self.startup_time_s),
             (self.self_heating_1, self.self_heating_1_time_s),
@@ -230,7 +230,7 @@ class TriadTruth:
 
 @dataclass(frozen=True)
 class UnitTruth:
-    """One unit: who it is, how often it sends, its two triads (the nominal scale of a channel is its pulse), its heat.
+    """True values of one unit: serial, sample rate, two triads (a channel's nominal scale is its pulse) and heat.
 
     The triads are what they are with the whole unit at `simulators.truth.thermal.REFERENCE_C`.
     """
@@ -247,5 +247,5 @@ class UnitTruth:
             raise TruthError("unit.serial must not be empty")
 
     def triad(self, name: str) -> TriadTruth:
-        """A triad by name, "gyro" or "accelerometer"."""
+        """Return a triad by name, "gyro" or "accelerometer"."""
         return {"gyro": self.gyro, "accelerometer": self.accelerometer}[name]

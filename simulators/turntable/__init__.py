@@ -1,1 +1,1 @@
-"""The simulated three-axis table: profiles, its own kinematics, MuJoCo plant, device."""
+"""Simulated three-axis table: profiles, its own kinematics, MuJoCo plant, device."""

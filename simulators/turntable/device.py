@@ -1,4 +1,4 @@
-"""A three-axis table on a simulated bench: implements `procedures.bench.turntable.Turntable`.
+"""Three-axis table on a simulated bench: implements `procedures.bench.turntable.Turntable`.
 
 Time moves the table (`advance`, called by the clock); its verbs only give it profiles and let time pass. At rest it is
 locked: not stepped, its attitude constant. Angles are wrapped by whole turns at standstill and while turning, the turns
@@ -28,7 +28,7 @@ SETTLE_SLICE_S = 0.05
 SETTLED_ERROR_RAD = 1e-3 * units.ARCSEC
 SETTLED_RATE_RAD_S = 1e-6 * units.DEG_PER_HOUR
 SETTLE_S = 0.5
-"""A move is not called settled before so long after its profile ends."""
+"""Time after the end of its profile before which a move is not called settled [s]."""
 SETTLE_TIMEOUT_S = 10.0
 
 
@@ -60,12 +60,12 @@ class SimTurntable:
         self._demand = 0
         self._fault = ""
         self._lean: Array | None = None
-        """Rotation vector of the unit on the inner axis, (3,); None: it is mounted on the table as it should be."""
+        """Rotation vector of the unit on the inner axis, (3,) [rad]; None: it is mounted exactly."""
         self._rest = self._at_rest()
 
     @property
     def locked(self) -> bool:
-        """At rest and held."""
+        """True while the axes are at rest and held."""
         return self._profile is None
 
     async def move_to(self, angles: TableAngles) -> None:
@@ -108,7 +108,7 @@ class SimTurntable:
         self._lock()
 
     def _need_leave(self, violations: tuple[str, ...]) -> None:
-        """Limits first, then whether the table may move at all."""
+        """Check the limits first, then whether the table may move at all."""
         if violations:
             raise OutOfRange("; ".join(violations))
         if self._fault:
@@ -117,13 +117,13 @@ class SimTurntable:
             raise DeviceFault("the table is moving: one demand at a time")
 
     def read_angles(self) -> TableAngles:
-        """Where the encoders say the axes are."""
+        """Read the axis angles from the encoders."""
         encoders = (self._plant.angles_rad - self._pointing + 2.0 * np.pi * self._turns) / units.DEG
         outer, middle, inner = encoders.tolist()
         return TableAngles(outer, middle, inner)
 
     def is_moving(self) -> bool:
-        """Whether the axes are not at rest and held; see the port."""
+        """Return whether the axes are moving or not held; see the port."""
         return not self.locked
 
     def read_rates_deg_s(self) -> Array:
@@ -131,7 +131,7 @@ class SimTurntable:
         return self._plant.rates_rad_s / units.DEG
 
     async def make_safe(self) -> None:
-        """Ramp down to rest and lock, whatever it was doing. Raises `DeviceFault` where the plant has failed."""
+        """Ramp down to rest and lock, during any motion. Raises `DeviceFault` where the plant has failed."""
         if self._fault:
             raise DeviceFault(self._fault)
         if self.locked:
@@ -165,7 +165,7 @@ class SimTurntable:
             raise Stopped("the table was stopped by another demand")
 
     async def _settle(self, demand: int, waited: float) -> None:
-        """`waited`: how long the profile has been over already [s]."""
+        """Wait until the axes settle. `waited`: time since the end of the profile [s]."""
         ticks = max(1, int(SETTLE_SLICE_S * self._clock.rate_hz))
         longest = waited + SETTLE_TIMEOUT_S
         while waited < longest:
@@ -177,7 +177,7 @@ class SimTurntable:
         raise NotSettled(f"the table did not come to rest within {SETTLE_TIMEOUT_S:g} s of its move")
 
     def _error_rad(self) -> float:
-        """How far the axes are from where the profile ends."""
+        """Largest distance of an axis from the end of the profile [rad]."""
         if self._profile is None:
             return 0.0
         target = self._profile.at(np.array([self._profile.duration_s + 1.0]))[0][0]
@@ -205,7 +205,7 @@ class SimTurntable:
         return self._rest[0][0], self._rest[1][0]
 
     def advance(self, ticks: int) -> Motion:
-        """Let the table live through some ticks. A plant that fails leaves the table faulted."""
+        """Advance the table by some ticks. A plant that fails leaves the table faulted."""
         tick_s = 1.0 / self._clock.rate_hz
         if self._profile is None or self._fault:
             return Motion(ticks, self._rest[0] * tick_s, self._rest[1] * tick_s)
@@ -245,7 +245,7 @@ class SimTurntable:
         }
 
     def resume(self, state: dict[str, Any]) -> None:
-        """Stand, locked, where a checkpoint says."""
+        """Stand, locked, at the position of a checkpoint."""
         self._turns = np.array(state["turns"], dtype=np.float64)
         self._pointing = np.array(state["pointing_rad"], dtype=np.float64)
         self._moves = int(state["moves"])

@@ -50,7 +50,7 @@ def wobble_vector(axis: int, amplitude_arcsec: float, angle_rad: Array) -> Array
 
 
 def base_attitude(table: TableTruth, azimuth_deg: float) -> Array:
-    """B, (3, 3): declared azimuth plus its error, and the base's tilt."""
+    """Attitude B of the base, (3, 3): declared azimuth plus its error, and the base's tilt."""
     heading = azimuth_deg * units.DEG + table.azimuth_error_arcsec * units.ARCSEC
     lay = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     lean = units.ARCSEC * np.array([[-table.base_tilt_north_arcsec, table.base_tilt_east_arcsec, 0.0]])
@@ -73,7 +73,7 @@ def attitude(axes_rad: Array, table: TableTruth, azimuth_deg: float) -> Array:
 
 
 def earth_rate_enu(site: SiteTruth) -> Array:
-    """``Ω·[0, cos L, sin L]``, (3,) [rad/s]."""
+    """Earth's rate ``Ω·[0, cos L, sin L]``, (3,) [rad/s]."""
     latitude = site.latitude_deg * units.DEG
     return site.earth_rate_rad_s * np.array([0.0, np.cos(latitude), np.sin(latitude)])
 

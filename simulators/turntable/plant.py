@@ -17,7 +17,7 @@ from simulators.turntable.kinematics import X, Y, Z, wobble_vector
 from simulators.turntable.profile import Profile
 
 STEP_S = 0.00125
-"""Longest step of integration; a whole number of steps makes one tick."""
+"""Longest integration step [s]; a whole number of steps makes one tick."""
 BANDWIDTH_RAD_S = 2.0 * pi * 20.0
 INTEGRAL_SHARE = 0.15
 INTEGRAL_LIMIT_RAD_S = 1e-3
@@ -40,7 +40,7 @@ def _quaternion(vector_rad: Array) -> Quaternion:
 
 
 def _product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Hamilton product p·q."""
+    """Compute the Hamilton product p·q."""
     pw, px, py, pz = p
     qw, qx, qy, qz = q
     w = pw * qw - px * qx - py * qy - pz * qz
@@ -68,7 +68,7 @@ def _base_quaternion(table: TableTruth, azimuth_deg: float) -> Quaternion:
 
 
 def model_text(table: TableTruth, site: SiteTruth, azimuth_deg: float, step_s: float) -> str:
-    """The model as MJCF."""
+    """Build the MuJoCo model as MJCF text."""
     arcsec = pi / 648000.0
     middle = _about(X, table.outer_middle_nonorthogonality_arcsec * arcsec)
     inner = _about(Y, table.middle_inner_nonorthogonality_arcsec * arcsec)
@@ -116,7 +116,7 @@ def model_text(table: TableTruth, site: SiteTruth, azimuth_deg: float, step_s: f
 
 
 class Plant:
-    """Three axes under servo. Angles here are true joint angles [rad], wrapped by whole turns by whoever holds it."""
+    """Three axes under servo. Angles here are true joint angles [rad]; the device that owns the plant wraps them."""
 
     def __init__(self, table: TableTruth, site: SiteTruth, azimuth_deg: float, rate_hz: float) -> None:
         self.steps_per_tick = max(1, ceil(1.0 / (rate_hz * STEP_S) - 1e-9))
@@ -132,21 +132,21 @@ class Plant:
 
     @property
     def angles_rad(self) -> Array:
-        """True joint angles, (3,)."""
+        """True joint angles, (3,) [rad]."""
         return self._state[1:4].copy()
 
     @property
     def rates_rad_s(self) -> Array:
-        """Joint rates, (3,)."""
+        """Current joint rates, (3,) [rad/s]."""
         return self._state[4:7].copy()
 
     @property
     def integral(self) -> Array:
-        """What the servo's integrators hold, (3,)."""
+        """State of the servo's integrators, (3,)."""
         return self._state[7:10].copy()
 
     def put(self, angles_rad: Array, integral: Array | None = None) -> None:
-        """Stand still at some joint angles; the integrators keep what they hold unless told."""
+        """Stand still at some joint angles; the integrators keep their state unless `integral` is given."""
         held = self.integral if integral is None else integral
         self._state = np.concatenate([[0.0], angles_rad, np.zeros(3), held])
 

@@ -1,4 +1,4 @@
-"""Where the axes are asked to be while they move: reference positions and rates over time."""
+"""Motion profiles of the axes: reference positions and rates over time."""
 
 from dataclasses import dataclass
 from math import ceil, sqrt
@@ -38,7 +38,7 @@ class Quintic:
     duration_s: float
 
     def at(self, time_s: Array) -> tuple[Array, Array]:
-        """See `Profile`; at rest after the end."""
+        """Positions and rates, see `Profile`; at rest after the end."""
         s = np.clip(time_s / max(self.duration_s, 1e-9), 0.0, 1.0)[:, None]
         distance = self.end_rad - self.start_rad
         position = self.start_rad + distance * (s**3 * (10.0 + s * (6.0 * s - 15.0)))
@@ -56,11 +56,11 @@ class RampDown:
 
     @property
     def duration_s(self) -> float:
-        """Until the last axis rests."""
+        """Duration until the last axis rests [s]."""
         return float(np.max(np.abs(self.rate_rad_s) / self.deceleration_rad_s2))
 
     def at(self, time_s: Array) -> tuple[Array, Array]:
-        """See `Profile`."""
+        """Positions and rates, see `Profile`."""
         sign = np.sign(self.rate_rad_s)
         passed = np.minimum(time_s[:, None], np.abs(self.rate_rad_s) / self.deceleration_rad_s2)
         rate = self.rate_rad_s - sign * self.deceleration_rad_s2 * passed
@@ -81,7 +81,7 @@ class Spin:
     ramp_s: float
 
     def at(self, time_s: Array) -> tuple[Array, Array]:
-        """See `Profile`; at rest after the end."""
+        """Positions and rates, see `Profile`; at rest after the end."""
         t = np.clip(time_s, 0.0, self.duration_s)
         up = np.minimum(t / self.ramp_s, 1.0)
         down = np.minimum((self.duration_s - t) / self.ramp_s, 1.0)
@@ -109,5 +109,5 @@ def move_ticks(distance_deg: Array, limits: tuple[AxisLimits, ...], rate_hz: flo
 
 
 def deceleration_rad_s2(limits: tuple[AxisLimits, ...]) -> Array:
-    """Deceleration of a stop, (3,): the axes' limits."""
+    """Deceleration of a stop, (3,), which equals the axes' limits."""
     return MARGIN * units.DEG * np.array([limit.acceleration_deg_s2 for limit in limits])

@@ -1,4 +1,4 @@
-"""``bench`` as a process of its own, and what it printed."""
+"""Run of ``bench`` as a process of its own, with its output."""
 
 import json
 import os
@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 
 
 class Done:
-    """A command that has ended."""
+    """A command that has ended, with code and output."""
 
     def __init__(self, code: int, out: str, err: str) -> None:
         self.code, self.out, self.err = code, out, err
@@ -26,7 +26,7 @@ Command = Callable[..., Done]
 
 
 def environment(folder: Path, **settings: str) -> dict[str, str]:
-    """An environment with settings of ours alone."""
+    """Environment with no settings but those of the test."""
     outer = {k: v for k, v in os.environ.items() if not k.startswith("BENCH_")}
     given = {"BENCH_DATABASE_URL": f"sqlite:///{folder / 'bench.sqlite'}", **settings}
     return {**outer, "COLUMNS": "200", "PYTHONPATH": str(ROOT), **given}
@@ -49,7 +49,7 @@ def command_in(folder: Path) -> Command:
 
 
 def one_line(done: Done, *words: str) -> None:
-    """A refusal: exit code 2, nothing said to standard output, one line to standard error."""
+    """Require a refusal: exit code 2, nothing on standard output, one line with these words on standard error."""
     assert (done.code, done.out) == (2, ""), done.err
     assert len(done.err.strip().splitlines()) == 1, done.err
     assert done.err.startswith("bench: ")

@@ -47,7 +47,7 @@ CHANNELS = (
     *(Channel(name, Quantity.ANGULAR_RATE, "rad/s") for name in GYRO),
     *(Channel(name, Quantity.SPECIFIC_FORCE, "m/s^2") for name in ACCELEROMETER),
 )
-"""Of recordings in rates: a count is one rad/s or one m/s²."""
+"""Channels of recordings in rates: a count is one rad/s or one m/s²."""
 
 
 def turn(axis: str, degrees: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A process that dies at a chosen touch of the world: work is wrapped, and the n-th call kills it."""
+"""A process that dies at a chosen call into its environment: work is wrapped, and the n-th call kills it."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,7 +7,7 @@ from bench_service.persistence import Database
 
 
 class Killed(BaseException):
-    """The process is gone."""
+    """The process was killed by its fuse."""
 
 
 class Fuse:

@@ -1,4 +1,4 @@
-"""What `/metrics` says, as numbers by name and labels."""
+"""Reader of `/metrics`: its numbers by name and labels."""
 
 import httpx
 from prometheus_client.parser import text_string_to_metric_families

@@ -1,4 +1,4 @@
-"""Answers of a service whose texts hold brackets and colons, as a command gets them."""
+"""Answers of a service whose texts hold brackets and colons, in the form that a command receives."""
 
 EVIL = "cable [/dev/ttyS0] [red]x[/] :smile:"
 BELOW = "trend of gyro.b_x over 10 results: one point beyond 3σ"

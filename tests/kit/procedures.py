@@ -28,13 +28,13 @@ AnyProcedure = Procedure[Any, Any]
 
 
 def simulated_context(unit: str = "SIM-0001") -> Context:
-    """What is known of the simulated bench and of its unit, or of a drawn one such as "RANDOM-7"."""
+    """Context of the simulated bench and of its unit, or of a drawn one such as "RANDOM-7"."""
     driver = SimulatedDriver("sim")
     return Context(next(one for one in driver.mounted(unit) if one.serial == unit), driver.description)
 
 
 def require_form(procedure: AnyProcedure, context: Context, **parameters: object) -> None:
-    """What every procedure must keep: see docs/add-a-procedure.md. Fails with an assertion that names the rule."""
+    """Check the rules for every procedure, see docs/add-a-procedure.md. Fails with the name of the broken rule."""
     assert inspect.isasyncgenfunction(procedure.acquire), "`acquire` must be an async generator"
     params = procedure.params.model_validate(parameters)
     resolved = procedure.resolve(params, context)
@@ -99,7 +99,7 @@ def run(procedure: AnyProcedure, seed: int = 1, unit: str = "SIM-0001", **parame
 
 
 def require_result(entry: AnyProcedure | Method[Any, Any], result: Outcome) -> None:
-    """A result must be finite, survive JSON, and have a report whose parts fit together."""
+    """Require that a result is finite, survives JSON, and has a report whose parts fit together."""
     assert isinstance(result, entry.result), f"the result must be a {entry.result.__name__}"
     assert entry.result.model_validate(document_of(result)) == result, "a result must survive JSON"
     require_storable(entry.calibrations(result), entry.corrections(result))
@@ -119,5 +119,5 @@ def require_report(report: Report) -> None:
 
 
 def parameters_of(procedure: AnyProcedure, context: Context, **parameters: object) -> Parameters:
-    """Parameters with every default filled."""
+    """Return the parameters with every default filled."""
     return procedure.resolve(procedure.params.model_validate(parameters), context)

@@ -1,4 +1,4 @@
-"""A bench that is registered and that nobody drives: a process has one job engine, which another service may have."""
+"""A registered bench that this process does not drive, so that another service can: a process has one job engine."""
 
 from contextlib import ExitStack
 

@@ -1,1 +1,1 @@
-"""Benches over HTTP: their state, their queues and their stops."""
+"""Routes and schemas of benches: their state, their queues and their stops."""

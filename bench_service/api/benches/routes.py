@@ -1,4 +1,4 @@
-"""Benches: what they are, what they are doing, and their software stops."""
+"""Routes of benches: descriptions, current state, queues and software stops."""
 
 from fastapi import APIRouter
 from fastapi.exceptions import RequestValidationError
@@ -49,19 +49,19 @@ def _view(service: BenchService, bench_id: str) -> BenchView:
 
 @router.get("", responses=problems())
 def list_benches(service: Service) -> list[BenchView]:
-    """Every bench that a worker of this database has registered."""
+    """List every bench that a worker of this database has registered."""
     return [_view(service, bench_id) for bench_id in service.benches.ids()]
 
 
 @router.get("/{bench_id}", responses=problems(404))
 def read_bench(bench_id: str, service: Service) -> BenchView:
-    """Live state, limits, declared accuracy, and the job that drives it."""
+    """Read one bench: live state, limits, declared accuracy, and the job that drives it."""
     return _view(service, bench_id)
 
 
 @router.get("/{bench_id}/queue", responses=problems(404))
 def read_queue(bench_id: str, service: Service) -> QueueView:
-    """The jobs that wait for a bench, in the order in which they start, and why each of them waits."""
+    """List the jobs that wait for a bench, in the order in which they start, and why each of them waits."""
     queue = service.queues.queue(bench_id)
     holder = service.benches.holder(bench_id)
     places = queue.places(holder is not None)
@@ -71,11 +71,11 @@ def read_queue(bench_id: str, service: Service) -> QueueView:
 
 @router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 413, 507))
 async def stop(bench_id: str, service: Service, client: ClientName, body: StopRequest | None = None) -> Stopping:
-    """Software stop: end the running job, stop the table, switch the unit off; until this stop is released.
+    """Stop a bench by software: end the running job, stop the table, switch the unit off; until this stop is released.
 
-    It goes to the bench itself first, on its host, and needs no database for that: a worker sees it, and in its place
-    the bench's supervisor. The database follows when it can; `books` says why where it has not yet. Several stops of a
-    bench stand beside each other.
+    The stop goes to the bench itself first, on its host, and needs no database for that: a worker sees it, and in its
+    place the bench's supervisor. The database follows when it can; `books` says why where it has not yet. Several stops
+    of a bench can stand at the same time.
     """
     asked = body or StopRequest.model_validate({})
     done = await stop_in_own_thread(service.stops, bench_id, asked.reason, asked.by or client)
@@ -86,7 +86,7 @@ async def stop(bench_id: str, service: Service, client: ClientName, body: StopRe
 
 @router.get("/{bench_id}/stops", responses=problems(404))
 def list_stops(bench_id: str, service: Service, after: After = None, limit: Limit = 50) -> StopPage:
-    """Every stop of a bench, newest first: those that stand, and those that were released, by whom and why."""
+    """List every stop of a bench, newest first: standing and released ones, with author and reason of both."""
     service.benches.description(bench_id)
     page = service.stores.benches.stops(bench_id, after=after, limit=limit)
     return StopPage(items=[StopView.of(one) for one in page.items], next=page.next)
@@ -96,9 +96,9 @@ def list_stops(bench_id: str, service: Service, after: After = None, limit: Limi
 def release_stop(
     bench_id: str, stop_id: str, service: Service, body: ReleaseRequest, requested_by: RequestedBy = None
 ) -> Releasing:
-    """Release one stop, one's own or another's, once the bench is known to be safe.
+    """Release one stop, the client's own or another's, once the bench is known to be safe.
 
-    The person who releases it names himself, as `by` or in `X-Requested-By`. The jobs in the bench's queue go on once
+    The person who releases it gives a name, as `by` or in `X-Requested-By`. The jobs in the bench's queue go on once
     no stop stands.
     """
     by = body.by or requested_by

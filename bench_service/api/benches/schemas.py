@@ -1,4 +1,4 @@
-"""What HTTP says of benches: their state, safety, queue and stops."""
+"""HTTP schemas of benches: their state, safety, queue and stops."""
 
 from datetime import datetime
 from typing import Annotated
@@ -27,14 +27,14 @@ By = Annotated[
 
 
 class StopRequest(Request):
-    """Why a bench is stopped, and by whom."""
+    """Request to stop a bench, with reason and author."""
 
     reason: str = Field("stopped by an operator", min_length=1, max_length=500)
     by: By | None = None
 
 
 class ReleaseRequest(Request):
-    """Why a stop is released, and by whom."""
+    """Request to release a stop, with author and remark."""
 
     remark: str = Field(min_length=1, max_length=500, description="What was looked at before the bench was released")
     by: By | None = None
@@ -56,7 +56,7 @@ class StopView(BaseModel):
 
     @classmethod
     def of(cls, stop: BenchStop) -> "StopView":
-        """As HTTP says it."""
+        """Convert a stop to its HTTP view."""
         return cls(**vars(stop))
 
 
@@ -68,14 +68,14 @@ class StopPage(BaseModel):
 
 
 class Releasing(BaseModel):
-    """The answer to a release."""
+    """The answer to a release: the released stop, and those that still stand."""
 
     stop: StopView = Field(description="The stop that was released")
     standing: list[StopView] = Field(description="Stops that still keep the bench from working, oldest first")
 
 
 class DevicesView(BaseModel):
-    """What a bench's devices last said of themselves, as the bench's own host has it."""
+    """The last state that a bench's devices reported, as the bench's own host has it."""
 
     at: datetime | None = Field(description="When something was last asked of them; null: nothing ever was")
     by: str = Field(description="Who asked")
@@ -90,7 +90,7 @@ class DevicesView(BaseModel):
 
     @classmethod
     def of(cls, state: DeviceState | None) -> "DevicesView | None":
-        """None where this host does not know."""
+        """Convert the devices' state to its HTTP view; None where this host does not know it."""
         if state is None:
             return None
         return cls(
@@ -106,7 +106,7 @@ class DevicesView(BaseModel):
 
 
 class SafetyView(BaseModel):
-    """What is known of a bench's safety. Software is not the emergency stop: that is a circuit beside the table."""
+    """The known safety of a bench. Software is not the emergency stop: that is a separate circuit at the table."""
 
     safe: bool | None = Field(description="Table at rest, unit off, chamber led to ambient; null: not known here")
     explanation: str = Field(description="What is known, and who sees to it")
@@ -116,7 +116,7 @@ class SafetyView(BaseModel):
 
     @classmethod
     def of(cls, safety: Safety) -> "SafetyView":
-        """As HTTP says it."""
+        """Convert a safety state to its HTTP view."""
         return cls(
             safe=safety.safe,
             explanation=safety.explanation,
@@ -127,7 +127,7 @@ class SafetyView(BaseModel):
 
 
 class BenchView(BaseModel):
-    """A bench: what is declared of it, and what it is doing."""
+    """A bench: its declared description and its current activity."""
 
     id: str
     description: BenchDescription
@@ -159,7 +159,7 @@ class QueueEntryView(BaseModel):
 
     @classmethod
     def of(cls, entry: QueueEntry, place: Place) -> "QueueEntryView":
-        """As HTTP says it."""
+        """Convert a queue entry and its place to their HTTP view."""
         return copied(cls, entry, place, job=entry.id)
 
 
@@ -173,7 +173,7 @@ class QueueView(BaseModel):
 
 
 class Stopping(BaseModel):
-    """The answer to a stop. Software is not the emergency stop: that is a hardware circuit beside the table."""
+    """The answer to a stop request. Software is not the emergency stop: that is a hardware circuit at the table."""
 
     bench: str
     stop: str = Field(description="Id of this stop: a release names it")

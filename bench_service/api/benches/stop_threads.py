@@ -1,4 +1,4 @@
-"""The thread of a stop: each has one of its own, so that no analysis, import or page that waits holds it up."""
+"""Threads for stop requests: each has one of its own, so that no analysis, import or page request delays it."""
 
 import asyncio
 from functools import partial
@@ -8,15 +8,15 @@ from bench_service.jobs.stops import Stopped, StopService
 from bench_service.model.errors import StorageFailure
 
 PATIENT = 32
-"""So many stops at once wait for what becomes of them; further ones are passed on just the same, and do not wait."""
+"""Number of simultaneous stops that wait for their outcome; further ones are passed on without waiting."""
 LONGEST_S = 6.0
-"""A stop is answered after this, whatever holds its thread [s]."""
+"""Longest time until a stop is answered, whatever holds its thread [s]."""
 
 _waiting = 0
 
 
 async def stop_in_own_thread(stops: StopService, bench_id: str, reason: str, by: str) -> Stopped:
-    """`StopService.stop`, beside the pool of threads that all other routes share. Raises what it raises."""
+    """Run `StopService.stop` in a thread of its own, outside the pool of all other routes. Raises what it raises."""
     global _waiting
     _waiting += 1
     try:

@@ -1,4 +1,4 @@
-"""Campaigns and their runs: define, preview, start, watch, cancel, report."""
+"""Routes of campaigns and their runs: define, preview, start, watch, cancel, report."""
 
 from typing import Annotated, Any, Literal
 
@@ -39,7 +39,7 @@ class CampaignOn(Request):
 
 
 class RunSubmission(CampaignOn):
-    """A campaign to be done."""
+    """Request to run a campaign."""
 
     seed: int | None = Field(None, ge=0, lt=2**47, description="Base of the steps' seeds on a simulated bench")
     labels: Labels = Field(default_factory=Labels, max_length=20)
@@ -52,14 +52,14 @@ class RunSubmission(CampaignOn):
 
 @router.get("/campaigns", responses=problems())
 def list_campaigns(service: Service, after: After = None, limit: Limit = 50) -> CampaignPage:
-    """Campaigns by name, those that come with the service among them."""
+    """List the campaigns by name, including those that come with the service."""
     page = service.campaigns.campaigns(after, limit)
     return CampaignPage(items=[CampaignView.of(campaign) for campaign in page.items], next=page.next)
 
 
 @router.post("/campaigns", status_code=201, responses=problems(404, 409, 413, 507))
 def add_campaign(body: Campaign, service: Service, response: Response, key: IdempotencyKey = None) -> CampaignMade:
-    """Store a campaign. Every step is looked at first: what can never work is refused, what may not is warned of."""
+    """Store a new campaign. Every step is examined first: impossible steps are refused, doubtful ones give warnings."""
     campaign = service.campaigns.add(body, key)
     response.headers["Location"] = f"/api/v1/campaigns/{campaign.name}"
     return CampaignMade.of(campaign, service.campaigns.examine(campaign))
@@ -67,13 +67,13 @@ def add_campaign(body: Campaign, service: Service, response: Response, key: Idem
 
 @router.get("/campaigns/{name}", responses=problems(404))
 def read_campaign(name: CampaignName, service: Service) -> CampaignView:
-    """One campaign."""
+    """Read one campaign by its name."""
     return CampaignView.of(service.campaigns.campaign(name))
 
 
 @router.put("/campaigns/{name}", responses=problems(404, 409, 413, 507))
 def replace_campaign(name: CampaignName, body: Campaign, service: Service) -> CampaignMade:
-    """Change a campaign; runs that were asked for before keep the one that they have."""
+    """Replace a stored campaign; runs requested before keep the version that they have."""
     if body.name != name:
         raise BadParameter("name", body.name, f"the name in the address, {name}")
     campaign = service.campaigns.replace(body)
@@ -82,7 +82,7 @@ def replace_campaign(name: CampaignName, body: Campaign, service: Service) -> Ca
 
 @router.post("/campaigns/{name}/preview", responses=problems(404, 413))
 def preview_campaign(name: CampaignName, body: CampaignOn, service: Service) -> CampaignPreview:
-    """What the campaign would do on a unit: steps left out, times, limits out of reach. Nothing moves."""
+    """Preview the campaign on a unit: steps left out, times, limits out of reach. Nothing moves."""
     campaign = service.campaigns.campaign(name)
     found = service.campaigns.examine(campaign, body.unit, body.bench)
     return copied(CampaignPreview, found, campaign=name, unit=body.unit)
@@ -96,7 +96,7 @@ def preview_campaign(name: CampaignName, body: CampaignOn, service: Service) -> 
 def start_campaign(
     name: CampaignName, body: RunSubmission, service: Service, response: Response, key: IdempotencyKey = None
 ) -> CampaignRunView:
-    """Queue a run of the campaign. A bench does one campaign run at a time, in the order of asking."""
+    """Queue a run of the campaign. A bench does one campaign run at a time, in the order of the requests."""
     request = copied(RunRequest, body, campaign=name)
     run = service.campaigns.start(request, key)
     response.headers["Location"] = f"/api/v1/campaign-runs/{run.id}"
@@ -112,20 +112,20 @@ def list_campaign_runs(
     after: After = None,
     limit: Limit = 50,
 ) -> CampaignRunPage:
-    """Runs, newest first."""
+    """List the campaign runs, newest first."""
     page = service.stores.campaigns.runs(campaign=campaign, unit=unit, state=state, after=after, limit=limit)
     return CampaignRunPage(items=[CampaignRunView.of(run) for run in page.items], next=page.next)
 
 
 @router.get("/campaign-runs/{run_id}", responses=problems(404))
 def read_campaign_run(run_id: str, service: Service) -> CampaignRunView:
-    """One run: each step's state, job, checks, verdict and reasons."""
+    """Read one campaign run: each step's state, job, checks, verdict and reasons."""
     return CampaignRunView.of(service.stores.campaigns.run(run_id))
 
 
 @router.post("/campaign-runs/{run_id}/cancel", status_code=202, responses=problems(404, 409, 507))
 def cancel_campaign_run(run_id: str, service: Service) -> CampaignRunView:
-    """End a run: its job as soon as the bench is safe; steps that did not begin are left out."""
+    """Cancel a campaign run: its job ends as soon as the bench is safe; steps that did not begin are left out."""
     return CampaignRunView.of(service.campaigns.cancel_run(run_id))
 
 

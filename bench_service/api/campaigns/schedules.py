@@ -1,4 +1,4 @@
-"""Schedules: campaigns that start by themselves."""
+"""Routes and schemas of schedules: campaigns that start by themselves."""
 
 from typing import Annotated
 
@@ -18,7 +18,7 @@ OF_A_SCHEDULE = ("read_schedule", "change_schedule", "remove_schedule")
 
 
 class ScheduleSubmission(Request):
-    """A campaign on a unit, again and again."""
+    """Request to run a campaign on a unit at repeated times."""
 
     cron: str = Field(
         min_length=1,
@@ -45,14 +45,14 @@ class ScheduleSubmission(Request):
 
 
 class ScheduleChange(Request):
-    """Whether a schedule is in force."""
+    """A change of a schedule: put it in force or suspend it."""
 
     enabled: bool
 
 
 @router.get("", responses=problems())
 def list_schedules(service: Service, after: After = None, limit: Limit = 50) -> SchedulePage:
-    """Schedules, newest first."""
+    """List the schedules, newest first."""
     page = service.campaigns.schedules.list(after, limit)
     return SchedulePage(items=[ScheduleView.of(schedule) for schedule in page.items], next=page.next)
 
@@ -63,7 +63,7 @@ def list_schedules(service: Service, after: After = None, limit: Limit = 50) -> 
 def add_schedule(
     body: ScheduleSubmission, service: Service, response: Response, key: IdempotencyKey = None
 ) -> ScheduleView:
-    """Start a campaign at given times. A time that never comes is refused, and a run that could not begin now."""
+    """Schedule a campaign at given times. A time that never comes is refused, and a run that could not begin now."""
     request = copied(ScheduleRequest, body)
     schedule = service.campaigns.schedules.add(request, key)
     response.headers["Location"] = f"/api/v1/schedules/{schedule.id}"
@@ -72,7 +72,7 @@ def add_schedule(
 
 @router.get("/{schedule_id}", responses=problems(404))
 def read_schedule(schedule_id: str, service: Service) -> ScheduleView:
-    """One schedule: when it starts next, and what became of the last start."""
+    """Read one schedule: its next start, and the outcome of its last start."""
     return ScheduleView.of(service.campaigns.schedules.get(schedule_id))
 
 
@@ -84,5 +84,5 @@ def change_schedule(schedule_id: str, body: ScheduleChange, service: Service) ->
 
 @router.delete("/{schedule_id}", status_code=204, response_model=None, responses=problems(404, 507))
 def remove_schedule(schedule_id: str, service: Service) -> None:
-    """Forget a schedule; its runs stay."""
+    """Delete one schedule; its runs are kept."""
     service.campaigns.schedules.remove(schedule_id)

@@ -1,4 +1,4 @@
-"""What a client is told of campaigns, their runs and schedules."""
+"""HTTP schemas of campaigns, their runs and schedules."""
 
 from datetime import datetime
 
@@ -19,7 +19,7 @@ from procedures.core.limits import Check, Verdict
 
 
 class CampaignView(BaseModel):
-    """A campaign."""
+    """A stored campaign with its name."""
 
     name: str
     campaign: Campaign
@@ -31,14 +31,14 @@ class CampaignView(BaseModel):
 
 
 class CampaignPage(BaseModel):
-    """Campaigns by name."""
+    """One page of campaigns, sorted by name."""
 
     items: list[CampaignView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")
 
 
 class CampaignMade(BaseModel):
-    """A campaign that was stored, and what to know before it runs."""
+    """A stored campaign, and the warnings before it runs."""
 
     name: str
     campaign: Campaign
@@ -52,7 +52,7 @@ class CampaignMade(BaseModel):
 
 
 class CampaignPreview(BaseModel):
-    """What a campaign would do on a unit."""
+    """Preview of a campaign on a unit."""
 
     campaign: str
     unit: str
@@ -63,7 +63,7 @@ class CampaignPreview(BaseModel):
 
 
 class StepRunView(BaseModel):
-    """One step of a run."""
+    """One step of a campaign run."""
 
     name: str
     does: str = Field(description="Its procedure or method")
@@ -82,7 +82,7 @@ class StepRunView(BaseModel):
 
 
 class CampaignRunView(BaseModel):
-    """One execution of a campaign."""
+    """One run of a campaign."""
 
     id: str
     campaign: str
@@ -115,14 +115,14 @@ class CampaignRunView(BaseModel):
 
 
 class CampaignRunPage(BaseModel):
-    """Runs, newest first."""
+    """One page of campaign runs, newest first."""
 
     items: list[CampaignRunView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")
 
 
 class CampaignReport(BaseModel):
-    """The outcome of a run with everything that made it."""
+    """Outcome of a run with everything that made it."""
 
     run: CampaignRunView
     campaign: Campaign = Field(description="As it was when the run was asked for")
@@ -136,7 +136,7 @@ class CampaignReport(BaseModel):
 
 
 class ScheduleView(BaseModel):
-    """When a campaign starts by itself."""
+    """A schedule: the times at which a campaign starts by itself."""
 
     id: str
     cron: str
@@ -161,7 +161,7 @@ class ScheduleView(BaseModel):
 
 
 class SchedulePage(BaseModel):
-    """Schedules, newest first."""
+    """One page of schedules, newest first."""
 
     items: list[ScheduleView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")

@@ -1,1 +1,1 @@
-"""What all routes share: dependencies, bodies, errors, request ids."""
+"""Code that all routes share: dependencies, bodies, errors, request ids."""

@@ -1,4 +1,4 @@
-"""What a body may be, for every route: of a bounded length, and JSON that everything can hold."""
+"""Limits on request bodies, for every route: a bounded length, and JSON that can be stored and sent again."""
 
 from email.message import Message as Header
 from itertools import islice
@@ -14,15 +14,15 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from bench_service.formats.plain_json import faults
 
 BODY_BYTES = 1_000_000
-"""Largest body of a route that takes no files; beside files, room for their description."""
+"""Largest body of a route that takes no files; in an upload, the room for the description of the files."""
 SMALL_BYTES = 10_000
 """A body of this length is looked through in a few milliseconds."""
 TOLD = 20
-"""So many faults of a body are told at most."""
+"""Most faults of a body that an answer lists."""
 
 
 def is_json(content_type: str | None) -> bool:
-    """Whether a body of this type is read as JSON: as FastAPI decides it."""
+    """Return whether a body of this type is read as JSON, by the rule that FastAPI uses."""
     header = Header()
     header["content-type"] = content_type or ""
     kind = header.get_content_subtype()
@@ -43,7 +43,7 @@ async def only_plain_json(request: Request) -> None:
 
 
 def refuse_unfit(document: object, place: str) -> None:
-    """Raises `RequestValidationError` with what in a document, sent as `place`, not everything can hold."""
+    """Check a document, sent as `place`. Raises `RequestValidationError` with the values that cannot be stored."""
     found = list(islice(faults(document), TOLD))
     if found:
         raise RequestValidationError(
@@ -52,7 +52,7 @@ def refuse_unfit(document: object, place: str) -> None:
 
 
 class Bounded:
-    """Pure ASGI: a body that is too long is refused before it is read, or as soon as it has come so far."""
+    """ASGI middleware that refuses a body that is too long, before it is read or as soon as it exceeds the limit."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -78,7 +78,7 @@ class Bounded:
 
 
 def _most_bytes(scope: Scope) -> int | None:
-    """The longest body that a route takes; None: it takes none."""
+    """Return the longest body that a route takes; None: it takes none."""
     if _takes_json(scope):
         return BODY_BYTES
     if getattr(scope.get("route"), "body_field", None) is None:
@@ -87,7 +87,7 @@ def _most_bytes(scope: Scope) -> int | None:
 
 
 def _takes_json(scope: Scope) -> bool:
-    """Whether the route has a body, and one that is no form."""
+    """Return whether the route has a body that is not a form."""
     field = getattr(scope.get("route"), "body_field", None)
     return field is not None and not isinstance(field.field_info, Form)
 

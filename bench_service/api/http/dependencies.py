@@ -1,4 +1,4 @@
-"""What every route is given, and what several of them say in the same words."""
+"""Dependencies and parameters that several routes share."""
 
 import re
 from typing import Annotated
@@ -49,6 +49,6 @@ async def _client_name(request: Request, requested_by: RequestedBy = None) -> st
 
 
 ClientName = Annotated[str, Depends(_client_name)]
-"""Who asks: what the client calls itself, or the address that it asks from."""
+"""Name of the client: the one that it gives itself, or the address that it asks from."""
 After = Annotated[str | None, Query(max_length=100, description="Cursor: `next` of the page before")]
 Limit = Annotated[int, Query(ge=1, le=500)]

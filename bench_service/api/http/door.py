@@ -1,10 +1,10 @@
-"""The rules by which a request is let in: to which host it speaks, from which page it comes, and from which address.
+"""Access rules for requests: the host a request is sent to, the page it comes from, and the address it comes from.
 
 Host: a page of another site can make its own name resolve to this address (DNS rebinding), and then reads and commands
-as one of ours; so the name in `Host` must be one that is ours. Origin and Sec-Fetch-Site: a browser says from which
-site a request comes; what comes from another site is refused. The one exception is a person who follows a link: a
-top-level navigation that only reads. A request with neither header comes from a program: it is let in from a loopback
-address, and from elsewhere with the service's token.
+as a page of this service; so the name in `Host` must be one of this service's. Origin and Sec-Fetch-Site: a browser
+states from which site a request comes; a request from another site is refused. The one exception is a person who
+follows a link: a top-level navigation that only reads. A request with neither header comes from a program: it is let
+in from a loopback address, and from elsewhere with the service's token.
 """
 
 import hmac
@@ -27,7 +27,7 @@ LOOPBACK_NAMES = ("localhost", "127.0.0.1", "[::1]")
 ANY_ADDRESS = ("0.0.0.0", "::", "")
 READING = ("GET", "HEAD")
 QUIET_S = 60.0
-"""A reason to refuse is logged once in this time [s]: a page that tries again and again fills no disk."""
+"""Interval in which a reason to refuse is logged once [s]: a page that tries again and again fills no disk."""
 _AUTHORITY = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(?::(?P<port>[0-9]{1,5}))?")
 _ORIGIN = re.compile(r"(?P<scheme>https?)://(?P<authority>[^/]+)")
 _DEFAULT_PORT = {"http": "80", "https": "443"}
@@ -37,18 +37,18 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Door:
-    """The rules of one service."""
+    """Access rules of one service."""
 
     hosts: frozenset[str]
-    """Names in `Host` that are ours; with a port only that port, without one any."""
+    """Names in `Host` that belong to this service; with a port only that port, without one any."""
     token: str | None = None
-    """Sent as `Authorization: Bearer …` by programs that ask from elsewhere than a loopback address."""
+    """The token that programs send as `Authorization: Bearer …` from any address but a loopback one."""
     all_local: bool = False
-    """Whether the address is reached through a port of a loopback address only, so that every peer counts as local."""
+    """True where the address is reached through a port of a loopback address only, so that all peers count as local."""
 
     @classmethod
     def of(cls, settings: Settings, *more_hosts: str) -> "Door":
-        """The rules that settings give. Raises `Misconfigured` for a token that cannot be used."""
+        """Build the rules from the settings. Raises `Misconfigured` for a token that cannot be used."""
         own = () if settings.host in ANY_ADDRESS else (_bracketed(settings.host),)
         try:
             token = settings.token()
@@ -58,7 +58,7 @@ class Door:
         return cls(hosts, token, settings.published == "loopback")
 
     def refusal(self, headers: Headers, method: str, peer: str | None) -> "Refusal | None":
-        """Why a request is refused; None where it is let in. `peer`: address it comes from; None: a socket file."""
+        """Return why a request is refused; None where it is let in. `peer`: its source address; None: a socket file."""
         hosts = headers.getlist("host")
         if len(hosts) != 1 or not self._ours(hosts[0]):
             text = "the name that this request speaks to is not one of this service: BENCH_HOSTS lists further names"
@@ -90,17 +90,17 @@ class Door:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a request is not let in."""
+    """Reason for which a request is refused."""
 
     status: int
     kind: str
     text: str
     given: str
-    """What the request had instead: for the log."""
+    """The value that the request had instead: for the log."""
 
 
 class Doorkeeper:
-    """Pure ASGI: what is refused reaches no route, and its body is not read."""
+    """ASGI middleware that enforces the access rules: a refused request reaches no route, and its body is not read."""
 
     def __init__(self, app: ASGIApp, door: Door) -> None:
         self._app = app
@@ -134,12 +134,12 @@ class Doorkeeper:
 
 
 def may_listen(settings: Settings) -> bool:
-    """Whether a service may listen at its address: a loopback one, or one whose peers prove themselves."""
+    """Return whether a service may listen at its address: a loopback one, or one whose peers authenticate."""
     return is_loopback(settings.host) or settings.token_file is not None or settings.published is not None
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a name or an address is this host's own, whatever it resolves to."""
+    """Return whether a name or an address is this host's own, whatever it resolves to."""
     if host in ANY_ADDRESS:
         return False
     try:
@@ -150,7 +150,7 @@ def is_loopback(host: str) -> bool:
 
 
 def is_loopback_address(text: str) -> bool:
-    """Whether an address is one of this host's loopback; false for what is no address."""
+    """Return whether a text is a loopback address of this host; false for a text that is no address."""
     try:
         address = ip_address(text)
     except ValueError:
@@ -161,7 +161,7 @@ def is_loopback_address(text: str) -> bool:
 
 
 def _same_origin(origin: str, host: str) -> bool:
-    """Whether a page is ours: its scheme may differ, where something before us ends TLS."""
+    """Return whether a page is this service's own: its scheme may differ where a proxy ends TLS."""
     found = _ORIGIN.fullmatch(origin.lower())
     if found is None:
         return False
@@ -172,11 +172,11 @@ def _same_origin(origin: str, host: str) -> bool:
 
 
 def _follows_link(headers: Headers, method: str) -> bool:
-    """Whether a person follows a link to us from another site, in a window of its own."""
+    """Return whether the request is a link from another site that a person follows in a top-level window."""
     top_level = (headers.get("sec-fetch-mode"), headers.get("sec-fetch-dest")) == ("navigate", "document")
     return top_level and method in READING
 
 
 def _bracketed(host: str) -> str:
-    """An address as `Host` has it."""
+    """Format an address as `Host` has it."""
     return f"[{host}]" if ":" in host else host

@@ -55,15 +55,15 @@ STATUS: dict[type[Exception], int] = {
     StorageFailure: 503,
     ServiceError: 500,
 }
-"""An error's status is that of its nearest ancestor here."""
+"""Status codes by error class; an error has the status of its nearest ancestor here."""
 
 
 Shown = Annotated[str, BeforeValidator(shown)]
-"""Whatever a message quotes, it can be sent."""
+"""Text as a message may quote it, with its unsendable characters escaped."""
 
 
 class FieldError(BaseModel):
-    """One field that is not as it must be."""
+    """A faulty field of a request."""
 
     field: Shown = Field(description="Path of the field, for example parameters.dwell_s")
     message: Shown = Field(description="What is wrong, with the allowed range")
@@ -71,7 +71,7 @@ class FieldError(BaseModel):
 
 
 class Problem(BaseModel):
-    """An error as RFC 9457 has it, with the fields that caused it."""
+    """Problem document of RFC 9457, with the fields that caused the error."""
 
     type: str = Field("about:blank", description="Kind of error, a relative reference")
     title: str
@@ -83,12 +83,12 @@ class Problem(BaseModel):
 
 
 RETRY_AFTER_S = "2"
-"""When a request that was too much may be sent again."""
+"""Time after which a client may repeat a request that was refused for overload [s]."""
 MOST_FIELDS = 100
-"""Of a megabyte of wrong fields so many are told."""
+"""Most wrong fields that an answer lists, of a body of up to a megabyte."""
 _NO_BODY = FieldError(field="body", message="UTF-8 text of one JSON document is expected")
 _UNREAD: dict[type, str] = {RecursionError: NOT_SO_DEEP, ValueError: A_NUMBER}
-"""What is allowed instead where `json.loads` itself gave up, at a thousand brackets or at an integer of 4300 digits."""
+"""Allowed values, by the error of `json.loads` itself: at a thousand brackets or at an integer of 4300 digits."""
 
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
@@ -127,7 +127,7 @@ def install(app: FastAPI) -> None:
 
 
 class AnswerAtTheEnd:
-    """A request that is still at work when the server has waited long enough for its end is told so, and may be
+    """Middleware that answers every request still at work when the server's grace period is over. Such a request may be
     repeated: what it asked for may be done or not, which its `Idempotency-Key` sorts out. A stream ends, unfinished.
     """
 
@@ -154,7 +154,7 @@ class AnswerAtTheEnd:
 
 
 class RefuseNul:
-    """No database can hold the character NUL in a text, so no address may contain it."""
+    """ASGI middleware that refuses addresses with the character NUL, which no database can hold in a text."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -168,7 +168,7 @@ class RefuseNul:
 
 
 def status_of(error: Exception) -> int:
-    """The status code of a known error."""
+    """Return the status code of a known error."""
     return next(STATUS[cls] for cls in type(error).__mro__ if cls in STATUS)
 
 
@@ -212,7 +212,7 @@ def _invalid(request: Request, errors: Sequence[Any], prefix: str) -> Response:
 
 
 def _follows(error: Any, errors: Sequence[Any]) -> bool:
-    """A list whose bad element was left out is told to be too short as well: that is no second fault."""
+    """Return whether an error only follows from another: a list without its bad element is also reported too short."""
     place = tuple(error["loc"])
     return error["type"] == "too_short" and any(
         len(other["loc"]) > len(place) and tuple(other["loc"][: len(place)]) == place for other in errors
@@ -241,7 +241,7 @@ def _on_unknown(request: Request, error: Exception) -> Response:
 def respond(
     request: Request, status: int, detail: str, kind: str, errors: Sequence[FieldError] = (), lost: Sequence[str] = ()
 ) -> JSONResponse:
-    """A problem document as a response."""
+    """Build the response that carries a problem document."""
     problem = Problem(
         type=f"/problems/{kind}" if kind else "about:blank",
         title=HTTPStatus(status).phrase,

@@ -1,4 +1,4 @@
-"""Fields of request bodies: every one bounded, unknown ones refused. Units are in the field names."""
+"""Field types of request bodies: every one bounded, unknown ones refused. Units are in the field names."""
 
 from typing import Annotated
 

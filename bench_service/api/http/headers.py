@@ -1,4 +1,4 @@
-"""Headers of every answer that bound what a browser does with it: no frame, no foreign script, no guessed type."""
+"""Security headers of every answer, which restrict the browser: no frame, no foreign script, no guessed type."""
 
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -7,7 +7,7 @@ OWN_FILES_ONLY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; form-action 'self'; "
     "base-uri 'none'; frame-ancestors 'none'"
 )
-"""Content-Security-Policy of whatever states none of its own."""
+"""Content-Security-Policy of answers that state none of their own."""
 SECURITY_HEADERS = {
     "Content-Security-Policy": OWN_FILES_ONLY,
     "X-Frame-Options": "DENY",
@@ -19,7 +19,7 @@ SECURITY_HEADERS = {
 
 
 class SecurityHeaders:
-    """Pure ASGI: adds the headers that an answer does not have of its own."""
+    """ASGI middleware that adds the security headers that an answer does not have of its own."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

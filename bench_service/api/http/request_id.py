@@ -1,4 +1,4 @@
-"""An id for every request: the client's own `X-Request-ID` or a new one, in the answer and in every line about it."""
+"""Request ids: the client's own `X-Request-ID` or a new one, in the answer and in every log line of the request."""
 
 import re
 
@@ -10,11 +10,11 @@ from bench_service.wall_clock import new_id
 
 HEADER = "X-Request-ID"
 ACCEPTED = re.compile(r"[A-Za-z0-9._:/+=@-]{1,100}")
-"""Anything else is replaced by an id of our own: a header must not write lines into the log."""
+"""Allowed ids; any other is replaced by a new one: a header must not write lines into the log."""
 
 
 class RequestId:
-    """Pure ASGI: it never holds a stream up."""
+    """ASGI middleware that gives each request an id; it never delays a stream."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

@@ -1,1 +1,1 @@
-"""Jobs over HTTP: routes, schemas, event stream."""
+"""Jobs over HTTP: their routes, schemas and event stream."""

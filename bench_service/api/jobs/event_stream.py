@@ -1,7 +1,7 @@
-"""Server-sent events: how what happens to a job is written on the wire.
+"""Server-sent events of a job: the format in which its events are sent.
 
-An event's `id` is its sequence: a client that comes back says it as `Last-Event-ID` and misses nothing. What the bench
-does now (`event: live`) has no id, because it is not part of what is kept.
+An event's `id` is its sequence: a client that reconnects sends it as `Last-Event-ID` and misses nothing. The bench's
+current activity (`event: live`) has no id, because it is not part of what is kept.
 """
 
 from pydantic import TypeAdapter
@@ -11,7 +11,7 @@ from bench_service.bench.live.values import BenchLive
 from bench_service.model.job import Event
 
 RETRY_MS = 1000
-"""After this long a browser that lost the connection comes back."""
+"""Time after which a browser that lost the connection reconnects [ms]."""
 HEAD = f"retry: {RETRY_MS}\n\n".encode()
 HEADERS = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
 LIVE = TypeAdapter(BenchLive)
@@ -29,18 +29,18 @@ DOCUMENTED: dict[int | str, dict[str, object]] = {
 
 
 class ServerSentEvents:
-    """`bench_service.jobs.events.hub.Frames`."""
+    """Frames in the format of server-sent events; implements `bench_service.jobs.events.hub.Frames`."""
 
     quiet = b": still here\n\n"
     dropped = b": too slow, and let go; come back with Last-Event-ID\n\n"
 
     def event(self, event: Event) -> bytes:
-        """An event with its sequence as id."""
+        """Encode an event with its sequence as id."""
         data = EventView.of(event).model_dump_json()
         return f"id: {event.sequence}\nevent: {event.kind}\ndata: {data}\n\n".encode()
 
     def live(self, live: BenchLive) -> bytes:
-        """What the bench does now."""
+        """Encode the bench's current activity as a frame."""
         return b"event: live\ndata: " + LIVE.dump_json(live) + b"\n\n"
 
 

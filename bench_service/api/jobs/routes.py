@@ -1,4 +1,4 @@
-"""Jobs: submit, read, watch, cancel, and what came out."""
+"""Routes of jobs: submit, read, watch, cancel, and read the result."""
 
 from collections.abc import AsyncIterator
 from typing import Annotated
@@ -43,7 +43,7 @@ OF_A_JOB = (
     "read_truth",
     "analyse_again",
 )
-"""What can be asked of a job once there is one."""
+"""Names of the routes that work on an existing job."""
 
 
 @router.post(
@@ -61,7 +61,7 @@ def submit(
     key: IdempotencyKey = None,
     requested_by: RequestedBy = None,
 ) -> JobView:
-    """Queue a job. The same `Idempotency-Key` with the same body gives the job that the first one made."""
+    """Submit a job to the queue. The same `Idempotency-Key` with the same body gives the job of the first request."""
     job = service.jobs.submit(copied(JobRequest, body), key, requested_by or "")
     response.headers["Location"] = f"/api/v1/jobs/{job.id}"
     return _view(service, job)
@@ -80,7 +80,7 @@ def list_jobs(
     after: After = None,
     limit: Limit = 50,
 ) -> JobPage:
-    """Jobs, newest first."""
+    """List the jobs, newest first."""
     page = service.stores.jobs.list(state=state, procedure=procedure, unit=unit, after=after, limit=limit)
     standing = service.queues.standing(page.items)
     items = [JobView.of(job, standing[job.id], service.live.of_job(job)) for job in page.items]
@@ -89,7 +89,7 @@ def list_jobs(
 
 @router.get("/{job_id}", responses=problems(404, 409))
 def read_job(job_id: str, service: Service) -> JobView:
-    """One job: everything that is known of it, its place in the queue and why it waits."""
+    """Read one job: its state, its place in the queue and why it waits."""
     return _view(service, service.stores.jobs.get(job_id))
 
 
@@ -109,9 +109,9 @@ def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
     },
 )
 def cancel(job_id: str, service: Service) -> JobView | JSONResponse:
-    """End a job: a queued one at once, a running one as soon as its bench is safe. Its recordings are kept.
+    """Cancel a job: a queued one at once, a running one as soon as its bench is safe. Its recordings are kept.
 
-    One that this version does not understand is ended too; of it, only its state is told.
+    A job that this version does not understand is cancelled too; the answer then holds only its state.
     """
     try:
         return _view(service, service.jobs.cancel(job_id))
@@ -122,20 +122,20 @@ def cancel(job_id: str, service: Service) -> JobView | JSONResponse:
 
 @router.post("/{job_id}/pause", status_code=202, responses=problems(404, 409, 507))
 def pause(job_id: str, service: Service) -> JobView:
-    """Put a job aside: a queued one at once, a running one before its next station. The bench is then safe and free."""
+    """Pause a job: a queued one at once, a running one before its next station. The bench is then safe and free."""
     return _view(service, service.jobs.pause(job_id))
 
 
 @router.post("/{job_id}/answer", status_code=202, responses=problems(404, 409, 413, 507))
 def answer(job_id: str, body: PromptAnswer, service: Service, requested_by: RequestedBy = None) -> JobView:
-    """Say that what the job asks of the person at the bench (`prompt`) is done, or refuse it."""
+    """Confirm that the person at the bench did what the job's prompt asks (`prompt`), or decline it."""
     said = Answer(body.done, body.remark, requested_by or "")
     return _view(service, service.stores.prompts.answer(job_id, said, now()))
 
 
 @router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409, 507))
 def resume(job_id: str, service: Service) -> JobView:
-    """Queue a paused, interrupted or resumable failed job again; it goes on with the stations that remain."""
+    """Resume a paused, interrupted or resumable failed job: it is queued again and does the stations that remain."""
     return _view(service, service.jobs.resume(job_id))
 
 
@@ -149,7 +149,7 @@ async def events(
     hub: Hub,
     last_event_id: Annotated[int, Header(alias="Last-Event-ID", ge=0, le=2**31)] = 0,
 ) -> StreamingResponse:
-    """Everything that happens to the job as server-sent events, from after `Last-Event-ID`, until it has ended."""
+    """Stream the job's events as server-sent events, from after `Last-Event-ID`, until it has ended."""
     await hub.require(job_id)
     told = _told(hub, job_id, last_event_id)
     return StreamingResponse(told, media_type="text/event-stream", headers=event_stream.HEADERS)
@@ -168,7 +168,7 @@ def read_result(
     response: Response,
     if_none_match: Annotated[str | None, Header(max_length=200)] = None,
 ) -> ResultView:
-    """The result that gave the job its verdict. It never changes, so an ETag saves reading it twice."""
+    """Read the result that gave the job its verdict. It never changes, so an ETag saves reading it twice."""
     result = service.jobs.result_of(job_id)
     etag = f'"{result.id}"'
     if if_none_match == etag:
@@ -179,7 +179,7 @@ def read_result(
 
 @router.get("/{job_id}/truth", responses=problems(404, 409))
 def read_truth(job_id: str, service: Service) -> Truth:
-    """What the simulated unit really was in this job; 404 on a real bench."""
+    """Read the true values of the simulated unit in this job; 404 on a real bench."""
     return Truth(job=job_id, triads=list(service.jobs.truth(job_id)))
 
 
@@ -195,7 +195,7 @@ def analyse_again(
 
 @router.get("/{job_id}/analyses", responses=problems(404, 409))
 def list_analyses(job_id: str, service: Service, after: After = None, limit: Limit = 50) -> ResultPage:
-    """Every result of the job's recordings taken as a whole, newest first."""
+    """List every result of the job's recordings taken as a whole, newest first."""
     service.stores.jobs.get(job_id)
     page = service.stores.results.list(job_id=job_id, after=after, limit=limit)
     return ResultPage(items=[ResultView.of(result) for result in page.items], next=page.next)

@@ -1,4 +1,4 @@
-"""What a client is told of a job: its state, its progress, what happened to it."""
+"""HTTP schemas of a job: its state, its progress and its events."""
 
 from datetime import datetime
 from typing import Any
@@ -16,7 +16,7 @@ from procedures.core.limits import Verdict
 
 
 class JobSubmission(PreviewRequest):
-    """A job to be done."""
+    """Request for a new job: procedure, unit and parameters."""
 
     procedure: str = NAME
     priority: int = Field(10, ge=1, le=1000, description="Smaller runs first")
@@ -28,13 +28,13 @@ class JobSubmission(PreviewRequest):
 
 
 class JobChange(Request):
-    """What can be changed of a job while it is queued."""
+    """A change of a job while it is queued."""
 
     priority: int = Field(ge=1, le=1000, description="Smaller runs first")
 
 
 class PromptAnswer(Request):
-    """What the person at the bench says to what a job asks."""
+    """The answer of the person at the bench to a job's prompt."""
 
     done: bool = Field(description="It is done; false: it will not be, and the job ends cancelled")
     remark: str = Field("", max_length=500, pattern=r"^[^\x00]*$")
@@ -47,14 +47,14 @@ class Reanalysis(Request):
 
 
 class Truth(BaseModel):
-    """What a simulated unit really was in a job."""
+    """True values of a simulated unit in a job."""
 
     job: str
     triads: list[TrueTriad]
 
 
 class Progress(BaseModel):
-    """How far a job is."""
+    """Progress of a job in stations and time."""
 
     station: int = Field(description="Stations finished")
     stations: int
@@ -69,21 +69,21 @@ class Progress(BaseModel):
 
 
 class PlaceView(BaseModel):
-    """A queued job's place."""
+    """Place of a queued job in its bench's queue."""
 
     position: int = Field(description="From 1, in the order of its bench's queue")
     ahead: int = Field(description="Jobs that go before it as things stand, the running one included")
 
 
 class PromptView(BaseModel):
-    """What a person at the bench is asked to do; the job waits for the answer."""
+    """A prompt for a person at the bench; the job waits for the answer."""
 
     text: str
     asked_at: datetime
 
 
 class JobView(BaseModel):
-    """A job."""
+    """A job with its state, parameters and progress."""
 
     id: str
     procedure: str
@@ -123,7 +123,7 @@ class JobView(BaseModel):
 
     @classmethod
     def of(cls, job: Job, standing: Standing | None = None, live: LiveJob | None = None) -> "JobView":
-        """As HTTP says it; `standing` where it was asked for, `live` what its bench says of it while it runs."""
+        """Convert a job to its HTTP view; `standing` where it was asked for, `live` its bench's state while it runs."""
         place = None if standing is None else standing.place
         stations = len(job.stations)
         open_state = job.state in (JobState.QUEUED, JobState.RUNNING, JobState.PAUSED)
@@ -152,14 +152,14 @@ class JobView(BaseModel):
 
 
 class JobPage(BaseModel):
-    """Jobs, newest first. Those that this version does not understand are left out, and named in its log."""
+    """One page of jobs, newest first. Jobs that this version does not understand are left out and named in its log."""
 
     items: list[JobView]
     next: str | None = Field(description="Cursor: pass it as `after` for the next page")
 
 
 class ForeignJob(BaseModel):
-    """A job that was stored by a version whose words this one does not understand."""
+    """A job stored by a version whose terms this one does not understand."""
 
     id: str
     state: JobState
@@ -167,7 +167,7 @@ class ForeignJob(BaseModel):
 
 
 class EventView(BaseModel):
-    """Something that happened to a job: the `data` of a server-sent event."""
+    """One event of a job: the `data` of a server-sent event."""
 
     sequence: int
     at: datetime

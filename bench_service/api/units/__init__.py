@@ -1,1 +1,1 @@
-"""Units over HTTP: their records, calibrations and corrections."""
+"""Routes and schemas of units: their records, calibrations and corrections."""

@@ -1,4 +1,4 @@
-"""Units under test: what is declared of them, their calibrations and their corrections."""
+"""Routes of units under test: their declarations, their calibrations and their corrections."""
 
 from typing import Annotated
 
@@ -25,19 +25,19 @@ Serial = Annotated[str, Path(pattern=SERIAL)]
 
 @router.get("", responses=problems())
 def list_units(service: Service) -> list[UnitView]:
-    """Every unit that is known."""
+    """List every unit with its declaration."""
     return [UnitView.of(unit) for unit in service.stores.units.units()]
 
 
 @router.get("/{serial}", responses=problems(404))
 def read_unit(serial: str, service: Service) -> UnitView:
-    """One unit."""
+    """Read one unit by its serial."""
     return UnitView.of(service.stores.units.unit(serial))
 
 
 @router.put("/{serial}", responses=problems(413, 507))
 def declare_unit(serial: Serial, body: UnitDeclaration, service: Service) -> UnitView:
-    """Declare a unit or change what is declared. Its recordings, results and calibrations stay."""
+    """Declare a unit or change its declaration. Its recordings, results and calibrations stay."""
     service.stores.units.put_unit(
         Unit(
             serial,
@@ -53,7 +53,7 @@ def declare_unit(serial: Serial, body: UnitDeclaration, service: Service) -> Uni
 
 @router.get("/{serial}/calibrations", responses=problems(404))
 def list_calibrations(serial: str, service: Service, after: After = None, limit: Limit = 50) -> CalibrationPage:
-    """The unit's calibrations, newest first; one is current."""
+    """List the unit's calibrations, newest first; one is current."""
     service.stores.units.unit(serial)
     page = service.stores.results.calibrations(serial, after=after, limit=limit)
     return CalibrationPage(items=[CalibrationView.of(c) for c in page.items], next=page.next)
@@ -63,7 +63,7 @@ def list_calibrations(serial: str, service: Service, after: After = None, limit:
 def list_corrections(
     serial: str, service: Service, kind: CorrectionKind | None = None, after: After = None, limit: Limit = 50
 ) -> CorrectionPage:
-    """The unit's correction sets, newest first; one of each kind is current."""
+    """List the unit's correction sets, newest first; one of each kind is current."""
     service.stores.units.unit(serial)
     page = service.stores.corrections.list(serial, kind=kind, after=after, limit=limit)
     return CorrectionPage(items=[CorrectionView.of(c) for c in page.items], next=page.next)
@@ -71,7 +71,7 @@ def list_corrections(
 
 @router.get("/{serial}/corrections/{correction_id}", responses=problems(404))
 def read_correction(serial: str, correction_id: str, service: Service) -> CorrectionView:
-    """One correction set, and the results that rest on it."""
+    """Read one correction set, and the results that rest on it."""
     stored = service.stores.corrections.get(serial, correction_id)
     return CorrectionView.of(stored, service.stores.corrections.used_by(correction_id))
 

@@ -17,7 +17,7 @@ from procedures.core.unit_correction import CorrectionKind
 
 
 class UnitDeclaration(Request):
-    """What is declared of a unit (its data sheet), without its serial, which the address has."""
+    """The declaration of a unit (its data sheet); its serial stands in the address."""
 
     sample_rate_hz: float = Field(gt=0, le=1e6, allow_inf_nan=False)
     channels: list[Channel] = Field(default_factory=list[Channel], max_length=64)
@@ -27,7 +27,7 @@ class UnitDeclaration(Request):
 
 
 class UnitView(BaseModel):
-    """A unit as it is declared."""
+    """The declared record of a unit."""
 
     serial: str
     sample_rate_hz: float
@@ -67,7 +67,7 @@ class CalibrationView(BaseModel):
 
 
 class CalibrationPage(BaseModel):
-    """Calibrations of a unit, newest first."""
+    """One page of a unit's calibrations, newest first."""
 
     items: list[CalibrationView]
     next: str | None
@@ -93,7 +93,7 @@ class CorrectionView(BaseModel):
 
 
 class CorrectionPage(BaseModel):
-    """Correction sets of a unit, newest first."""
+    """One page of a unit's correction sets, newest first."""
 
     items: list[CorrectionView]
     next: str | None

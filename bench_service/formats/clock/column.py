@@ -11,7 +11,7 @@ from bench_service.formats.clock.resolution import Resolution
 from procedures.core.arrays import Array
 
 IN_MEMORY_BYTES = 16 * 1024 * 1024
-"""Stamps beyond that lie in a file without a name."""
+"""Size of the stamps in memory [bytes]; further ones go to an unnamed file."""
 WRAPS_S = {
     "2^16 µs": 2.0**16 * 1e-6,
     "2^32 ns": 2.0**32 * 1e-9,
@@ -23,13 +23,13 @@ WRAPS_S = {
     "a week": 604800.0,
     "2^32 ms": 2.0**32 * 1e-3,
 }
-"""Where counters and clocks begin again, shortest first [s]."""
+"""Periods after which counters and clocks begin again, shortest first [s]."""
 WRAP_STEPS = 50.0
-"""A fall is a wrap where the step that remains is no longer than so many usual ones."""
+"""Largest step that may remain after a wrap, as a multiple of the usual step."""
 REPEATS_KEPT = 4_000_000
 FALLS_KEPT = 100
 FALLS_LOOKED_AT = 20_000
-"""More falls are counted, and none of them is taken as a wrap."""
+"""Number of falls beyond which they are only counted, and none is taken as a wrap."""
 
 Stamps = NDArray[np.int64] | Array
 
@@ -42,7 +42,7 @@ class Fall:
     before: int | float
     after: int | float
     wrap: str | None
-    """The name of the period that the clock begins again with; None: it is no wrap."""
+    """Name of the period after which the clock began again; None: the fall is no wrap."""
 
 
 @dataclass
@@ -53,18 +53,18 @@ class ClockColumn:
     unwrap: bool
     count: int = 0
     falls: list[Fall] = field(default_factory=list[Fall])
-    """The first of them; those that were carried on are in `wraps`."""
+    """First falls of the column; those that were continued as wraps are in `wraps`."""
     fall_count: int = 0
     wraps: list[Fall] = field(default_factory=list[Fall])
     still: int = 0
-    """Steps of zero."""
+    """Number of steps whose length is zero."""
     resolution: Resolution = field(default_factory=Resolution)
     largest: float = 0.0
     """Largest stamp without its sign, in the column's unit."""
     first: int | float = 0
     typical_s: float | None = None
     same: int = 0
-    """Rows whose channels equal those of the row before, whatever their time."""
+    """Number of rows whose channels equal those of the row before, whatever their time."""
     _carried_s: float = 0.0
     _last_s: float = 0.0
     _last_raw: int | float = 0
@@ -73,7 +73,7 @@ class ClockColumn:
     _times: SpooledTemporaryFile[bytes] = field(default_factory=lambda: SpooledTemporaryFile(IN_MEMORY_BYTES))  # noqa: SIM115  closed by `close`
 
     def add(self, stamps: Stamps, same: NDArray[np.bool_]) -> None:
-        """The next rows: their stamps in the column's unit, and whether the channels of each equal the row before's."""
+        """Add the next rows: stamps in the column's unit, and whether each row's channels repeat the last row's."""
         if not self.count:
             self.first = stamps[0].item()
         time_s = self._relative(stamps)
@@ -96,7 +96,7 @@ class ClockColumn:
         self._times.write(time_s.tobytes())
 
     def close(self) -> None:
-        """Give the room of the stamps back."""
+        """Free the memory of the stamps."""
         self._times.close()
 
     def _relative(self, stamps: Stamps) -> Array:
@@ -111,7 +111,7 @@ class ClockColumn:
         return units * self.scale_s + self._carried_s
 
     def _fall(self, falls: NDArray[np.intp], steps: Array, stamps: Stamps, row: int, time_s: Array) -> None:
-        """Note falls; those that are wraps are carried on where that is wanted, in place."""
+        """Record the falls of the stamps; continue those that are wraps where that is wanted, in place."""
         shift = len(steps) - len(time_s)  # −1 in the first block, whose first stamp has no step
         carried = np.zeros(len(time_s))
         looked_at = falls[: max(0, FALLS_LOOKED_AT - self.fall_count)]
@@ -161,12 +161,12 @@ class ClockColumn:
 
     @property
     def duration_s(self) -> float:
-        """From the first stamp to the last."""
+        """Return the time from the first stamp to the last [s]."""
         return self._last_s
 
 
 def windows(count: int, length: int, most: int) -> Sequence[tuple[int, int]]:
-    """At most so many stretches of the given length, evenly over `count` rows."""
+    """Select stretches of the given length evenly over `count` rows, up to a largest number of them."""
     whole = max(1, count // length)
     picked = np.unique(np.linspace(0, whole - 1, min(most, whole)).astype(int))
     return [(int(p) * length, min(count, int(p + 1) * length + 1)) for p in picked]

@@ -1,4 +1,4 @@
-"""Doubts about the rate of a time column: another than declared, unlikely, or of another unit than its name says."""
+"""Doubts about the rate of a time column: not the declared one, unlikely, or in a unit that its name contradicts."""
 
 import re
 
@@ -9,7 +9,7 @@ from procedures.core.errors import BadParameter
 from procedures.core.recording import Quantity
 
 CRYSTAL = 1e-4
-"""By so much the rate of an ordinary quartz may be off what is declared; more is said."""
+"""Largest relative error of an ordinary quartz's rate; beyond it a doubt is reported."""
 FASTEST_HZ, SLOWEST_HZ = 20_000.0, 1.0
 """Beyond them a rate is unlikely for an inertial unit."""
 _NAMED_UNIT = re.compile(
@@ -20,7 +20,7 @@ _SPELLED = {"n": "ns", "u": "us", "µ": "us", "mic": "us", "mil": "ms", "ms": "m
 
 
 def require_declared(name: str, rate_hz: float, description: ImportDescription) -> None:
-    """Raises `BadParameter` where the declared rate is another one."""
+    """Check the declared rate. Raises `BadParameter` where it is another one."""
     declared = description.rate_hz
     if declared is None or abs(rate_hz / declared - 1.0) <= description.rate_tolerance:
         return
@@ -56,12 +56,12 @@ def doubts(
 
 
 def clock_error_s(pattern: Pattern, resolution_s: float) -> float:
-    """By how much stamps may be off their places, for all that is known [s]."""
+    """Largest error of the stamps' places, for all that is known [s]."""
     return resolution_s + (0.0 if pattern.kind in ("steady", "coarse") else pattern.band_s)
 
 
 def _name_doubts(rate_hz: float, column: ClockColumn, description: ImportDescription, column_name: str) -> list[str]:
-    """A sentence where the name of the column says another unit than the description."""
+    """Describe the doubt where the name of the column gives another unit than the description."""
     named = _NAMED_UNIT.search(column_name)
     unit = description.time_unit
     if named is None or unit not in SECONDS or column.scale_s != SECONDS[unit]:

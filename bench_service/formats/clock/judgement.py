@@ -18,14 +18,14 @@ from procedures.core.errors import UnfitRecording
 LOST_DIGITS = 9.9
 """Ratio of the resolutions within one column that shows digits lost in printing."""
 MOST_PLACES = 100
-"""Gaps that are kept with the recording."""
+"""Number of gaps that are kept with the recording."""
 _UNPADDED = '; where milliseconds are written without leading zeros (31.18 for 31.018), ask for clock_fraction = "ms"'
 _UNSORTED = f"; nothing is sorted: give the rows before or after it (rows), or {NO_TIME}"
 
 
 @dataclass(frozen=True)
 class ClockFindings:
-    """A time column that was accepted."""
+    """Findings about a time column that was accepted."""
 
     rate_hz: float
     """Samples over time, those that are lost counted in."""
@@ -34,10 +34,10 @@ class ClockFindings:
     gaps: NDArray[np.int64]
     """Rows, from 0 in what is read, after which samples are lost."""
     lost: NDArray[np.int64]
-    """How many, for each of `gaps`."""
+    """Number of lost samples for each of `gaps`."""
     warnings: tuple[str, ...]
     document: dict[str, Any]
-    """The same as JSON, to be kept with the recording."""
+    """The findings as JSON, to be kept with the recording."""
 
 
 def judge(name: str, column: ClockColumn, description: ImportDescription, column_name: str) -> ClockFindings:
@@ -87,7 +87,7 @@ def _repeats(column: ClockColumn) -> NDArray[np.int64]:
 
 
 def _require_growing(name: str, column: ClockColumn, description: ImportDescription) -> None:
-    """Raises `UnfitRecording` where the time falls, or never moves."""
+    """Check the order of the stamps. Raises `UnfitRecording` where the time falls, or never moves."""
     if column.fall_count:
         first, more = column.falls[0], others(column.fall_count - 1)
         where = fall(first, column, description)
@@ -106,7 +106,7 @@ def _require_growing(name: str, column: ClockColumn, description: ImportDescript
 
 
 def _require_whole(name: str, found: Sentences) -> None:
-    """Raises `UnfitRecording` with all that is lost and doubled, and the ways out."""
+    """Check for lost and doubled rows. Raises `UnfitRecording` with all of them, and the ways out."""
     problems: list[str] = []
     ways: list[str] = []
     if len(found.repeats) and found.description.repeats == "refuse":

@@ -1,4 +1,4 @@
-"""Where rows are lost: places at which the stamps of all later rows lie behind by whole periods."""
+"""Places where rows are lost: from there on all stamps lie behind by whole periods."""
 
 from dataclasses import dataclass, field
 
@@ -16,7 +16,7 @@ EARLY = 8
 EVEN = 0.1
 """Part of their mean by which the distances of slips may differ."""
 MOST_LOST = 1e12
-"""Samples in one place: what a stamp of nonsense says is cut off there."""
+"""Largest number of lost samples in one place: the number from a nonsensical stamp is clipped to it."""
 MADE_UP_FOR = 10_000
 """More falls of the level than that are not compared with the rises before them: such a clock is of no use."""
 
@@ -28,20 +28,20 @@ class Places:
     rows: NDArray[np.int64]
     """The row before the step, from 0."""
     samples: NDArray[np.int64]
-    """Samples lost there; negative: rows more than the time has room for."""
+    """Number of samples lost at each place; negative: rows more than the time has room for."""
     late_rows: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-    """The row before each stretch of rows whose stamps are late or early, with nothing lost."""
+    """The row before each stretch of rows whose stamps are late or early, without lost samples."""
     late: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-    """By how many periods they are off."""
+    """Number of periods by which they are off."""
 
     @property
     def lost(self) -> int:
-        """All samples that are lost."""
+        """Total number of lost samples."""
         return int(self.samples[self.samples > 0].sum())
 
     @property
     def surplus(self) -> int:
-        """All rows that the time has no room for."""
+        """Total number of rows for which the time has no room."""
         return int(-self.samples[self.samples < 0].sum())
 
     def before(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:

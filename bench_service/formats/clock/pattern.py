@@ -1,4 +1,4 @@
-"""How the stamps of a recording come: at the sample period, coarsely, with rows lost, or as they arrived, in batches.
+"""Pattern of the stamps of a recording: at the sample period, coarse, with rows lost, or as they arrived, in batches.
 
 Model: the stamp of sample k is ``t_k = t_0 + k·P + e_k``. A coarse clock has ``|e_k|`` within its resolution, a late
 arrival ``e_k ≥ 0`` that returns to nought, and a lost row raises k for good. A median of the steps knows neither.
@@ -13,25 +13,25 @@ import numpy as np
 from procedures.core.arrays import Array
 
 CHUNK = 64
-"""Rows over which a clock's own error is looked at."""
+"""Number of rows over which a clock's own error is estimated."""
 LONG_CHUNK = 1024
-"""Rows over which a mean step is taken where rows come in batches."""
+"""Number of rows over which a mean step is taken where rows come in batches."""
 FEW = 16
-"""Fewer steps show no order: they are taken as steps of one length, and what differs as a loss."""
+"""Number of steps below which no order shows: they are taken as of one length, and deviations as losses."""
 COARSE = 0.9
 """Part of the resolution by which a stamp may be off its place on a coarse clock. Rounding is half of it."""
 ON_LATTICE = 0.9
 """Share of the steps that are whole multiples of one where rows are lost from a uniform clock."""
 SINGLE = 0.4
-"""Share of the steps that are that one itself."""
+"""Share of the steps that are that base itself."""
 DENSE = 0.6
 """The smallest ratio of the shortest step to the mean one that speaks for lost rows, where the order is regular."""
 LONG_AND_SHORT = 0.004
-"""By so much the period of long chunks may differ from that of short ones where no row is lost in most of them."""
+"""Largest difference of the periods of long and short chunks where no row is lost in most of them, relative."""
 MOST = 0.75
 """Quantile of the chunks' bands that is taken as the usual one."""
 SHARED = 1.5
-"""Periods: a resolution beyond them makes rows share stamps, and in regular batches is taken as those."""
+"""Resolution in periods beyond which rows share stamps, which counts as batches where they are regular."""
 CLEAN = 0.002
 """Share of shorter steps that speaks against lost rows where the clock resolves only a step or two of its own."""
 REGULAR = 0.9
@@ -40,19 +40,19 @@ REGULAR = 0.9
 
 @dataclass(frozen=True)
 class Pattern:
-    """How the stamps come."""
+    """Pattern in which the stamps of a recording come."""
 
     kind: Literal["steady", "coarse", "batches", "jitter"]
-    """steady: at the period; coarse: up to the clock's resolution; batches and jitter: as they arrived."""
+    """The kind of pattern. steady: at the period; coarse: up to the resolution; batches, jitter: as they arrived."""
     period_s: float
     band_s: float
-    """By how much stamps lie off their places, largest less smallest, over rows without a loss."""
+    """Spread of the stamps about their places, largest less smallest, over rows without a loss."""
     batch: int = 1
-    """Rows that come together."""
+    """Number of rows that come together."""
     span: int = 1
-    """Rows within which one is on time."""
+    """Number of rows within which one is on time."""
     usual_band_s: float = 0.0
-    """The same as `band_s` over most rows, where stamps come as they arrived."""
+    """Band like `band_s`, but over most rows, where stamps come as they arrived."""
 
 
 def find_pattern(
@@ -90,14 +90,14 @@ def find_pattern(
 
 
 def _expected(one_s: float, other_s: float, declared_s: float | None) -> bool:
-    """Whether the declared period speaks for one of two."""
+    """Return whether the declared period agrees with the first of two periods and not with the other."""
     if declared_s is None:
         return False
     return abs(one_s / declared_s - 1.0) < 0.05 and abs(other_s / declared_s - 1.0) >= 0.05
 
 
 def _chunks(stretches: Sequence[Array], rows: int) -> list[Array]:
-    """Whole chunks of so many rows, or the stretches themselves where they are shorter."""
+    """Split stretches into whole chunks of a length, or keep them where they are shorter."""
     found = [t[a : a + rows] for t in stretches for a in range(0, len(t) - rows + 1, rows)]
     return found or [t for t in stretches if len(t) > 1]
 
@@ -175,7 +175,7 @@ def _lines(times: Array) -> tuple[Array, Array]:
 
 
 def _is_lattice(steps: Array, base_s: float, tolerance: float, resolution_s: float) -> bool:
-    """Whether steps are whole multiples of a base, one of them itself most often."""
+    """Return whether steps are whole multiples of a base, and the base itself the most frequent of them."""
     if 3.0 * resolution_s > base_s and np.mean(steps < (1.0 - tolerance) * base_s) > CLEAN:
         return False
     multiples = np.rint(steps / base_s)
@@ -184,7 +184,7 @@ def _is_lattice(steps: Array, base_s: float, tolerance: float, resolution_s: flo
 
 
 def _batch(steps: Array, mean_s: float) -> int:
-    """How many rows come together, by the usual distance of long steps; 1: no order is to be seen."""
+    """Number of rows that come together, by the usual distance of long steps; 1: no order is visible."""
     long = np.flatnonzero(steps > 1.25 * mean_s)
     if len(long) < 4:
         return 1

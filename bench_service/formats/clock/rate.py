@@ -11,18 +11,18 @@ from bench_service.formats.clock.pattern import Pattern
 from procedures.core.arrays import Array
 
 STRETCH = 256
-"""Steps of time whose mean is compared with that of all: jitter of a fifth of a step is 0.2 % of it."""
+"""Number of steps whose mean is compared with that of all: jitter of a fifth of a step is 0.2 % of it."""
 WINDOW = 1 << 18
-"""Rows that are looked at together."""
+"""Number of rows that are processed together."""
 SLIPS = 0.4
-"""Periods: with a resolution beyond them a clock that is a little fast or slow slips by a tick now and then."""
+"""Resolution in periods beyond which a clock that is a little fast or slow slips by a tick now and then."""
 WHOLE = 0.9
-"""Periods: with a resolution beyond them a slip looks as a lost sample does."""
+"""Resolution in periods beyond which a slip looks like a lost sample."""
 PAUSE = 8
-"""More samples lost in one place are a pause."""
+"""Number of samples lost in one place beyond which the gap is a pause."""
 MOST_RUNS = 1000
 SAMPLES = 4
-"""Windows from which the pattern is found."""
+"""Number of windows from which the pattern is found."""
 
 
 class KeptRows:
@@ -71,7 +71,7 @@ class MeanRate:
 
     rate_hz: float
     places: Places
-    """In kept rows."""
+    """Places of lost samples, counted in kept rows."""
     worst: tuple[int, int, float, float]
     """First kept row from 0, samples, duration [s], and what is allowed, relative."""
     off: float
@@ -81,7 +81,7 @@ class MeanRate:
 def mean_rate(
     rows: KeptRows, pattern: Pattern, tolerances: tuple[float, float], resolutions_s: tuple[float, float]
 ) -> MeanRate:
-    """Samples over time. At least two rows, not of one time.
+    """Compute the mean rate, samples over time. At least two rows, not all of the same time.
 
     `tolerances` are of a step and of a rate, relative; `resolutions_s` the finest and the coarsest of the clock.
     """
@@ -130,12 +130,12 @@ def _walked(
 
 
 def stretch_of(count: int) -> int:
-    """Rows whose mean stamp is one point of the regression: fewer in a short column."""
+    """Number of rows whose mean stamp is one point of the regression: fewer in a short column."""
     return STRETCH if count >= 16 * STRETCH else max(1, count // 32)
 
 
 def _means(time_s: Array, stretch: int) -> Array:
-    """Mean stamp of each whole stretch."""
+    """Compute the mean stamp of each whole stretch."""
     whole = len(time_s) // stretch
     return time_s[: whole * stretch].reshape(whole, stretch).mean(axis=1)
 
@@ -196,7 +196,7 @@ def _worst(
     jitter_s: float,
     batch: int,
 ) -> tuple[tuple[int, int, float, float], float]:
-    """The stretch whose mean rate differs most from that of all, in parts of what is allowed."""
+    """Find the stretch whose mean rate differs most from that of all, in parts of the allowed difference."""
     group = max(1, batch // 4)
     last = rows.count - 1
     marks = np.arange(0, rows.count, STRETCH)[::group]

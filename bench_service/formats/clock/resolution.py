@@ -38,7 +38,7 @@ class Resolution:
     def __init__(self) -> None:
         self.finest = np.inf
         self.later = 0.0
-        """Coarsest of a part that follows finer ones: printed to so many digits, a stamp that grows loses some."""
+        """Coarsest resolution of a part that follows finer ones: with fixed digits, a stamp that grows loses some."""
         self._before = np.inf
 
     def add(self, stamps: Array, error: float) -> None:

@@ -17,7 +17,7 @@ NO_TIME = "leave time_column out and give rate_hz"
 
 @dataclass(frozen=True)
 class Sentences:
-    """A time column and what was found in it."""
+    """Writes the sentences on a time column and its findings."""
 
     column: ClockColumn
     description: ImportDescription
@@ -39,27 +39,27 @@ class Sentences:
         return self.rows[positive], self.mean.places.samples[positive]
 
     def repeated(self) -> str:
-        """Rows that were written twice."""
+        """Describe the rows that were written twice."""
         count = len(self.repeats)
         shown = [f"row {self._row(int(r))} ({self._at(int(r))})" for r in self.repeats[:SHOWN_PLACES]]
         verb = "rows repeat" if count > 1 else "row repeats"
         return f"{count} {verb} the row before, time and values: {', '.join(shown)}{_more(count)}"
 
     def lost(self) -> str:
-        """Samples that are missing, and where."""
+        """Describe the missing samples and their places."""
         rows, samples = self.gaps
         lost = self.mean.places.lost
         verb = "samples are" if lost > 1 else "sample is"
         return f"{lost} {verb} missing in {_places(len(rows))}: {self._placed(rows, samples)}"
 
     def surplus(self) -> str:
-        """Rows more than the time has room for."""
+        """Describe the rows for which the time has no room."""
         negative = self.mean.places.samples < 0
         placed = self._placed(self.rows[negative], -self.mean.places.samples[negative])
         return f"the time has no room for {self.mean.places.surplus} of the rows: {placed}"
 
     def range_without_gaps(self) -> list[str]:
-        """A range of rows that has no gap, where all gaps are near the beginning."""
+        """Suggest a range of rows without gap, where all gaps are near the beginning."""
         rows, _ = self.gaps
         last = int(rows[-1]) + 1
         if last > 0.05 * self.column.count:
@@ -67,7 +67,7 @@ class Sentences:
         return [f'rows = {{"first": {self._row(last)}}} begins after {"it" if len(rows) == 1 else "them"}']
 
     def done(self) -> list[str]:
-        """Rows that were left out, gaps that were marked, wraps that were carried on."""
+        """Describe rows that were left out, gaps that were marked, wraps that were continued."""
         found: list[str] = []
         if len(self.repeats):
             found.append(f"{self.repeated()}; they were left out")
@@ -88,7 +88,7 @@ class Sentences:
         return found
 
     def arrival(self, resolution_s: float) -> list[str]:
-        """Stamps that are those of arrival, or shared by several rows."""
+        """Describe stamps that are arrival times, or shared by several rows."""
         rate = f"the rate of {self.mean.rate_hz:.6g} Hz"
         lost = "what is lost is said apart" if self.mean.places.lost else "no sample is lost"
         if self.pattern.batch > 1:
@@ -108,7 +108,7 @@ class Sentences:
         return []
 
     def lost_digits(self, finest_s: float, coarsest_s: float) -> list[str]:
-        """Stamps that lose digits as they grow, so many that it matters."""
+        """Describe stamps that lose enough digits as they grow for it to matter."""
         if coarsest_s * self.mean.rate_hz < 0.05:
             return []
         return [
@@ -117,7 +117,7 @@ class Sentences:
         ]
 
     def not_uniform(self) -> str:
-        """The stretch whose rate differs most from that of the whole."""
+        """Describe the stretch whose rate differs most from that of the whole."""
         begin, samples, duration, allowed = self.mean.worst
         row = self._row(int(self.kept.row(np.array([begin]))[0]))
         return (
@@ -127,7 +127,7 @@ class Sentences:
         )
 
     def _row(self, row: int) -> int:
-        """A row as people count it, from 1 and in the whole table."""
+        """Format a row as people count it, from 1 and in the whole table."""
         return row + self.description.rows.first
 
     def _at(self, row: int) -> str:
@@ -142,7 +142,7 @@ class Sentences:
 
 
 def fall(place: Fall, column: ClockColumn, description: ImportDescription) -> str:
-    """A place where the time falls: both stamps with their rows."""
+    """Describe a place where the time falls: both stamps with their rows."""
     row = place.row + description.rows.first - 1
     clock = description.time_unit == "clock"
     unit, size = ("s", 1e-9) if clock else (_UNIT[column.scale_s], 1)
@@ -151,7 +151,7 @@ def fall(place: Fall, column: ClockColumn, description: ImportDescription) -> st
 
 
 def others(count: int) -> str:
-    """Places besides the one that is shown."""
+    """Mention the number of further falls besides the one that is shown."""
     return f", and falls in {count} more {'places' if count > 1 else 'place'}" if count else ""
 
 

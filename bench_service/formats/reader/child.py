@@ -1,4 +1,4 @@
-"""The process that reads one import: it limits itself, reads, sends what it found and the samples, and ends."""
+"""Child process that reads one import: it limits itself, reads, sends findings and samples, and ends."""
 
 import errno
 import json
@@ -19,7 +19,7 @@ from bench_service.formats.reader.frames import CHILD, END, FOUND, REFUSED, SAMP
 from procedures.core.errors import BadParameter, DomainError, UnfitRecording
 
 SENT_BYTES = 1024 * 1024
-"""Most bytes of samples in a frame."""
+"""Largest number of sample bytes in a frame."""
 MOST_FILES = 64
 SPOOLED_BYTES = 2_000 * MEGABYTE
 """Largest file that a reader may write: stamps that do not fit into its memory."""
@@ -40,11 +40,11 @@ def serve(line: socket.socket) -> None:
         ]
         _answer(line, files, ImportDescription.model_validate_json(asked["description"]))
     except (OSError, Broken):
-        return  # whoever asked does not want to know any more
+        return  # the client has gone
 
 
 def _limit(bounds: Bounds) -> None:
-    """No more memory, processor time and file than the import may have; a platform without a limit has none."""
+    """Limit memory, processor time and file size to the import's; a platform without a limit has none."""
     pages = int(Path("/proc/self/statm").read_text().split()[0]) if Path("/proc/self/statm").exists() else 0
     wanted = {
         resource.RLIMIT_CPU: int(2 * bounds.time_s) + 1,
@@ -88,7 +88,7 @@ def _found(imported: ImportedRecording) -> dict[str, Any]:
 
 
 def _refusal(error: Exception, name: str) -> dict[str, Any]:
-    """A refusal as JSON; the client makes the same error of it."""
+    """Convert a refusal to JSON; the client makes the same error of it."""
     if isinstance(error, UnreadableFile):
         return {"kind": "unreadable", "name": error.name, "problem": error.problem}
     if isinstance(error, BadParameter):

@@ -1,4 +1,4 @@
-"""The service's side of reading a file: a process is asked, waited for within a deadline, and believed in nothing."""
+"""Client of the process that reads a file: it waits within a deadline, and trusts nothing that comes back."""
 
 import json
 import logging
@@ -30,9 +30,9 @@ from procedures.core.recording import Channel, RawArray
 logger = logging.getLogger(__name__)
 
 AT_ONCE = 2
-"""Files that are read at one time."""
+"""Largest number of files that are read at one time."""
 LOADING_S = 60.0
-"""For which the host may be loading its readers."""
+"""Time that the host may take to load its readers [s]."""
 _ENVIRONMENT = {
     "ARROW_DEFAULT_MEMORY_POOL": "system",
     "MALLOC_ARENA_MAX": "1",
@@ -55,18 +55,18 @@ class NoRoom(Exception):
 
 @dataclass
 class _Budget:
-    """For how long a process may be waited for, all its waits together [s]."""
+    """Time for which a process may be waited for, all its waits together [s]."""
 
     left_s: float
     line: socket.socket = field(repr=False)
     _since_s: float = field(default_factory=monotonic_s)
 
     def begin(self) -> None:
-        """The wait begins, or goes on."""
+        """Start or continue the wait."""
         self._since_s = monotonic_s()
 
     def before_wait(self) -> None:
-        """Take what has passed. Raises `TimeoutError`."""
+        """Subtract the time that has passed. Raises `TimeoutError`."""
         now_s = monotonic_s()
         self.left_s -= now_s - self._since_s
         self._since_s = now_s
@@ -88,7 +88,7 @@ class _Reading:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """The channels of the recording."""
+        """Channels of the imported recording."""
         return tuple(channel.channel() for channel in self.description.channels)
 
     def blocks(self) -> Iterator[RawArray]:
@@ -116,13 +116,13 @@ class FileReader:
         self._places = threading.BoundedSemaphore(AT_ONCE)
 
     def close(self) -> None:
-        """End the host; a reading that is under way ends as it would."""
+        """Stop the host process; a reading that is under way ends as it would."""
         with self._lock:
             self._end_host()
 
     @contextmanager
     def reading(self, files: Sequence[ImportFile], description: ImportDescription) -> Generator[_Reading]:
-        """Files that were checked whole, their samples to be taken within the block.
+        """Check files whole; their samples can be taken within the block.
 
         Raises `UnreadableFile`, `UnfitRecording`, `BadParameter`, and `NoRoom`, `NoReader`.
         """
@@ -141,7 +141,7 @@ class FileReader:
             yield _Reading(description, found["rate_hz"], found["count"], dtype, found["source"], line)
 
     def _connected(self) -> socket.socket:
-        """A line to a new child. Raises `NoReader`."""
+        """Open a line to a new child. Raises `NoReader`."""
         with self._lock:
             for last in (False, True):
                 ours, theirs = socket.socketpair()
@@ -157,7 +157,7 @@ class FileReader:
         raise NoReader("the process that reads files is gone")
 
     def _running(self) -> socket.socket:
-        """The line to the host, which is begun where there is none. Raises `OSError`."""
+        """Return the line to the host, which is started if needed. Raises `OSError`."""
         if self._control is not None and self._host is not None and self._host.poll() is None:
             return self._control
         self._end_host()
@@ -191,7 +191,7 @@ class FileReader:
 
 
 class _Line:
-    """The line to one child; at its end the child is gone, whatever it was doing."""
+    """Line to one child; at its end the child is gone, whatever it was doing."""
 
     def __init__(self, line: socket.socket, names: Sequence[str], bounds: Bounds) -> None:
         self._line = line
@@ -199,7 +199,7 @@ class _Line:
         self._bounds = bounds
         self._budget = _Budget(bounds.time_s, line)
         self._child: int | None = None
-        """A descriptor of its process: another one that gets its number is not meant."""
+        """Open a descriptor of its process, so that another process with the same number is never meant."""
 
     def __enter__(self) -> "_Line":
         return self
@@ -212,7 +212,7 @@ class _Line:
         self._line.close()
 
     def ask(self, descriptors: Sequence[int], description: ImportDescription) -> None:
-        """Hand the files over. Raises `NoReader`."""
+        """Hand the files over to the child. Raises `NoReader`."""
         try:
             self._line.settimeout(LOADING_S)
             socket.send_fds(self._line, [b"f"], list(descriptors))
@@ -227,7 +227,7 @@ class _Line:
             raise NoReader(f"the process that reads files is gone: {error}") from error
 
     def frame(self) -> tuple[bytes, bytes]:
-        """The next frame; what the child refuses is raised."""
+        """Receive the next frame; raise the refusal that the child sent."""
         self._budget.begin()
         try:
             kind, payload = receive(self._line, self._budget.before_wait)
@@ -246,7 +246,7 @@ class _Line:
 
 
 def _refused(refusal: dict[str, Any], bounds: Bounds) -> Exception:
-    """The error that a child met."""
+    """Rebuild the error that a child met."""
     kind = refusal["kind"]
     if kind == "unreadable":
         return UnreadableFile(refusal["name"], refusal["problem"])
@@ -267,7 +267,7 @@ def _refused(refusal: dict[str, Any], bounds: Bounds) -> Exception:
 
 
 def _descriptor(stream: BinaryIO, closing: ExitStack) -> int:
-    """A descriptor of a stream's file; what lies in memory is written into one without a name. Raises `NoRoom`."""
+    """Return a descriptor of a stream's file; a stream in memory is copied into an unnamed one. Raises `NoRoom`."""
     try:
         stream.flush()
         return stream.fileno()

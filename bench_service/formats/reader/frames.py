@@ -1,4 +1,4 @@
-"""Frames on the socket between the service and the process that reads: a kind, a length, and so many bytes."""
+"""Frames on the socket between the service and the reading process: kind, length, and as many bytes."""
 
 import json
 import socket
@@ -8,18 +8,18 @@ from typing import Any
 
 HEAD = struct.Struct("!cI")
 LARGEST = 64 * 1024 * 1024
-"""Bytes of a frame; the child is not believed."""
+"""Largest payload of a frame [bytes]; the child is not trusted."""
 
 CHILD, FOUND, SAMPLES, END, REFUSED = b"P", b"H", b"B", b"E", b"X"
-"""Kinds: the child's process id, what the files say together, samples row by row, their end, or the refusal."""
+"""Kinds of frames: the child's process id, the findings, samples row by row, their end, or the refusal."""
 
 
 class Broken(Exception):
-    """The other side is gone, or sent what is no frame."""
+    """The other side is gone, or sent no valid frame."""
 
 
 def send(line: socket.socket, kind: bytes, payload: bytes | memoryview) -> None:
-    """Send a frame. Raises `OSError`."""
+    """Send a frame of a kind over the line. Raises `OSError`."""
     line.sendall(HEAD.pack(kind, len(payload)))
     line.sendall(payload)
 
@@ -30,7 +30,7 @@ def send_json(line: socket.socket, kind: bytes, document: Any) -> None:
 
 
 def receive(line: socket.socket, before: Callable[[], None] = lambda: None) -> tuple[bytes, bytes]:
-    """The next frame; `before` is called ahead of each wait. Raises `Broken`, `TimeoutError`."""
+    """Receive the next frame; `before` is called ahead of each wait. Raises `Broken`, `TimeoutError`."""
     kind, length = HEAD.unpack(_exactly(line, HEAD.size, before))
     if length > LARGEST:
         raise Broken(f"a frame of {length} bytes")

@@ -1,4 +1,4 @@
-"""The process that has the readers of files loaded: it forks one child an import, which begins in milliseconds.
+"""Host process with the file readers loaded: it forks one child for each import, which starts in milliseconds.
 
 It has one thread and opens no file itself. It ends when the service closes the line between them.
 """

@@ -1,6 +1,6 @@
-"""What processes of one host tell one another about a bench: who drives it, and who supervises it.
+"""Files by which processes of one host know which of them drives and which supervises a bench.
 
-Two small files beside the devices' register. Must not know what is driven.
+Two small files for each bench, next to the devices' register. Must not know what is driven.
 """
 
 import fcntl
@@ -14,7 +14,7 @@ from bench_service.model.errors import BenchBusy
 
 
 class HostFiles:
-    """`bench_service.bench.processes.Watch`, and how a process says that it drives or supervises."""
+    """Marks this process as driver or supervisor of a bench, and implements `bench_service.bench.processes.Watch`."""
 
     def __init__(self, folder: Path, bench_id: str) -> None:
         self._bench_id = bench_id
@@ -22,7 +22,7 @@ class HostFiles:
         self._supervisor = folder / f"bench-{bench_id}.supervisor"
 
     def driving(self) -> Driving | None:
-        """Which process drives, or last drove, the bench from this host."""
+        """Return the process that drives, or last drove, the bench from this host."""
         try:
             document = json.loads(self._driver.read_text(encoding="utf-8"))
             return Driving(ProcessIdentity(**document["process"]), document["ended"])
@@ -30,16 +30,16 @@ class HostFiles:
             return None
 
     def begin_driving(self) -> None:
-        """Say that this process drives the bench. Its lease must be held."""
+        """Record that this process drives the bench. Its lease must be held."""
         self._driver.parent.mkdir(parents=True, exist_ok=True)
         self._write(False)
 
     def end_driving(self) -> None:
-        """Say that this process has ended in order. Its lease must still be held."""
+        """Record that this process has ended in order. Its lease must still be held."""
         self._write(True)
 
     def supervisor(self) -> ProcessIdentity | None:
-        """The process that supervises the bench on this host, if one lives."""
+        """Return the process that supervises the bench on this host, if one lives."""
         try:
             process = ProcessIdentity(**json.loads(self._supervisor.read_text(encoding="utf-8")))
         except (OSError, ValueError, TypeError):

@@ -1,6 +1,6 @@
 """The right to drive a bench: one process at a time, held for its life, and free again the moment it dies.
 
-On SQLite it is a lock on a file beside the database (the kernel drops it with the process); on Postgres an advisory
+On SQLite it is a lock on a file next to the database (the kernel drops it with the process); on Postgres an advisory
 lock of a connection that is used for nothing else (the server drops it with the connection). Must not know what is
 driven.
 """
@@ -24,29 +24,29 @@ from bench_service.model.errors import BenchBusy
 from bench_service.persistence.database import TCP, Database, storage_errors
 
 PASSING_S = 5.0
-"""How long a process that starts waits for a supervisor that makes the bench safe at this moment [s]."""
+"""Time for which a process that starts waits for a supervisor that is just making the bench safe [s]."""
 SUPERVISOR = "supervisor"
 
 
 class BenchLease(ABC):
-    """The right to drive a bench, held for a process's life, and whether it is still ours."""
+    """Lease of a bench, held for the life of a process, with a check that it is still held."""
 
     def __init__(self, bench_id: str, role: str) -> None:
-        """Take the bench. Raises `BenchBusy`."""
+        """Take the lease of the bench. Raises `BenchBusy`."""
         self._bench_id = bench_id
         self._role = role
         self._mutex = threading.Lock()
         self._given_back = False
         self._right: Any = self._take()
-        """That by which it is held, an open file or a connection; None: nothing."""
+        """The open file or the connection that holds the lease; None: nothing."""
 
     def held(self) -> bool:
-        """Whether the bench is still ours."""
+        """Return whether this process still holds the lease of the bench."""
         with self._mutex:
             return self._right is not None and self._is_ours(self._right)
 
     def regain(self) -> bool:
-        """Take the bench again, after it was taken away; False where somebody else was first or it cannot be now."""
+        """Take the bench again after the lease was lost; False where another process was first, or on a failure."""
         with self._mutex:
             self._drop()
             if self._given_back:  # a thread that looks once more while the process ends
@@ -58,7 +58,7 @@ class BenchLease(ABC):
             return True
 
     def release(self) -> None:
-        """Give the bench back, for good; a second time does nothing."""
+        """Release the lease for good; a second call does nothing."""
         with self._mutex:
             self._given_back = True
             self._drop()
@@ -70,7 +70,7 @@ class BenchLease(ABC):
 
     @abstractmethod
     def _take(self) -> Any:
-        """Raises `BenchBusy`, and what file or database raise."""
+        """Take the lease of the bench. Raises `BenchBusy`, and the errors of file or database."""
 
     @abstractmethod
     def _is_ours(self, right: Any) -> bool: ...
@@ -80,7 +80,7 @@ class BenchLease(ABC):
 
 
 def acquire_lease(database_url: str, bench_id: str, role: str = "process") -> BenchLease:
-    """Take the bench, at once or not at all; only a supervisor, which has it for a moment, is waited for.
+    """Acquire the lease at once or not at all; only a supervisor, which has it for a moment, is waited for.
 
     `role`: as what others shall name the holder. Raises `BenchBusy`, naming the holder where it is known.
     """
@@ -103,7 +103,7 @@ def _lease(database_url: str, bench_id: str, role: str) -> BenchLease:
 
 
 def _written_holder(file: int) -> str:
-    """Role and process id in a lock file; its holder writes it a moment after it took the lock."""
+    """Read role and process id from a lock file; its holder writes it a moment after it took the lock."""
     for _ in range(20):
         holder = os.pread(file, 32, 0).decode(errors="replace").strip()
         if holder:
@@ -113,7 +113,7 @@ def _written_holder(file: int) -> str:
 
 
 class FileLease(BenchLease):
-    """A locked file, with the holder's process id in it."""
+    """Lease by a locked file, with the holder's process id in it."""
 
     def __init__(self, path: Path, bench_id: str, role: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -121,7 +121,7 @@ class FileLease(BenchLease):
         super().__init__(bench_id, role)
 
     def _is_ours(self, right: int) -> bool:
-        """Whether the locked file is still the one that others would lock."""
+        """Return whether the locked file is still the one that other processes would lock."""
         try:
             there = self._path.stat()
         except OSError:
@@ -133,13 +133,13 @@ class FileLease(BenchLease):
         os.close(right)
 
     def _take(self) -> int:
-        """The file, locked, with our process id in it."""
+        """Open the file, lock it and write this process's id into it."""
         file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
             self._lock(file)
             os.ftruncate(file, 0)
             os.pwrite(file, f"{self._role} {os.getpid()}\n".encode(), 0)
-        except BaseException:  # a full disk: an open file that nobody knows would keep the lock from us too
+        except BaseException:  # a full disk: a leaked open file would keep the lock
             os.close(file)
             raise
         return file
@@ -152,11 +152,11 @@ class FileLease(BenchLease):
             except BlockingIOError:
                 if not again:
                     raise _busy(self._bench_id, _written_holder(file)) from None
-            wall_clock.pause(0.01)  # it may only be somebody who looks whether it is taken: `lease_holder`
+            wall_clock.pause(0.01)  # perhaps `lease_holder` is only testing the lock
 
 
 class ServerLease(BenchLease):
-    """An advisory lock of a connection of its own."""
+    """Lease by an advisory lock of a connection of its own."""
 
     def __init__(self, url: URL, bench_id: str, role: str) -> None:
         self._key = lease_key(bench_id)
@@ -172,7 +172,7 @@ class ServerLease(BenchLease):
         super().__init__(bench_id, role)
 
     def _is_ours(self, right: Connection) -> bool:
-        """Ask the server over the connection that has the lock: while it answers, the lock is ours."""
+        """Ask the server over the connection that holds the lock: while it answers, the lock is held."""
         try:
             right.execute(text("SELECT 1"))
         except SQLAlchemyError:
@@ -185,7 +185,7 @@ class ServerLease(BenchLease):
         right.close()
 
     def _take(self) -> Connection:
-        """A connection that has the lock."""
+        """Open a connection that holds the lock."""
         connection = self._engine.connect()
         try:
             if not connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": self._key}):
@@ -197,7 +197,7 @@ class ServerLease(BenchLease):
 
 
 def lease_holder(database: Database, database_url: str, bench_id: str) -> str | None:
-    """Who drives a bench now, in a person's words; None: nobody, or only a supervisor that makes it safe.
+    """Name the process that drives a bench now, for a person; None: none, or only a supervisor that makes it safe.
 
     On SQLite the lock is tried for a moment in its shared form, which a process that starts meanwhile waits out.
     """
@@ -224,18 +224,18 @@ def _worker(holder: str | None) -> str | None:
 
 
 def _busy(bench_id: str, who: str | None) -> BenchBusy:
-    """For example: bench 'sim' is driven by process 4711."""
+    """Build the refusal of a lease, for example: bench 'sim' is driven by process 4711."""
     named = who or "another process"
     return BenchBusy(f"bench {bench_id!r} is driven by {named}", passing=f"{SUPERVISOR} " in named)
 
 
 def lease_key(bench_id: str) -> int:
-    """The advisory lock of a bench."""
+    """Compute the key of a bench's advisory lock."""
     return int.from_bytes(hashlib.sha256(f"bench lease {bench_id}".encode()).digest()[:8], "big", signed=True)
 
 
 def holder(connection: Connection | Session, key: int) -> str | None:
-    """Who has an advisory lock, in the words of its connection; None where nobody has it."""
+    """Return the holder of an advisory lock, by its connection's application name; None where the lock is free."""
     query = text(
         "SELECT a.application_name FROM pg_locks l JOIN pg_stat_activity a ON a.pid = l.pid "
         "WHERE l.locktype = 'advisory' AND l.granted AND l.objsubid = 1 "

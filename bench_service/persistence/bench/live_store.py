@@ -1,4 +1,4 @@
-"""What benches do now, in SQL: one row a bench, replaced at each word."""
+"""Live states of benches in SQL: one row for each bench, replaced at each update."""
 
 from pydantic import TypeAdapter
 from sqlalchemy import select
@@ -11,7 +11,7 @@ LIVE = TypeAdapter(BenchLive)
 
 
 class SqlLiveStore:
-    """`bench_service.bench.live.values.LiveStore`."""
+    """SQL implementation of `bench_service.bench.live.values.LiveStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -14,7 +14,7 @@ from bench_service.persistence.tables.jobs import JobRow
 
 
 class SqlPromptStore:
-    """`bench_service.bench.prompts.PromptStore`."""
+    """SQL implementation of `bench_service.bench.prompts.PromptStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -24,7 +24,7 @@ _FIELDS = tuple(column.key for column in BenchStopRow.__table__.columns)
 
 
 class SqlBenchRegistry:
-    """`bench_service.bench.registry.BenchRegistry`."""
+    """SQL implementation of `bench_service.bench.registry.BenchRegistry`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -104,7 +104,7 @@ class SqlBenchRegistry:
 
 
 def standing_stops(session: Session, bench_id: str, limit: int | None = None) -> tuple[BenchStop, ...]:
-    """The stops of a bench that stand, oldest first."""
+    """Read the stops of a bench that stand, oldest first."""
     query = select(BenchStopRow).where(BenchStopRow.bench == bench_id, _STANDS)
     ordered = query.order_by(BenchStopRow.at, BenchStopRow.id).limit(limit)
     return tuple(map(_stop_of_row, session.scalars(ordered)))

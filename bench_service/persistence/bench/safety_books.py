@@ -1,7 +1,7 @@
-"""What a supervisor reads and writes in the database: the stop of its bench, and what it did.
+"""Database access of a supervisor: it reads the stops of its bench, and writes its own actions.
 
-Of all tables it needs these few, and loads nothing else. The database is opened when it is first asked, so that a
-supervisor works without one that does not answer.
+It needs few tables, and loads nothing else. The database is opened at the first query, so that a supervisor works
+even while the database does not answer.
 """
 
 from functools import cached_property
@@ -25,7 +25,7 @@ from bench_service.persistence.telemetry.audit_store import SqlAuditTrail
 
 
 class SqlSafetyBooks:
-    """`bench_service.bench.supervisor.SafetyBooks` of one bench."""
+    """SQL implementation of `bench_service.bench.supervisor.SafetyBooks` for one bench."""
 
     def __init__(self, database_url: str, bench_id: str) -> None:
         self._url = database_url
@@ -75,7 +75,7 @@ class SqlSafetyBooks:
                 return
 
     def _stands(self, *conditions: ColumnElement[bool]) -> bool:
-        """Whether the bench has a stop of which all this is true."""
+        """Return whether the bench has a stop that meets all conditions."""
         query = select(BenchStopRow.id).where(BenchStopRow.bench == self._bench_id, *conditions).limit(1)
         with self._database.read() as session:
             return session.scalar(query) is not None

@@ -1,6 +1,6 @@
-"""Where the supervisors of benches listen for stops, in the benches' own rows.
+"""Addresses where the supervisors of benches listen for stops, kept in the benches' own rows.
 
-A bench that is registered anew loses it; its supervisor says it again with its next look.
+A bench that is registered anew loses its address; its supervisor writes it again at its next poll.
 """
 
 from sqlalchemy import select
@@ -13,19 +13,19 @@ KEY = "stops_taken_at"
 
 
 class SqlStopAddresses:
-    """Written by supervisors, read by every API."""
+    """Addresses written by supervisors and read by every API process."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
 
     def all(self) -> dict[str, Listening]:
-        """By bench; without those whose supervisor has said none. Raises `StorageFailure`."""
+        """Return the addresses by bench; benches without one are left out. Raises `StorageFailure`."""
         with self._database.read() as session:
             rows = session.execute(select(BenchRow.id, BenchRow.document)).all()
         return {name: Listening(**document[KEY]) for name, document in rows if KEY in document}
 
     def say(self, bench_id: str, at: Listening) -> None:
-        """Remember where a bench's supervisor listens. Raises `StorageFull`, `StorageFailure`."""
+        """Store the address where a bench's supervisor listens. Raises `StorageFull`, `StorageFailure`."""
         said = {"address": at.address, "host": at.host}
         with self._database.read() as session:
             document = session.scalar(select(BenchRow.document).where(BenchRow.id == bench_id))

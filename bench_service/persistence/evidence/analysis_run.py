@@ -1,4 +1,4 @@
-"""What a process of analyses opens for itself: a connection to the database, the catalogue, and the numerics."""
+"""Entry point of an analysis process: its connection to the database, its catalogue, and the numerics."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from bench_service.persistence import open_stores
 
 
 def open_run(database_url: str, code_version: str) -> Run:
-    """See `WorkProcesses`: "method" and "again", with the arguments of `AnalysisService`'s verbs."""
+    """Prepare an analysis process, see `WorkProcesses`: "method" and "again" are verbs of `AnalysisService`."""
     from threadpoolctl import threadpool_limits
 
     stores, _ = open_stores(database_url)  # it is closed with the process

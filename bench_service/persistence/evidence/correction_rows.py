@@ -1,4 +1,4 @@
-"""Corrections as rows and back, and how they join a unit. Knows the shapes only; no transaction begins here."""
+"""Conversion of corrections to rows and back, and their place in a unit's history. No transaction begins here."""
 
 from collections.abc import Sequence
 
@@ -18,20 +18,20 @@ CORRECTION = TypeAdapter(UnitCorrection)
 
 
 def correction_of_row(row: CorrectionRow) -> StoredCorrection:
-    """The correction that a row keeps."""
+    """Convert a row to its correction."""
     correction = CORRECTION.validate_python(row.document)
     return copied(StoredCorrection, row, current=row.is_current, correction=correction)
 
 
 def check_corrections(session: Session, result: StoredResult) -> None:
-    """The corrections that a result rests on must exist. Raises `NotFound`."""
+    """Check that the corrections of a result exist. Raises `NotFound`."""
     for correction_id in result.corrections:
         if session.scalar(select(CorrectionRow.id).where(CorrectionRow.id == correction_id)) is None:
             raise NotFound("correction", correction_id)
 
 
 def correction_lineage(result: StoredResult) -> list[ResultCorrectionRow]:
-    """The rows that say which corrections a result used."""
+    """Build the rows that link a result to the corrections that it used."""
     return [
         ResultCorrectionRow(result_id=result.id, position=position, correction_id=correction_id)
         for position, correction_id in enumerate(result.corrections)
@@ -39,7 +39,7 @@ def correction_lineage(result: StoredResult) -> list[ResultCorrectionRow]:
 
 
 def retire_current(session: Session, unit: str | None, kind: str) -> None:
-    """No correction of that kind is the unit's current one any more."""
+    """Unset the unit's current correction of that kind."""
     session.execute(
         update(CorrectionRow)
         .where(CorrectionRow.unit == unit, CorrectionRow.kind == kind, CorrectionRow.is_current)

@@ -16,7 +16,7 @@ from procedures.core.unit_correction import CorrectionKind
 
 
 class SqlCorrectionStore:
-    """`bench_service.evidence.corrections.CorrectionStore`."""
+    """SQL implementation of `bench_service.evidence.corrections.CorrectionStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -15,12 +15,12 @@ STATION = TypeAdapter(Station)
 
 
 def station_of_row(row: RecordingRow) -> Station | None:
-    """The station that a recording was made at."""
+    """Read the station of a recording from its row."""
     return None if row.station is None else STATION.validate_python(row.station)
 
 
 def info_of_row(row: RecordingRow) -> RecordingInfo:
-    """What a recording is, from its row."""
+    """Read the description of a recording from its row."""
     return copied(
         RecordingInfo,
         row,
@@ -31,13 +31,13 @@ def info_of_row(row: RecordingRow) -> RecordingInfo:
 
 
 def stored_of_row(row: RecordingRow) -> StoredRecording:
-    """The recording that a row keeps."""
+    """Convert a row to its recording."""
     info, state = info_of_row(row), RecordingState(row.state)
     return copied(StoredRecording, row, info=info, state=state, dtype=row.sample_type)
 
 
 def row_of_new(new: NewRecording, recording_id: str, created_at: datetime, chunk_rows: int) -> RecordingRow:
-    """The row of a recording before its first sample."""
+    """Build the row of a recording before its first sample."""
     return copied(
         RecordingRow,
         new,

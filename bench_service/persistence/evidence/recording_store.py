@@ -1,4 +1,4 @@
-"""Raw samples in SQL: rows that say what a recording is, chunks that hold it. Must not know who records, or why."""
+"""Raw samples in SQL: rows that describe a recording, chunks that hold it. Must not know which job records, or why."""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -42,12 +42,12 @@ class StoredSamples:
     _reader: ChunkReader
 
     def blocks(self) -> Iterator[RawArray]:
-        """The raw samples in order, a chunk at a time."""
+        """Yield the raw samples in order, a chunk at a time."""
         return self._reader.blocks([c.name for c in self.info.channels], 0, self.info.count)
 
 
 class SqlRecordingStore:
-    """`bench_service.jobs.stores.RecordingStore`."""
+    """SQL implementation of `bench_service.jobs.stores.RecordingStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -82,7 +82,7 @@ class SqlRecordingStore:
     def read(
         self, recording_id: str, channels: Sequence[str] | None, start: int, stop: int
     ) -> Iterator[NDArray[np.int32] | NDArray[np.float64]]:
-        """See the port; `start` and `stop` beyond the ends are taken as the ends."""
+        """Read samples, see the port; `start` and `stop` beyond the ends are taken as the ends."""
         with self._database.read() as session:
             row = _found(session, recording_id)
             info = info_of_row(row)
@@ -111,7 +111,7 @@ class SqlRecordingStore:
         return len(left_open)
 
     def discard_open_imports(self, before: datetime) -> int:
-        """Remove what crashed imports left behind: open recordings of no job, begun before a moment. How many."""
+        """Delete open recordings of crashed imports, begun before a moment and without a job. Return their number."""
         query = select(RecordingRow.id).where(
             RecordingRow.job_id.is_(None), RecordingRow.state == _OPEN, RecordingRow.created_at < before
         )
@@ -124,7 +124,7 @@ class SqlRecordingStore:
     def _interrupt(self, recording_id: str) -> None:
         """Close a recording whose writer is gone; the hash is made from the chunks, the writer took its own along.
 
-        One that is damaged has none: that must not keep its job from ending.
+        A damaged recording gets no hash: the damage must not keep its job from ending.
         """
         with self._database.read() as session:
             row = _found(session, recording_id, with_open=True)

@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 
 
 class SqlRecordingWriter:
-    """`bench_service.jobs.stores.RecordingWriter`. Its memory is one chunk, however long the recording."""
+    """SQL implementation of `bench_service.jobs.stores.RecordingWriter`. It holds one chunk in memory at most."""
 
     def __init__(self, database: Database, new: NewRecording) -> None:
         _check(new)
@@ -96,7 +96,7 @@ class SqlRecordingWriter:
         return self._sealed
 
     def abandon(self) -> None:
-        """End without sealing. Does not raise: it is called when something failed already."""
+        """Close the recording without sealing it. Does not raise: it is called when something failed already."""
         if self._sealed is not None:
             return
         self._closed = True
@@ -134,14 +134,14 @@ class SqlRecordingWriter:
             return info_of_row(row)
 
     def _interrupt(self) -> None:
-        """Keep what was committed, without what had not filled a chunk."""
+        """Keep the committed chunks, and drop the samples that had not filled a chunk."""
         with self._database.write() as session:
             row = self._row(session)
             row.content_hash = self._hash.hexdigest()
             row.state = RecordingState.INTERRUPTED.value
 
     def _row(self, session: Session) -> RecordingRow:
-        """This recording's row, made with its first chunk; still open, or somebody closed it in between."""
+        """Return this recording's row, made with its first chunk; still open, unless it was closed in between."""
         if not self._chunks:
             row = row_of_new(self._new, self.id, self._created_at, self._rows)
             session.add(row)
@@ -170,7 +170,7 @@ class SqlRecordingWriter:
         row.stored_bytes += len(payload)
 
     def _complete_before(self) -> RecordingInfo | None:
-        """The complete recording of the same key, or of the same job and station, if there is one."""
+        """Find the complete recording of the same key, or of the same job and station, if there is one."""
         with self._database.read() as session:
             made = made_before(session, self._new.idempotency, "recording")
             row = None if made is None else session.get(RecordingRow, made)

@@ -22,18 +22,18 @@ TRIADS = TypeAdapter(tuple[TriadCalibration, ...])
 
 
 def row_of_result(result: StoredResult) -> ResultRow:
-    """The row that keeps a result, without its lineage."""
+    """Convert a result to its row, without its lineage."""
     return copied(ResultRow, result, verdict=result.verdict.value)
 
 
 def quantity_rows(result: StoredResult) -> list[ResultQuantityRow]:
-    """The rows that keep the numbers of a result's document."""
+    """Build the rows that hold the numbers of a result's document."""
     found = quantities(result.document).values()
     return [copied(ResultQuantityRow, quantity, result_id=result.id) for quantity in found]
 
 
 def lineage_rows(result: StoredResult) -> tuple[ResultRecordingRow | ResultCalibrationRow, ...]:
-    """The rows that say what a result was made from."""
+    """Build the rows of a result's lineage."""
     recordings = (
         ResultRecordingRow(result_id=result.id, position=position, recording_id=recording_id, content_hash=digest)
         for position, (recording_id, digest) in enumerate(result.recordings)
@@ -51,7 +51,7 @@ def result_of_row(
     calibrations: Iterable[ResultCalibrationRow],
     corrections: Iterable[ResultCorrectionRow],
 ) -> StoredResult:
-    """The result that rows keep; lineage in the order of its positions."""
+    """Convert rows to their result; lineage in the order of its positions."""
     return copied(
         StoredResult,
         row,
@@ -63,5 +63,5 @@ def result_of_row(
 
 
 def calibration_of_row(row: CalibrationRow) -> StoredCalibration:
-    """The calibration that a row keeps."""
+    """Convert a row to its calibration."""
     return copied(StoredCalibration, row, current=row.is_current, triads=TRIADS.validate_python(row.triads))

@@ -37,7 +37,7 @@ from procedures.core.unit_correction import UnitCorrection
 
 
 class SqlResultStore:
-    """`bench_service.jobs.stores.ResultStore`."""
+    """SQL implementation of `bench_service.jobs.stores.ResultStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -170,7 +170,7 @@ def _results(session: Session, rows: Sequence[ResultRow]) -> tuple[StoredResult,
 
 
 def _check_lineage(session: Session, result: StoredResult) -> None:
-    """What a result was made from must exist. Raises `NotFound`."""
+    """Check that everything from which a result was made exists. Raises `NotFound`."""
     for recording_id, _ in result.recordings:
         if session.scalar(select(RecordingRow.id).where(RecordingRow.id == recording_id)) is None:
             raise NotFound("recording", recording_id)

@@ -1,4 +1,4 @@
-"""One quantity of many results: the queries, and what a row says. No transaction begins here."""
+"""One quantity of many results: the queries, and the value in a row. No transaction begins here."""
 
 from collections.abc import Iterator
 from typing import Any, TypeVar
@@ -15,7 +15,7 @@ from bench_service.persistence.tables.jobs import JobRow
 
 Q = TypeVar("Q", bound=Select[*tuple[Any, ...]])
 AT_ONCE = 20
-"""Rows in memory; where the quantity is a JSON pointer, each with its document."""
+"""Number of rows read at once; where the quantity is a JSON pointer, each with its document."""
 ABOUT = (
     ResultRow.id,
     ResultRow.job_id,
@@ -27,7 +27,7 @@ ABOUT = (
 
 
 def of_verdicts(query: Q, unit: str, procedure: str, simulated: bool) -> Q:
-    """Of results: those of a procedure that gave a job of the unit its verdict, newest first; no second analyses."""
+    """Limit a query to the results that gave jobs of the unit their verdict, newest first; no repeated analyses."""
     return (
         query.join(JobRow, JobRow.result_id == ResultRow.id)
         .where(ResultRow.unit == unit, ResultRow.name == procedure, ResultRow.simulated == simulated)
@@ -36,7 +36,7 @@ def of_verdicts(query: Q, unit: str, procedure: str, simulated: bool) -> Q:
 
 
 def values_query(name: str) -> Select[*tuple[Any, ...]]:
-    """What `value_of_row` needs; the whole document only where a JSON pointer leads into it."""
+    """Select the columns that `value_of_row` needs; the whole document only where a JSON pointer leads into it."""
     if name.startswith("/"):
         return select(*ABOUT, ResultRow.document)
     kept = ResultQuantityRow
@@ -55,7 +55,7 @@ def newest_first(
 
 
 def value_of_row(row: Row[*tuple[Any, ...]], name: str) -> ResultValue:
-    """What one result says of the quantity."""
+    """Read the value of the quantity from one result's row."""
     about = {"result": row.id, "job": row.job_id, "at": row.created_at}
     return copied(ResultValue, row, **about, quantity=_quantity(row, name))
 

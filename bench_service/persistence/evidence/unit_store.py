@@ -24,11 +24,11 @@ _JOINED = {
     "converter",
     "converter_id",
 }
-"""What other tables know of a unit."""
+"""Fields of a unit that are stored in other tables."""
 
 
 class SqlUnitStore:
-    """`bench_service.evidence.units.UnitStore`."""
+    """SQL implementation of `bench_service.evidence.units.UnitStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

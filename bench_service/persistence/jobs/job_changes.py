@@ -1,4 +1,4 @@
-"""Changes of a job's row inside a transaction that somebody else began: its state, and the event that tells of it."""
+"""Changes of a job's row inside a transaction that the caller began: its state, and the event that records it."""
 
 from datetime import datetime
 from typing import Any
@@ -24,11 +24,11 @@ _NEWEST = (
 )
 _APPEND = insert(_EVENTS)
 CLOCKS_DIFFER_S = 5.0
-"""Clocks of several hosts may differ by this much and nobody set one back [s]."""
+"""Difference up to which clocks of several hosts may disagree without a clock having been set back [s]."""
 
 
 def found_job(session: Session, job_id: str, *, lock: bool = False) -> JobRow:
-    """The row of a job, locked for this transaction where asked. Raises `NotFound`."""
+    """Read the row of a job, locked for this transaction where asked. Raises `NotFound`."""
     row = session.scalar(_LOCKED_JOB if lock else _JOB, {"id": job_id})
     if row is None:
         raise NotFound("job", job_id)
@@ -44,14 +44,14 @@ def move_job(
     failure: Failure | None = None,
     result_id: str | None = None,
 ) -> None:
-    """Change the state of a locked row, with what goes with it, and say so in an event. Raises `IllegalTransition`."""
+    """Change the state of a locked row and its dependent fields, and append an event. Raises `IllegalTransition`."""
     before = state_of_row(row)
     if to not in LEGAL[before]:
         raise IllegalTransition(f"job {row.id} is {before.value}; it cannot become {to.value}")
     if verdict is None and to is JobState.FAILED:
         verdict = Verdict.ERROR
     row.state = to.value
-    row.prompt = None  # whoever was asked is asked again, if it still matters
+    row.prompt = None  # the prompt is repeated later, if it still matters
     data: dict[str, Any] = {"state": to.value, "before": before.value}
     if to is JobState.QUEUED:
         row.verdict = row.failure = row.finished_at = row.result_id = None
@@ -72,9 +72,9 @@ def move_job(
 
 
 def append_event(session: Session, job_id: str, kind: str, at: datetime, data: dict[str, Any]) -> None:
-    """Add the next event of a job whose row is locked.
+    """Append the next event of a job whose row is locked.
 
-    Its time is what the clock said. Where that is before the event before it, the event says by how much: the order of
+    Its time is the clock's. Where that is before the event before it, the event records by how much: the order of
     events is that of their sequence.
     """
     sequence, before = session.execute(_NEWEST, {"job": job_id}).first() or (0, at)

@@ -17,7 +17,7 @@ FAILURE = TypeAdapter(Failure)
 
 
 def row_of_job(job: Job) -> JobRow:
-    """The row that keeps a job."""
+    """Convert a job to its row."""
     return copied(
         JobRow,
         job,
@@ -30,7 +30,7 @@ def row_of_job(job: Job) -> JobRow:
 
 
 def job_of_row(row: JobRow) -> Job:
-    """The job that a row keeps. Raises `NotUnderstood`."""
+    """Convert a row to its job. Raises `NotUnderstood`."""
     try:
         return copied(
             Job,
@@ -45,7 +45,7 @@ def job_of_row(row: JobRow) -> Job:
 
 
 def state_of_row(row: JobRow) -> JobState:
-    """The state that a row keeps. Raises `NotUnderstood`."""
+    """Read the state from a row. Raises `NotUnderstood`."""
     try:
         return JobState(row.state)
     except ValueError as error:
@@ -53,10 +53,10 @@ def state_of_row(row: JobRow) -> JobState:
 
 
 def event_of_row(row: EventRow) -> Event:
-    """The event that a row keeps."""
+    """Convert a row to its event."""
     return copied(Event, row)
 
 
 def failure_document(failure: Failure | None) -> dict[str, Any] | None:
-    """Why a job failed, as JSON."""
+    """Convert the failure of a job to JSON."""
     return None if failure is None else FAILURE.dump_python(failure, mode="json")

@@ -1,7 +1,7 @@
-"""Jobs and their events in SQL. Knows which change of state is legal; must not know who asks for it, or why.
+"""Jobs and their events in SQL. Knows which change of state is legal; must not know which caller asks for it, or why.
 
 Every change reads the job's row under a lock (`FOR UPDATE`; on SQLite the writing transaction itself), so of two
-processes that want different ends for one job, one wins and the other is told `IllegalTransition`.
+processes that want different ends for one job, one wins and the other gets `IllegalTransition`.
 """
 
 import logging
@@ -26,12 +26,12 @@ log = logging.getLogger(__name__)
 
 
 class SqlJobStore:
-    """`bench_service.jobs.stores.JobStore`."""
+    """SQL implementation of `bench_service.jobs.stores.JobStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
         self._left_out: set[str] = set()
-        """Jobs that were not understood, and are told."""
+        """Ids of jobs that were not understood and are in the log already."""
 
     def add(self, job: Job, idempotency: Idempotency | None = None) -> Job:
         def once() -> Job:
@@ -71,7 +71,7 @@ class SqlJobStore:
             return page(session, query, JobRow.id, after, limit, self._understood)
 
     def _understood(self, row: JobRow) -> Job | None:
-        """A job for a list; None where it is not understood, which is told once for each."""
+        """Read a job for a list; None where it is not understood, which is logged once for each job."""
         try:
             return job_of_row(row)
         except NotUnderstood as error:

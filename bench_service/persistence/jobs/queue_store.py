@@ -1,4 +1,4 @@
-"""The queues of benches in SQL. Knows rows and locks; who may start is said by `bench_service.jobs.queue`."""
+"""Queues of benches in SQL. Knows rows and locks; `bench_service.jobs.queue` decides which job may start."""
 
 from dataclasses import replace
 from datetime import datetime
@@ -21,21 +21,21 @@ from bench_service.persistence.tables.jobs import JobRow, ReservationRow
 
 QUEUED, RUNNING = JobState.QUEUED.value, JobState.RUNNING.value
 FIRST_PAGE, LONGER = 20, 4
-"""How many entries are read to find the one that starts next, and how much more each time that none of them may."""
+"""Number of entries read to find the one that starts next, and the factor of its growth while none may start."""
 
 _ORDER = (JobRow.priority, JobRow.queued_at, JobRow.id)
 _ENTRY = columns(JobRow, QueueEntry)
 _OF_BENCH = JobRow.bench == bindparam("bench")
 _OPEN_JOBS = select(*_ENTRY, JobRow.state).where(_OF_BENCH, JobRow.state.in_((QUEUED, RUNNING))).order_by(*_ORDER)
-"""Those that wait, in the order of the queue, and the one that runs."""
+"""The bench's waiting jobs in the order of the queue, and the running one."""
 _FRONT = select(*_ENTRY).where(_OF_BENCH, JobRow.state == QUEUED).order_by(*_ORDER).limit(bindparam("limit"))
 _FURTHER = _FRONT.where(tuple_(*_ORDER) > tuple_(*(bindparam(f"last_{c.key}", type_=c.type) for c in _ORDER)))
-"""Those that wait, from the first on, and from one on: in the order of an index, so the others are not touched."""
+"""The next page of waiting jobs: read in the order of an index, so no other rows are touched."""
 _RUNNING = select(*_ENTRY).where(_OF_BENCH, JobRow.state == RUNNING).order_by(JobRow.id).limit(1)
 
 
 class SqlQueueStore:
-    """`bench_service.jobs.queue.QueueStore`."""
+    """SQL implementation of `bench_service.jobs.queue.QueueStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -120,19 +120,19 @@ def _look(session: Session, bench: str, at: datetime) -> BenchQueue:
 def _queue(
     session: Session, bench: str, at: datetime, entries: tuple[QueueEntry, ...], running: str | None = None
 ) -> BenchQueue:
-    """These entries, with everything that may keep them from starting."""
+    """Combine these entries with everything that may keep them from starting."""
     if not entries:
         return BenchQueue(bench, at, (), running)
     return BenchQueue(bench, at, entries, running, standing_stops(session, bench), active_reservations(session, at))
 
 
 def _running(session: Session, bench: str) -> str | None:
-    """The id of the job that drives a bench."""
+    """Return the id of the job that drives a bench."""
     return session.scalar(_RUNNING, {"bench": bench})
 
 
 def _entries(session: Session, bench: str, limit: int, after: QueueEntry | None = None) -> tuple[QueueEntry, ...]:
-    """The first that wait for a bench, or the next after one of them."""
+    """Read the first entries that wait for a bench, or those that follow one of them."""
     asked: dict[str, Any] = {"bench": bench, "limit": limit}
     if after is not None:
         asked |= {"last_priority": after.priority, "last_queued_at": after.queued_at, "last_id": after.id}
@@ -140,7 +140,7 @@ def _entries(session: Session, bench: str, limit: int, after: QueueEntry | None 
 
 
 def _note_ended_reservation(session: Session, row: JobRow, at: datetime) -> None:
-    """A job whose reservation ended before its turn runs all the same, and says so."""
+    """Append a note to a job whose reservation ended before its turn; the job runs all the same."""
     kept = session.get(ReservationRow, row.reservation)
     if kept is None or not reservation_of_row(kept).active(at):
         over = "" if kept is None else f" at {reservation_of_row(kept).over_at.isoformat()}"

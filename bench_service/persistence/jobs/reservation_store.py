@@ -1,4 +1,4 @@
-"""Reservations in SQL. Of two who want the same thing at once, one gets it: they take turns."""
+"""Reservations of benches and units in SQL. Transactions for the same name take turns: one of two rivals gets it."""
 
 from datetime import datetime
 
@@ -22,7 +22,7 @@ _ACTIVE = (
 
 
 class SqlReservationStore:
-    """`bench_service.jobs.reservation.ReservationStore`."""
+    """SQL implementation of `bench_service.jobs.reservation.ReservationStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -68,13 +68,13 @@ class SqlReservationStore:
 
 
 def active_reservations(session: Session, at: datetime) -> tuple[Reservation, ...]:
-    """Every reservation that holds at a moment; few do, so all of them are read."""
+    """Read every reservation that holds at a moment; few do, so all of them are read."""
     found = (reservation_of_row(row) for row in session.scalars(_ACTIVE, {"at": at}))
     return tuple(reservation for reservation in found if reservation.active(at))
 
 
 def reservation_of_row(row: ReservationRow) -> Reservation:
-    """The reservation that a row keeps."""
+    """Convert a row to its reservation."""
     return copied(Reservation, row, kind=Reserved(row.kind))
 
 

@@ -1,1 +1,1 @@
-"""The tables, by the same rooms as the ports of memory; `every` imports all of them, for migrations."""
+"""SQL tables, divided like the ports of the stores; `every` imports all of them, for migrations."""

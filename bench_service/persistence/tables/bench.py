@@ -1,4 +1,4 @@
-"""Tables of benches: as registered, their stops, their live state."""
+"""SQL tables of benches: as registered, their stops, their live state."""
 
 from datetime import datetime
 from typing import Any
@@ -44,7 +44,7 @@ class BenchStopRow(Table):
 
 
 class BenchLiveRow(Table):
-    """The last that a bench's driver said of it."""
+    """Last live state that a bench's driver reported."""
 
     __tablename__ = "bench_live"
 

@@ -1,4 +1,4 @@
-"""Tables of campaigns, their runs and schedules."""
+"""SQL tables of campaigns, their runs and schedules."""
 
 from datetime import datetime
 from typing import Any
@@ -10,7 +10,7 @@ from bench_service.persistence.tables.columns import Id, Table
 
 
 class CampaignRow(Table):
-    """A campaign as data."""
+    """A stored campaign as a document."""
 
     __tablename__ = "campaigns"
 
@@ -42,7 +42,7 @@ class CampaignRunRow(Table):
 
 
 class ScheduleRow(Table):
-    """When a campaign is to start by itself."""
+    """A schedule by which a campaign starts."""
 
     __tablename__ = "schedules"
 

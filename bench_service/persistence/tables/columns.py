@@ -45,7 +45,7 @@ Id = String().with_variant(String(collation="C"), "postgresql")
 
 
 class Table(DeclarativeBase):
-    """Root of all tables."""
+    """Root class of all tables."""
 
     metadata = MetaData(
         naming_convention={
@@ -63,5 +63,5 @@ class Table(DeclarativeBase):
 
 
 def columns(table: type[Table], shape: type) -> tuple[InstrumentedAttribute[Any], ...]:
-    """The columns of a table that a shape is made of, in the order of its fields."""
+    """Columns of a table that match a data class, in the order of its fields."""
     return tuple(getattr(table, name) for name in field_names(shape))

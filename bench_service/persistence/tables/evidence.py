@@ -1,4 +1,4 @@
-"""Tables of evidence: units, recordings with their chunks, results, calibrations, corrections, and lineage."""
+"""SQL tables of evidence: units, recordings with their chunks, results, calibrations, corrections, and lineage."""
 
 from datetime import datetime
 from typing import Any
@@ -98,7 +98,7 @@ class ResultRecordingRow(Table):
 
 
 class ResultQuantityRow(Table):
-    """A number of a result under its name, out of its document: a trend over many results reads no document."""
+    """A quantity of a result by name, copied from its document: a trend over many results reads no document."""
 
     __tablename__ = "result_quantities"
 
@@ -167,7 +167,7 @@ class CorrectionRow(Table):
 
 
 class ResultCorrectionRow(Table):
-    """Which correction sets a result used."""
+    """The correction sets that a result used."""
 
     __tablename__ = "result_corrections"
     __table_args__ = (Index("ix_result_corrections_correction_id", "correction_id"),)

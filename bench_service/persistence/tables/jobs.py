@@ -1,4 +1,4 @@
-"""Tables of jobs: jobs, their events, reservations, and idempotency keys."""
+"""SQL tables of jobs, their events, reservations, and idempotency keys."""
 
 from datetime import datetime
 from typing import Any
@@ -43,7 +43,7 @@ class JobRow(Table):
     attempt: Mapped[int]
     deadline_at: Mapped[datetime | None]
     queued_at: Mapped[datetime] = mapped_column(nullable=True)
-    """Never NULL; to say so of a table that is there, SQLite would have to copy it."""
+    """Time of queueing, never NULL; to declare that in an existing table, SQLite would have to copy it."""
     not_before: Mapped[datetime | None]
     retries: Mapped[int]
     retries_left: Mapped[int]
@@ -67,7 +67,7 @@ class EventRow(Table):
 
 
 class ReservationRow(Table):
-    """A unit or a bench that somebody keeps for a while."""
+    """A reservation of a unit or a bench."""
 
     __tablename__ = "reservations"
     __table_args__ = (Index("ix_reservations_kind_name", "kind", "name"),)
@@ -83,7 +83,7 @@ class ReservationRow(Table):
 
 
 class IdempotencyKeyRow(Table):
-    """A client's key, what was asked with it, and the id of what it made."""
+    """A client's idempotency key, the request made with it, and the id of the created object."""
 
     __tablename__ = "idempotency_keys"
 

@@ -1,4 +1,4 @@
-"""Table of the audit trail."""
+"""SQL table of the audit trail."""
 
 from datetime import datetime
 from typing import Any
@@ -9,7 +9,7 @@ from bench_service.persistence.tables.columns import Id, Table
 
 
 class AuditRow(Table):
-    """Who asked what, and what became of it."""
+    """One entry of the audit trail: client, request and outcome."""
 
     __tablename__ = "audit"
 

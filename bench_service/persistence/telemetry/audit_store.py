@@ -11,7 +11,7 @@ from bench_service.telemetry.audit import AuditEntry
 
 
 class SqlAuditTrail:
-    """`bench_service.telemetry.audit.AuditTrail`."""
+    """SQL implementation of `bench_service.telemetry.audit.AuditTrail`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -1,4 +1,4 @@
-"""What a monitor counts, in SQL: walks along indices, never over whole rows."""
+"""Counts for monitoring in SQL: queries that walk along indices, never over whole rows."""
 
 import shutil
 from datetime import datetime
@@ -16,7 +16,7 @@ from bench_service.telemetry.tallies import Ending
 
 
 class SqlTallyStore:
-    """`bench_service.telemetry.tallies.TallyStore`."""
+    """SQL implementation of `bench_service.telemetry.tallies.TallyStore`."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
