@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
+from pydantic import ValidationError
 from rich.markup import escape
 from rich.table import Table as ScreenTable
 
@@ -15,12 +16,15 @@ ROWS_MAX = 60
 
 
 def report_tables(method: str, document: dict[str, Any]) -> Iterator[ScreenTable]:
-    """Build each table of a method's report on a result; none where this version does not know the method."""
+    """Build each table of a method's report on a result.
+
+    None where this version does not know the method, or where a service of another version wrote the document.
+    """
     try:
         entry = Catalogue().method(method)
-    except NotFound:
+        report = entry.report(entry.result.model_validate(document))
+    except (NotFound, ValidationError):
         return
-    report = entry.report(entry.result.model_validate(document))
     for section in report.sections:
         if isinstance(section, Table):
             yield _shown(section)

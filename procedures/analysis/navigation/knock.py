@@ -27,6 +27,8 @@ SPAN = 10
 LIKELY = 7.0
 """Deviations beyond which a step is one: among some 1,000 looked at by chance once in 10⁹ of normal noise, and rare
 enough where slow noise makes deviations uneven."""
+ROUNDING_RAD = 1e-12
+"""Least scatter of angles [rad]: samples without any noise still differ by rounding."""
 NORMAL = 1.4826
 """Standard deviation over median absolute deviation of a normal number."""
 
@@ -73,7 +75,7 @@ def _tilt_steps(force: Array) -> tuple[float, float, int, float]:
     steps = steps - np.median(steps, axis=0)
     white = _deviation(np.diff(angles, axis=0)) / np.sqrt(SPAN)
     scale = np.maximum(_deviation(steps), white)
-    scale = np.where(scale > 0.0, scale, np.inf)
+    scale = np.maximum(scale, ROUNDING_RAD)
     ratios = np.max(np.abs(steps) / scale, axis=1)
     at = int(np.argmax(ratios))
     return float(ratios[at]), float(np.linalg.norm(steps[at])), at, float(LIKELY * np.max(scale))
