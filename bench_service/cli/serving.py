@@ -1,11 +1,13 @@
 """The HTTP server, in this thread or beside it."""
 
 import errno
+import signal
 import socket
 import threading
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import FrameType
 
 import uvicorn
 
@@ -26,7 +28,14 @@ GRACE_S = 3
 
 
 class _Server(uvicorn.Server):
-    """uvicorn's server, whose queue of connections is longer than what it accepts at once."""
+    """uvicorn's server, with a longer queue of connections, and exit code 0 after an orderly end on SIGTERM."""
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """End in order; uvicorn itself would raise SIGTERM again afterwards, and no clean-up at exit would run."""
+        if sig == signal.SIGTERM:
+            self.should_exit = True
+        else:
+            super().handle_exit(sig, frame)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)

@@ -91,9 +91,9 @@ class WorkProcesses:
             pool, self._pool = self._pool, None
         if pool is not None:
             processes = list(getattr(pool, "_processes", {}).values())
-            pool.shutdown(wait=False, cancel_futures=True)
             for process in processes:
                 process.terminate()
+            pool.shutdown(wait=True, cancel_futures=True)
 
     def _submit(self, name: str, arguments: tuple[Any, ...]) -> "Future[str | Refusal]":
         with self._mutex:

@@ -117,7 +117,7 @@ def test_too_short_is_refused_with_what_is_needed(client: Client) -> None:
 def test_what_is_no_number_or_no_even_time_does_not_come_in(client: Client) -> None:
     rows = [f"{k / RATE_HZ:.2f},{k % 7}" for k in range(1000)]
     timed = {**ONE, "time_column": "t"}
-    for row, words in (("5.00,nan", "'nan' where a finite number"), ("5.005,3", "between rows 500 and 501")):
+    for row, words in (("5.00,nan", "'nan' where a finite number"), ("5.30,3", "does not grow: 5.3 s in row 501")):
         bad = "\n".join(["t,g", *rows[:500], row, *rows[501:], ""]).encode()
         answer = client.import_files(timed, bad)
         assert answer.status_code == 422

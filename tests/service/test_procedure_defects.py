@@ -205,7 +205,7 @@ def test_what_nobody_foresaw_names_file_and_line_in_job_and_log(
         job = ended(client, "boom")
     # This procedure lies beside the project's code, so the innermost place that is named there is its caller's.
     assert job["error"]["kind"] == "InternalError"
-    assert job["error"]["message"].startswith("ValueError: boom (bench_service/evidence/job_analysis.py, line ")
+    assert job["error"]["message"].startswith("ValueError: boom (procedures/inspection.py, line ")
     assert job["attempt"] == 1
     assert any("ValueError: boom (" in record.getMessage() for record in caplog.records)
     assert f'{Path(__file__).name}", line {analyse_to_boom.__code__.co_firstlineno + 1}' in caplog.text
