@@ -1,4 +1,4 @@
-"""What a process of unit coefficient puts into each mode of a spectrum: exact expectations, no approximation by f.
+"""Expected power of a process of unit coefficient in each mode of a spectrum: exact, no approximation by f.
 
 The rate y of a channel is averaged over cells of Δ: ``y_k = (θ_{k+1} − θ_k)/Δ``. With R the rate's autocovariance and
 F'' = R, the cell means' is ``γ(l) = (F((l+1)Δ) − 2F(lΔ) + F((l−1)Δ))/Δ²``. Where a variance does not exist (flicker,

@@ -14,7 +14,7 @@ _RATIO = 2.0**0.5
 
 
 def gauss_markov(plain: Joined, model: Extension, free: tuple[int, ...]) -> GaussMarkov | None:
-    """Of the likelihood over ln τ, a parabola through three times about the best; `free` are the fit's variances.
+    """Fit a parabola in ln τ to the log likelihood at three times about the best; `free` are the fit's variances.
 
     ``ln τ ± 1/√(−d²L/d(ln τ)²)``; the driving noise q = √(2σ²/τ) has the uncertainty of σ² at one τ and that which
     comes with τ. None where the model has no such process.

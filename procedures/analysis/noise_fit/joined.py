@@ -31,13 +31,13 @@ class Joined:
     flicker: Array
     """Expected power for unit B², (b,), before an extension of the model changes it."""
     period_s: Array
-    """Of the samples that each bin's modes were made of, (b,)."""
+    """Sampling period of the data behind each bin, (b,)."""
     added: int = 0
     """Columns at the end that an extension of the model added."""
 
     @property
     def used(self) -> Spectrum:
-        """The fitted bins."""
+        """The spectrum of the fitted bins alone."""
         return only_where(self.fitted, self.spectrum)
 
     @property

@@ -91,7 +91,7 @@ class _Fit:
         return v
 
     def covariance(self, present: tuple[int, ...], v: Array, correlation: Array) -> Array:
-        """Of the present elements of v, (p, p); the sandwich at the model that v makes."""
+        """Covariance of the present elements of v, (p, p): the sandwich estimator at the model of v."""
         weight = np.sqrt(0.5 * self._edf) / (self._columns @ v)
         columns = self._columns[:, present] * weight[:, None]
         inverse = scaled_pinv(columns)
@@ -99,12 +99,12 @@ class _Fit:
 
 
 def _correlation(m: Array, rate_hz: float, count: int, v: Array) -> Array:
-    """Of the σ² at cluster sizes m, (k, k), for the spectrum of the squares v (5,), the ramp's left out."""
+    """Correlation of the σ² at cluster sizes m, (k, k), for the spectrum of the squares v (5,) without the ramp."""
     decades = np.log10(0.5 * count)
     f = rate_hz * np.geomspace(0.25 / count, 0.5, int(_PER_DECADE * decades))
     sine = np.sin(pi * f / rate_hz)
     spectrum = 4.0 * rate_hz * sine**2 * v[0] + v[1] + v[2] / (2.0 * pi * f) + v[3] / (2.0 * pi * f) ** 2
-    if not np.any(spectrum > 0.0):  # a bare ramp: what noise there is, is called white
+    if not np.any(spectrum > 0.0):  # a bare ramp: any remaining noise counts as white
         spectrum = np.ones_like(f)
     root = spectrum * np.sqrt(f)  # df = f d ln f
     filters = np.sin(pi * f * m[:, None] / rate_hz) ** 4 * (root / sine**2)

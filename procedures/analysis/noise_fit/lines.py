@@ -1,4 +1,4 @@
-"""Spectral lines: modes of a mean power spectrum that stand out of their neighbourhood. Knows no noise model."""
+"""Spectral lines: modes of a mean power spectrum that exceed their neighbourhood. Independent of any noise model."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -17,7 +17,7 @@ _FEWEST_MODES = 32
 _FIRST = 8
 """Below this mode of a segment the taper's main lobe meets the mean that was taken away."""
 _GUARD = 2
-"""Modes beside a line that are cut out with it: the taper's main lobe."""
+"""Modes on each side of a line that are cut out with it: the main lobe of the taper."""
 _EFFICIENCY = 0.6
 """Degrees of freedom of a median over those of a mean."""
 
@@ -27,9 +27,9 @@ class SpectralLine:
     """One line that was cut out before the fit."""
 
     frequency_hz: float
-    """Of its strongest mode."""
+    """Frequency of the strongest mode of the line."""
     amplitude: float
-    """Of the sine of the same power [rate]."""
+    """Amplitude of a sine of the same power [rate]."""
 
 
 def levels_around(power: Array, dof: float, first: int = 0) -> tuple[Array, Array]:
@@ -51,11 +51,11 @@ def levels_around(power: Array, dof: float, first: int = 0) -> tuple[Array, Arra
 
 
 def standing_out(dof: float, count: Array, level: float) -> Array:
-    """What a mode's power over the level about it passes with this probability, (m,), in units of one χ²_dof's scale.
+    """Threshold (m,) that a mode's power over the level about it exceeds with this probability, in scales of χ²_dof.
 
-    The level is itself of `count` modes: an F ratio of dof and dof·count degrees of freedom.
+    The level is itself the mean of `count` modes: an F ratio of dof and dof·count degrees of freedom.
     """
-    some, where = np.unique(count, return_inverse=True)  # the quantile is slow, and most modes have one count
+    some, where = np.unique(count, return_inverse=True)  # the quantile is slow, and most modes share one count
     return (dof * np.asarray(fdtri(dof, np.maximum(1.0, dof * some), 1.0 - level)))[where]
 
 

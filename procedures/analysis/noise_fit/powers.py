@@ -26,7 +26,7 @@ from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.noise import NoiseCoefficients
 
 FLICKER_BAND_S = NoiseCoefficients().flicker_band_s
-"""The flicker of `core.noise`, as long as nobody says otherwise."""
+"""Default flicker band, that of `core.noise`."""
 SINGLE_MODES = 50
 """The lowest modes of the whole record stand alone."""
 BINS = 300
@@ -38,7 +38,7 @@ _CUT, _ROUNDS = 1e-5, 6
 """Probability of a power that is cut down before the noise about a line is fitted, and how often."""
 VARIANCES = range(4)
 _EDGE = 8
-"""The taper rises over one in so many samples of a segment."""
+"""The taper rises over this fraction, 1/8, of a segment."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Powers:
     gram: Array
     """Sums of products of those regressors, (b, r, r)."""
     period_s: float
-    """Of the samples the modes were made of."""
+    """Sampling period of the data behind the modes."""
     lines: tuple[SpectralLine, ...] = ()
     """Cut out of the bins."""
 
@@ -68,7 +68,7 @@ def slow_powers(
 ) -> Powers:
     """The whole record's spectrum from its cell means, (n,) [rate], less its lines.
 
-    `regressors` (r, n) are what the rate may follow beside a ramp (a temperature, a shift of the level), any units.
+    `regressors` (r, n): what the rate may follow other than a ramp (a temperature, a shift of the level), any units.
     Raises `UnfitRecording` and `BadParameter`.
     """
     _check_rate("cell_s", cell_s)
@@ -115,9 +115,9 @@ def _less(y: Array, rows: Array) -> Array:
 
 
 def _expected_powers(coefficients: Array, expected: Array) -> Array:
-    """What Q, N, B and K that describe most of the modes (n−1,) put into each; a line is cut down to what noise shows.
+    """Expected power (n−1,) of Q, N, B and K as fitted to most of the modes; lines are clipped to the level of noise.
 
-    `expected` (4, n−1) are their powers for unit coefficients.
+    `expected` (4, n−1): the powers for unit coefficients.
     """
     bins = _Bins.over(np.arange(1, expected.shape[1] + 1), SINGLE_MODES, BINS)
     none = np.zeros((len(bins.count), 1))
@@ -184,7 +184,7 @@ class FastPowers:
                 self._take()
 
     def _take(self) -> None:
-        np.multiply(self._weights, self._segment, out=self._tapered)  # not np.dot: BLAS would wake its threads
+        np.multiply(self._weights, self._segment, out=self._tapered)  # not np.dot: BLAS would start its threads
         np.subtract(self._segment, np.sum(self._tapered), out=self._tapered)
         self._tapered *= self._taper
         np.fft.rfft(self._tapered, out=self._modes)
@@ -235,7 +235,7 @@ class _Bins:
 
     @classmethod
     def over(cls, modes: NDArray[np.int64], single: int, bins: int) -> "_Bins":
-        """Of ascending mode numbers (m,): the first `single` alone, the rest in at most `bins` even ratios."""
+        """Bins of ascending mode numbers (m,): the first `single` alone, the rest in at most `bins` even ratios."""
         single = min(single, len(modes) - 1)
         edges = np.geomspace(modes[single], modes[-1] + 1, bins + 1)
         starts = np.concatenate([np.arange(single), np.searchsorted(modes, edges[:-1])])
@@ -257,7 +257,7 @@ def _check_rate(field: str, value: float) -> None:
 
 
 def _checked(values: Array | NDArray[np.int32], before: int) -> Array:
-    """As floats, (n,). Raises where a sample is no measurement."""
+    """The values as floats, (n,). Raises `BadParameter` and `UnfitRecording`."""
     if values.ndim != 1:
         raise BadParameter("samples", values.shape, "one channel, (n,)")
     y = np.asarray(values, dtype=np.float64)

@@ -23,7 +23,7 @@ _SMOOTHED = 9
 """Bins over which the first guess of S is taken."""
 _WIDENINGS = 60
 _LEAST_SHARE, _MOVED = 1e-6, 0.1
-"""A start that explains less than this share of a bin's power is moved inwards, by so much of a fit of each alone."""
+"""A start that explains less than this share of a bin's power is moved inwards, by this part of each single fit."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def _step(spectrum: Spectrum, free: list[int], fixed: Array, target: Array, dof:
 
 
 def _climb(spectrum: Spectrum, best: State, target: Array) -> State:
-    """From `best` towards `target`, as far as the likelihood grows."""
+    """Step from `best` towards `target` as far as the likelihood grows."""
     part = 1.0
     while part > 1e-4:
         tried = state(spectrum, best.variances + part * (target - best.variances))
@@ -178,7 +178,7 @@ def _climb(spectrum: Spectrum, best: State, target: Array) -> State:
 
 @dataclass
 class Profile:
-    """Twice the log likelihood lost where variance k is held, the other `free` ones at their best."""
+    """Twice the loss of log likelihood where variance k is held fixed and the other `free` ones are fitted."""
 
     spectrum: Spectrum
     free: tuple[int, ...]
@@ -186,12 +186,12 @@ class Profile:
     best: State
 
     def loss(self, variance: float) -> float:
-        """At one value of the variance k."""
+        """Twice the loss of log likelihood at one value of variance k."""
         held = maximum(self.spectrum, self.free, (self.k, variance), self.best.variances)
         return 2.0 * (self.best.log_likelihood - held.log_likelihood)
 
     def crossing(self, loss: float, *, upwards: bool, scale: float) -> float:
-        """The variance where so much is lost, above or below the best one; below, 0 where less is lost at 0.
+        """The variance whose loss equals `loss`, above or below the best one; below it, 0 if the loss at 0 is less.
 
         `scale` is the variance's standard uncertainty, the first step of the search. Infinite where nothing is lost.
         """
