@@ -1,4 +1,4 @@
-"""An Allan deviation with its uncertainty, from an array or from blocks of any length. Knows no files and no chance."""
+"""An Allan deviation with its uncertainty, from an array or from blocks of any length. No files, no randomness."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -78,7 +78,7 @@ class DeviationStream:
             self._sums = CorrelatedSums(statistic, count, wanted)
 
     def add(self, block: Array | NDArray[np.int32]) -> None:
-        """The next samples of the channel, (n,)."""
+        """Add the next samples of the channel, (n,)."""
         if self._integral.count + len(block) > self._count:
             raise UnfitRecording(f"more samples came than the {self._count} that were announced")
         if isinstance(self._sums, CorrelatedSums):
@@ -89,7 +89,7 @@ class DeviationStream:
                 self._sums.add(piece)
 
     def finish(self) -> Deviation:
-        """The deviation, once all samples came; cluster sizes without a single term (gaps) do not appear."""
+        """The deviation, after the last sample; cluster sizes without a single term (gaps) do not appear."""
         self._integral.check_end(self._count)
         sums, terms = self._sums.finish()
         if isinstance(self._sums, CorrelatedSums):
