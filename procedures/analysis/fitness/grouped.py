@@ -1,4 +1,4 @@
-"""Findings of one recording or of many stations in as few sentences as say them all."""
+"""Findings of one recording or of many stations, merged into as few sentences as possible."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from procedures.analysis.fitness.findings import ChannelFitness, Finding, Kind, Severity
 
 NAMED = 12
-"""Stations that a sentence names; of more it says how many."""
+"""Most stations that a sentence names; of further ones it gives the number."""
 
 
 @dataclass
@@ -40,7 +40,7 @@ def grouped(
 
 
 def _together(fitness: Iterable[ChannelFitness], severity: Severity) -> Iterable[tuple[str, Finding, tuple[str, ...]]]:
-    """Each sentence with the channels that it is of: alike ones are said of all their channels at once."""
+    """Each sentence with its channels; equal sentences are merged into one for all their channels."""
     alike: dict[tuple[Kind, str], tuple[Finding, list[str]]] = {}
     for channel in fitness:
         begin = f"channel {channel.channel}: "

@@ -17,7 +17,7 @@ from procedures.core.recording import RawArray
 PIECE = 16384
 """Samples a piece: six channels of it fit into the cache."""
 MARGIN = 8
-"""Samples on either side of a jump that tell what it is."""
+"""Samples on either side of a jump that are used to classify it."""
 HISTORY = 2 * MARGIN + 1
 """Samples that a piece keeps of the one before: each jump is then seen once with its surroundings."""
 
@@ -89,7 +89,7 @@ class Pieces:
                 self._history = self._filled = HISTORY
 
     def finish(self) -> Iterator[Piece]:
-        """What is left, as the last piece, without new samples where nothing is left; none for no samples at all."""
+        """The remaining samples as the last piece, which may be without new ones; no piece without any samples."""
         if self._buffer is not None and self._filled:
             yield self._piece(self._buffer, last=True)
 

@@ -14,13 +14,13 @@ from procedures.core.recording import ACCELEROMETER, GYRO, INCREMENTS, TRIADS, C
 BURST = 128
 """Samples that are averaged before a magnitude is taken, so that noise does not pass for a reading."""
 BURSTS = 8
-"""Of these at the beginning of a piece."""
+"""Number of bursts at the beginning of a piece."""
 TOLERANCE = 0.3
-"""Of the magnitude of gravity, relative: nominal scales are known to some per cent, but the thesis's own unit (its
+"""Relative tolerance of the magnitude of gravity: nominal scales are known to some per cent, but the thesis's own unit (its
 table 5.1) gives 0.81 … 0.86 of its input; the nearest wrong unit, feet, is a factor of 3.3 away."""
 COLDEST_C, HOTTEST_C = -100.0, 200.0
 FACTORS = (2.0, 4.0, 5.0)
-"""Of a rate, or of the number of samples that were summed; of a range that was set otherwise than declared."""
+"""Simple factors of a wrong rate, of a wrong number of summed samples, or of a range set otherwise than declared."""
 FACTOR_TOLERANCE = 0.12
 """Relative: nominal scales are known to some per cent, and the nearest two factors are 25 % apart."""
 DOUBTFUL_RATE_RAD_S = 0.1
@@ -70,7 +70,7 @@ class Readings:
         self._pieces += 1
 
     def doubts(self, settings: FitnessSettings, mean: Array, noise: Array) -> dict[str, Doubt]:
-        """What is doubted, channel by channel; `mean` of each and `noise`, the standard deviation of white one, raw."""
+        """Doubts by channel name; `mean` and `noise`, the standard deviation of the white noise, of each channel, raw."""
         if not self._pieces or not settings.at_rest:
             return self._temperatures() if self._pieces else {}
         return {**self._temperatures(), **self._gyros(settings, mean, noise), **self._accelerometers(settings)}
@@ -143,7 +143,7 @@ class Readings:
         expected = f"less than {limit:.3g} rad/s at rest"
         found: dict[str, Doubt] = {}
         for group, burst in read.items():
-            # Single bursts tell a motion from a rest; what a unit at rest reads is surer from all samples.
+            # Single bursts distinguish motion from rest; the reading at rest is more certain from all samples.
             value = min(burst, float(np.linalg.norm(self._scale.rates(mean)[list(group)])))
             names = [self._names[i] for i in group]
             walk = float(np.max((noise * np.abs(self._scale.gain))[list(group)])) / self._rate_hz**0.5

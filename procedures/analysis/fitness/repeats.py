@@ -8,9 +8,9 @@ from procedures.analysis.fitness.pieces import Mask
 Counts = NDArray[np.int64]
 
 HELD = 0.8
-"""All channels that change in so many of the changed rows change together: rows are held."""
+"""Share of the changed rows in which a channel must change to count: if all such change together, rows are held."""
 HELD_SHARE = 0.01
-"""Repeated rows below this part are left to the longest run."""
+"""Least share of repeated rows; fewer are left to the search for the longest run."""
 
 SEVERAL = 5
 
@@ -26,7 +26,7 @@ class Repeats:
         self.first_index = 0
 
     def add(self, same: Mask, zeros: Counts, start: int) -> None:
-        """Which samples repeat the one before, (channels, n), how many in each, and the index of the first of them."""
+        """Add the mask of repeats of the previous sample, (channels, n), their number by channel, and the first index."""
         count = same.shape[1]
         rows: Mask = np.logical_and.reduce(same, axis=0)
         repeated = int(np.count_nonzero(rows))

@@ -39,7 +39,7 @@ FEWEST_A_CELL = 8
 
 
 def analyse_launch(recording: Recording, label: str, settings: LaunchSettings) -> LaunchNoise:
-    """Analyse every channel but temperatures. Raises `UnfitRecording` (recording, channel, value) and `BadParameter`."""
+    """Analyse all channels but temperatures. Raises `UnfitRecording` (recording, channel, value) and `BadParameter`."""
     info = recording.info
     names = tuple(c.name for c in info.channels if c.quantity is not Quantity.TEMPERATURE)
     if not names:

@@ -45,7 +45,7 @@ class ChannelSummary:
         return _coefficients(self.means)
 
     def noise_over(self, known: NoiseCoefficients | None) -> NoiseCoefficients:
-        """Coefficients for a unit's record; one that the model does not describe keeps its `known` value or its limit."""
+        """Coefficients for a unit's record; one that the model does not describe keeps its `known` value, or limit."""
         changed: dict[str, float] = {}
         for m in self.means:
             if m.mean is None and not all(reading.described for reading in m.values):
