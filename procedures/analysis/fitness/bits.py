@@ -19,7 +19,7 @@ class Bits:
 
     Values that leave no gap between their least and greatest change every bit below the highest that changes: to pass
     a multiple of 2^j they go from …0111 to …1000. So a bit that never changes below one that does is stuck, provided
-    that the signal does move back and forth between the values above and below, sample by sample, and takes many values.
+    that the signal does move to and fro between the values above and below, sample by sample, and takes many values.
     """
 
     def __init__(self) -> None:

@@ -77,8 +77,8 @@ class FitnessSettings:
     gaps: Literal["refuse", "aware"] = "refuse"
     """Treatment of samples that are no numbers: "refuse", or "aware", a warning for an analysis that omits gaps."""
     counters_may_rest: bool = False
-    """A counter that stands still causes a warning, not a refusal: across the Earth's rate it gives no pulse for minutes,
-    so a dwell of a calibration may well be silent. A silent static run has nothing to analyse."""
+    """A counter that stands still causes a warning, not a refusal: across the Earth's rate it gives no pulse for
+    minutes, so a dwell of a calibration may well be silent. A silent static run has nothing to analyse."""
     at_rest: bool = True
     """The unit neither turns faster than the Earth nor is accelerated but by gravity: units and jumps can be judged."""
     beside_others: bool = False

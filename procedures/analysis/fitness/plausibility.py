@@ -16,7 +16,7 @@ BURST = 128
 BURSTS = 8
 """Number of bursts at the beginning of a piece."""
 TOLERANCE = 0.3
-"""Relative tolerance of the magnitude of gravity: nominal scales are known to some per cent, but the thesis's own unit (its
+"""Relative tolerance of gravity's magnitude: nominal scales are known to some per cent, but the thesis's own unit (its
 table 5.1) gives 0.81 … 0.86 of its input; the nearest wrong unit, feet, is a factor of 3.3 away."""
 COLDEST_C, HOTTEST_C = -100.0, 200.0
 FACTORS = (2.0, 4.0, 5.0)
@@ -70,7 +70,7 @@ class Readings:
         self._pieces += 1
 
     def doubts(self, settings: FitnessSettings, mean: Array, noise: Array) -> dict[str, Doubt]:
-        """Doubts by channel name; `mean` and `noise`, the standard deviation of the white noise, of each channel, raw."""
+        """Doubts by channel name; `mean` and `noise`, the standard deviation of white noise, of each channel, raw."""
         if not self._pieces or not settings.at_rest:
             return self._temperatures() if self._pieces else {}
         return {**self._temperatures(), **self._gyros(settings, mean, noise), **self._accelerometers(settings)}

@@ -8,7 +8,7 @@ from procedures.analysis.fitness.pieces import Mask
 Counts = NDArray[np.int64]
 
 HELD = 0.8
-"""Share of the changed rows in which a channel must change to count: if all such change together, rows are held."""
+"""Share of the changed rows from which on channels change together, so that rows are held."""
 HELD_SHARE = 0.01
 """Least share of repeated rows; fewer are left to the search for the longest run."""
 
@@ -16,17 +16,17 @@ SEVERAL = 5
 
 
 class Repeats:
-    """Rows that repeat the row before, over all channels."""
+    """Rows that repeat the previous row in all channels."""
 
     def __init__(self, channels: int) -> None:
         self.zeros = np.zeros(channels, np.int64)
-        """Samples of each channel that repeat the one before."""
+        """Number of samples of each channel that repeat the previous one."""
         self.rows = 0
         self.pairs = 0
         self.first_index = 0
 
     def add(self, same: Mask, zeros: Counts, start: int) -> None:
-        """Add the mask of repeats of the previous sample, (channels, n), their number by channel, and the first index."""
+        """Add the mask of repeats of the previous sample, (channels, n), their number by channel, and their start."""
         count = same.shape[1]
         rows: Mask = np.logical_and.reduce(same, axis=0)
         repeated = int(np.count_nonzero(rows))

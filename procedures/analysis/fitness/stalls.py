@@ -61,7 +61,7 @@ class Stalls:
         self._seen = 0
 
     def add(self, same: Mask, zeros: NDArray[np.int64], start: int) -> None:
-        """Add the mask of repeats of the previous sample, (channels, n), their number by channel, and the first index."""
+        """Add the mask of repeats of the previous sample, (channels, n), their number by channel, and their start."""
         if not same.shape[1]:
             return
         self.repeats += zeros
@@ -82,7 +82,7 @@ class Stalls:
     def finish(self, able: NDArray[np.bool_]) -> list[Group]:
         """Every group with the runs that are its own, beyond chance against the whole recording.
 
-        `able` (channels,): those that count as evidence alone or as a triad. A counter that gives single pulses does not:
+        `able` (channels,): those that are evidence alone or as a triad. A counter that gives single pulses is not:
         how regularly they come depends on where its input stands between two pulses.
         """
         for group in self._groups:
@@ -105,7 +105,7 @@ class Stalls:
         return self._groups
 
     def _usual(self, same: Mask) -> Array:
-        """Usual share of repeats of each channel in a window of this piece, (channels,), without the windows that repeat
+        """Usual share of repeats of each channel in a window of this piece, (channels,), without windows that repeat
         throughout, which are to be judged. Where there is no other window, the share of the previous piece is used.
         """
         width = WINDOW if same.shape[1] >= 2 * WINDOW else same.shape[1]

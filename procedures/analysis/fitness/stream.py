@@ -225,7 +225,7 @@ class FitnessStream:
             found[c].append(Finding(kind, severity, doubt.sentence, 0, words.seen, of_row=doubt.of_rate))
 
     def _of_course(self, found: list[list[Finding]], words: Wording) -> None:
-        """Add findings on outliers, steps and changes of the noise, except where samples pile up, which alters the noise."""
+        """Add findings on outliers, steps and changes of the noise, unless piled-up samples falsify the noise."""
         cells = self._levels.finish()
         for c, jumps in enumerate(self._jumps.outliers):
             cells.leave_out(c, [jump.index for jump in jumps])

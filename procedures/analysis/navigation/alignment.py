@@ -30,7 +30,7 @@ class InitialAttitude:
     angles_rad: Array
     """(heading, pitch, roll), shape (3,)."""
     covariance: Array
-    """Of the three, shape (3, 3)."""
+    """Covariance of the three angles, shape (3, 3)."""
     per_force: Array
     """∂(heading, pitch, roll)/∂(specific force) [rad/(m/s²)], shape (3, 3)."""
     per_rate: Array
@@ -38,7 +38,7 @@ class InitialAttitude:
     magnitude_errors: Array
     """|f| − g [m/s²], |ω| − Ω [rad/s], and the upward part of ω minus Ω·sin L [rad/s], shape (3,)."""
     magnitude_sd: Array
-    """Their expected standard deviations, shape (3,)."""
+    """Expected standard deviations of the magnitude errors, shape (3,)."""
 
 
 def rotation_nb(heading_rad: float, pitch_rad: float, roll_rad: float) -> Array:
@@ -47,7 +47,7 @@ def rotation_nb(heading_rad: float, pitch_rad: float, roll_rad: float) -> Array:
 
 
 def require_alignable(latitude_deg: float) -> None:
-    """Refuse a place where no heading can be found: `BadParameter`."""
+    """Refuse a latitude at which no heading can be determined. Raises `BadParameter`."""
     if abs(latitude_deg) > LATITUDE_MAX_DEG:
         raise BadParameter(
             "latitude_deg",

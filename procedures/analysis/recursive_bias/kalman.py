@@ -3,8 +3,8 @@
 The state is the bias, ``x(k+1) = x(k)``; a measurement is ``z(k) = x + v(k)``. Under white noise of variance R this is
 S 5.180-5.183 with Φ = H = 1, Q = 0: ``K = P/(P + R)``, ``P ← (1 − K)·P``, ``x̂ ← x̂ + K·(z − x̂)``. Under noise of any
 covariance C = L·Lᵀ the innovations of the noise are white: ``y = L⁻¹z = L⁻¹1·x + ν`` with unit variance, and since L is
-triangular, y(k) needs the measurements up to k alone. Filtering y is the filter with the whole of C in it; no state has
-to be added for it.
+triangular, y(k) needs the measurements up to k alone. Filtering y thus accounts for the whole of C, without additional
+states.
 """
 
 import numpy as np
@@ -15,10 +15,10 @@ from procedures.core.errors import BadParameter
 
 
 class RecursiveBias:
-    """Best linear estimate of a constant from measurements that come one after the other.
+    """Best linear estimate of a constant from successive measurements.
 
     `covariance` (n, n) of the noise of all measurements that may come; n·R on the diagonal alone is S's filter.
-    `prior_variance` None knows nothing beforehand: then the first measurement is the first estimate.
+    `prior_variance` None: no prior knowledge; the first measurement is then the first estimate.
     """
 
     def __init__(self, covariance: Array, prior_mean: float = 0.0, prior_variance: float | None = None) -> None:
@@ -33,7 +33,7 @@ class RecursiveBias:
         self._normalised: list[float] = []
         self._prior = prior
         self.count = 0
-        """Measurements so far."""
+        """Number of measurements so far."""
         self.estimate = prior_mean
 
     @property
@@ -51,7 +51,7 @@ class RecursiveBias:
 
     @property
     def sd(self) -> float:
-        """Standard uncertainty by now; infinite before anything is known."""
+        """Current standard uncertainty; infinite before anything is known."""
         if self.count:
             return float(1.0 / np.sqrt(self._information[self.count - 1]))
         return float(1.0 / np.sqrt(self._prior)) if self._prior > 0.0 else float("inf")
@@ -87,5 +87,5 @@ class RecursiveBias:
 
 
 def white_covariance(variance: float, count: int) -> Array:
-    """R on the diagonal, shape (n, n): S's white noise."""
+    """White-noise covariance of S: R on the diagonal, shape (n, n)."""
     return variance * np.eye(count)
