@@ -41,7 +41,7 @@ class Copies:
         self._pieces = 0
 
     def add(self, d: Samples, resolution: Array) -> None:
-        """Add differences (channels, n); `resolution` [raw] of integer channels; 0 of others: the least change counts."""
+        """Add differences (channels, n); `resolution` [raw] of integer channels; 0 of others (least change)."""
         stride = 1 if self._pieces < FIRST else STRIDE
         some = np.abs(d[:, self._pieces % stride :: stride].astype(np.float64))
         self._pieces += 1

@@ -26,7 +26,7 @@ CELLS = 4
 four times as short, standard deviations of position differ by 0.3 %, of tilts and velocities by 1.5 % (measured).
 """
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(200)
-"""Quadrature over the angle of the circle; against ten times as many nodes the radius differs by 1e-9 at most (measured)."""
+"""Quadrature over the circle's angle; with ten times as many nodes the radius differs by 1e-9 at most (measured)."""
 SLOW = {
     "random walk": "random_walk",
     "bias instability": "bias_instability",
@@ -162,7 +162,7 @@ class _CellCovariances:
         self._unit: dict[tuple[str, tuple[float, float]], Array] = {}
 
     def of(self, noise: NoiseCoefficients, name: str) -> Array:
-        """Covariance of one noise process of a channel, (n + 1, n + 1) [rate²]; quantization counts in the first window."""
+        """Covariance of one noise process, shape (n + 1, n + 1) [rate²]; quantization counts in the first window."""
         size: float = getattr(noise, name)
         covariance = size**2 * self._of_unit(name, noise.flicker_band_s) if size > 0.0 else self._none()
         if name == "random_walk":

@@ -21,7 +21,7 @@ and longitude [rad] and height [m]."""
 TILT_NORTH, HEADING, TILT_EAST, V_NORTH, V_UP, V_EAST, LATITUDE, LONGITUDE, HEIGHT = range(9)
 
 EARTH_RADIUS_M = 6_371_000.0
-"""Radius of the sphere (S 4.1): with g = 9.81 m/s² the Schuler period is 84.4 min. The ellipsoid's radii of curvature differ
+"""Sphere's radius (S 4.1): with g = 9.81 m/s² the Schuler period is 84.4 min. The ellipsoid's radii of curvature differ
 from it by up to 0.6 %, and the result as much."""
 
 LATITUDE_MAX_DEG = 89.0

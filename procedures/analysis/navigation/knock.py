@@ -63,7 +63,7 @@ def attitude_step(recording: Recording, calibrations: dict[str, TriadCalibration
 
 
 def _tilt_steps(force: Array) -> tuple[float, float, int, float]:
-    """Tilt steps in forces (n, 3): greatest ratio to the scatter, its size [rad] and place, least visible step [rad]."""
+    """Tilt steps in forces (n, 3): greatest ratio to the scatter, its size [rad], place, least visible step [rad]."""
     mean = force.mean(axis=0)
     across = np.linalg.svd(mean[None, :])[2][1:]
     angles = force @ across.T / np.linalg.norm(mean)

@@ -1,8 +1,8 @@
 """The end of the warm-up: the transient's last moment above a stated share of the noise.
 
 Thesis 4.1.2 finds a transient of 600 s in a moving average; paper A fits a sum of exponentials and cuts 11 700 s; the
-standards require the warm-up to be cut off, without defining its end. Here it ends where the fitted curve falls below `FRACTION` of
-the noise's own Allan deviation at the averaging time, and stays there.
+standards require the warm-up to be cut off, without defining its end. Here it ends where the fitted curve falls below
+`FRACTION` of the noise's own Allan deviation at the averaging time, and stays there.
 """
 
 from collections.abc import Sequence

@@ -65,7 +65,7 @@ def fit_self_heating(
 ) -> SelfHeating:
     """Fit the curve to means (n,) [rate] over cells of `cell_s` [s], the first beginning `start_s` [s] after power-up.
 
-    An exponential is accepted where the p-value of its likelihood ratio is below `significance`. Raises `BadParameter` and
+    An exponential is accepted if the p-value of its likelihood ratio is below `significance`. Raises `BadParameter` and
     `UnfitRecording`. Series of more than 2048 cells are averaged to no more than that; time constants below two of
     those cells, or far above half the record, are not found.
     """
