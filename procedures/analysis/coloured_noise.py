@@ -1,9 +1,9 @@
 """Noise of one long record of cell means, decorrelated by a cosine transform. Independent of any transient.
 
 A discrete cosine transform (type II, orthonormal) decorrelates a rate random walk and a white noise exactly, a flicker
-noise and a quantization noise nearly: the coefficients are all but uncorrelated. So the
-likelihood of a record is that of its coefficients' squares (Whittle's), with the *exact* variance of each, and
-dividing by its root whitens whatever curve is to be fitted. The mean (k = 0) has no information on noise and is omitted.
+noise and a quantization noise nearly: the coefficients are all but uncorrelated. So the likelihood of a record is that
+of its coefficients' squares (Whittle's), with the *exact* variance of each, and division by its root whitens any curve
+that is fitted. The mean (k = 0) holds no information on noise and is left out.
 
 The power of each process in a coefficient is that of `noise_fit.columns`; flicker noise is taken as 1/f throughout.
 """
