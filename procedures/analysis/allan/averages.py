@@ -53,7 +53,7 @@ def remainder_kernel(s: int) -> Array:
 
 
 def lines(spectrum: Array) -> float:
-    """Part of the remainders' spectrum (n,) that is in lines: far above the median of the neighbouring frequencies."""
+    """Share of spectral lines in the remainders' spectrum (n,): power far above the median of its neighbourhood."""
     bands = spectrum[: len(spectrum) // NEIGHBOURS * NEIGHBOURS].reshape(-1, NEIGHBOURS)
     above = bands - STANDS_OUT * np.median(bands, axis=1)[:, None]
     # The first band, where the remainders begin, is steep and has no lines of importance.

@@ -160,7 +160,7 @@ class _Near:
         self._row = 0
 
     def _add(self, x: Array, rows: int, columns: int) -> None:
-        """Terms that start at the first `rows` clusters of `x`, at the first offsets."""
+        """Add the terms that start at the first `rows` clusters of `x`, at the first offsets."""
         step = x.strides[0]
         height = max(1, _CACHED // columns)
         for a in range(0, rows, height):
@@ -172,7 +172,7 @@ class _Near:
             self._sums[:columns] += squared(d) if columns == 1 else np.einsum("ij,ij->j", d, d)
 
     def add(self, x: Array, first: int) -> None:
-        """Its share of the terms that fit into `x`, which begins at sample `first`, for every offset."""
+        """Add its share of the terms that fit into `x`, which begins at sample `first`, for every offset."""
         last = first + len(x) - 1 - (self._offsets - 1) * self._spread
         rows = last // self.m - self._row - 1
         if rows > 0:

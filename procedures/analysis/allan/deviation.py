@@ -25,23 +25,23 @@ class Deviation:
     rate_hz: float
     count: int
     sizes: Sizes
-    """m: samples a cluster."""
+    """Cluster sizes m in samples."""
     tau_s: Array
     deviation: Array
     terms: NDArray[np.int64]
-    """Squared differences that were averaged."""
+    """Number of squared differences that were averaged."""
     left_out: NDArray[np.int64]
-    """Those left out because they touch a gap."""
+    """Number of terms omitted because they touch a gap."""
     strides: NDArray[np.int64]
     """Samples between neighbouring terms; 1 is exact, more: see `correlated` and `overlapping`."""
     alpha: Array
-    """Exponent of the rate's spectral density that the edf were taken for."""
+    """Exponent of the rate's spectral density that the edf assume."""
     edf: Array
     lower: Array
     upper: Array
     confidence: float
     missing: int
-    """Samples that were NaN."""
+    """Number of samples that were NaN."""
     first_missing: int | None
 
 

@@ -27,7 +27,7 @@ from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 
 ONE_SIGMA = float(erf(np.sqrt(0.5)))
-"""The usual confidence, 68.27 %."""
+"""Confidence of one sigma, 68.27 %."""
 _MOST = 100
 """J_max: terms summed before a closed form takes over."""
 

@@ -18,7 +18,7 @@ FEWEST = 30
 SURE = 120
 """Number of points from which on a rounded exponent is rarely wrong."""
 MOST = 2048
-"""More points than these do not change a rounded exponent."""
+"""Most points used; more do not change a rounded exponent."""
 _HELD = 1 << 17
 _LATE = 1 << 16
 
@@ -56,10 +56,10 @@ class Held:
     """Values of a running sum that the identification needs."""
 
     points: Array
-    """At every `stride`-th sample, (n,)."""
+    """The running sum at every `stride`-th sample, (n,)."""
     stride: int
     late: Array
-    """At each of the last samples."""
+    """The running sum at each of the last samples."""
 
 
 class LatePoints:

@@ -28,7 +28,7 @@ FEWEST_SAMPLES = 12
 
 @dataclass(frozen=True)
 class Statistic:
-    """One member of the family."""
+    """One member of the Allan family."""
 
     name: str
     order: int

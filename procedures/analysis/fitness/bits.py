@@ -4,12 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 CROSSINGS = 50
-"""Consecutive samples on either side of the forbidden half, so often, that the signal must pass through it."""
+"""Crossings between the two sides of the forbidden half that prove that the signal must pass through it."""
 LEVELS = 16
 """Different values that a channel must take within a piece before a gap among them counts: with two levels, some bits
 never change."""
 SPREAD = 4
-"""Different values from which on their common factor is a resolution."""
+"""Number of different values from which on their common factor counts as a resolution."""
 EXAMINED = 1024
 """Samples of a piece in which different values are counted."""
 

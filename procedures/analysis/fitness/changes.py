@@ -49,7 +49,7 @@ def changes(
 ) -> list[list[Change]]:
     """Steps of each row of `series` (channels, K), none smaller than its `floor` (channels,), in order.
 
-    `uneven` (channels, K), at least 1: how many times its usual noise a row has at each cell; a gap counts the less.
+    `uneven` (channels, K), at least 1: ratio of a row's noise at each cell to its usual noise; a gap counts the less.
     `least`: spreads that a gap must have. `flat`: the series does not drift, and means stand for the lines, which makes
     the gap twice as certain.
     """
@@ -88,7 +88,7 @@ def _gaps(y: Array, h: int, flat: bool) -> Array:
 
 
 def _intercept(total: Array, moment: Array, h: int) -> Array:
-    """Where the line through h cells meets the border: total Σy and moment Σy·u, u the distance from the border."""
+    """Value at the border of the line through h cells: total Σy and moment Σy·u, u the distance from the border."""
     mean = total / h
     slope = (moment / h - mean * h / 2.0) / ((h * h - 1.0) / 12.0)
     return mean - slope * h / 2.0
@@ -139,7 +139,7 @@ class _Scale:
 
 
 def _best(scales: Sequence[_Scale], barred: NDArray[np.bool_], most: float) -> tuple[int, int] | None:
-    """Border and scale of the gap that is most beyond its spread; None where none is."""
+    """Border and scale of the gap that exceeds its spread most; None where none does."""
     best = None
     for scale in scales:
         score = np.abs(scale.gaps) / scale.spread

@@ -19,7 +19,7 @@ LEAST = 50
 LEAST_SHARE = 0.01
 """Least share of copies; fewer are left to the search for runs."""
 PART = 1024
-"""Differences that are judged together."""
+"""Number of differences that are judged together."""
 STRIDE = 17
 """Every n-th difference is examined, with another offset in each piece, so that every phase of copying occurs."""
 FIRST = 4
@@ -71,13 +71,13 @@ class Copies:
         return self._large > 0.5 * (self._looked - self._same)
 
     def by_chance(self, c: int) -> float:
-        """Part of the samples that repeat the one before because the quantity did: half as many as change by a step."""
+        """Share of samples that repeat the previous one by chance: half as many as change by one step."""
         return float(self._one[c]) / max(2 * self._looked, 1)
 
     def copied(self, in_runs: Array) -> list[int]:
         """Columns of the channels whose repeats are beyond what their changes allow.
 
-        `in_runs`: part of all samples (channels,) that repeat in long runs, which are another matter.
+        `in_runs`: part of all samples (channels,) that repeat in long runs, which are judged elsewhere.
         """
         many = self._proven - in_runs * self._looked > np.maximum(LEAST_SHARE * self._looked, LEAST)
         return np.flatnonzero(many & (self._proven > 0.5 * self._same)).tolist()

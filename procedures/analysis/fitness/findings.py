@@ -83,7 +83,7 @@ class FitnessSettings:
     """The unit neither turns faster than the Earth nor is accelerated but by gravity: units and jumps can be judged."""
     beside_others: bool = False
     """The recording is one of several stations: a channel that reads one value is judged over all of them (see
-    `station_means`), so a counter that is silent is not even warned of, and samples that are constant are."""
+    `station_means`), so a silent counter causes no warning, and constant samples cause one."""
     means_only: bool = False
     """The analysis uses means, which repeated rows and copied samples leave right: these only cause warnings."""
     seeks_scale: bool = False

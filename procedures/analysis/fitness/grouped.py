@@ -11,7 +11,7 @@ NAMED = 12
 
 @dataclass
 class _Group:
-    """One kind of flaw of one channel, or of several that have it alike."""
+    """One kind of flaw of one channel, or of several channels that share it."""
 
     sentence: str
     label: str
@@ -23,8 +23,8 @@ def grouped(
 ) -> tuple[str, ...]:
     """Sentences about recordings, (label, findings) each; `but` for one kind.
 
-    Of a single recording each different sentence once. Of several, each kind of flaw of a channel once, with the
-    station where it is seen first and the names of the others.
+    For a single recording, each different sentence once. For several, each kind of flaw of a channel once, with the
+    station where it appears first and the names of the others.
     """
     groups: dict[tuple[Kind, str], _Group] = {}
     for label, fitness in found:

@@ -12,7 +12,7 @@ SIGMAS = 12.0
 WHITE = 2.0 / np.sqrt(np.pi)
 """Mean magnitude of the difference of two samples of white noise of unit standard deviation."""
 LEVELS = 4.0
-"""Resolutions that a jump is at least: a counter at rest gives a pulse now and then, and none in between."""
+"""Least jump in resolutions: a counter at rest gives a single pulse now and then."""
 STRIDE = 8
 """Every n-th difference is used for the noise: cheap, and one outlier in a thousand of them moves it little."""
 TRUSTED = 1024
@@ -24,15 +24,15 @@ LOOKED_AT = 256
 LONELY = 3.0
 """Least ratio of an outlier's distance to any distance of neighbouring samples around it."""
 KEPT = 1000
-"""Outliers and steps that are kept of a channel; the others are counted."""
+"""Most outliers and steps that are kept for a channel; further ones are only counted."""
 
 
 @dataclass(frozen=True)
 class Jump:
-    """One outlier, or one step."""
+    """One outlier or one step."""
 
     index: int
-    """The sample that is out, or the first behind the step."""
+    """The outlying sample, or the first one after the step."""
     size: float
     """Raw: from the mean of its two neighbours, or the height."""
     noise: float

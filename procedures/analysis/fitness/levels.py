@@ -1,4 +1,4 @@
-"""Level and noise of every channel over short cells: what steps and changes of the noise are sought in."""
+"""Level and noise of every channel over short cells, in which steps and changes of the noise are sought."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from procedures.core.arrays import Array
 LEAST_CELLS = 1024
 """Fewest cells of a recording of known length with at least as many samples; it has less than twice as many."""
 NOISE_SAMPLES = 32
-"""Differences that one value of the noise rests on, at least."""
+"""Fewest differences behind one value of the noise."""
 STRIDE = 8
 """Every n-th difference is used for the noise of a long cell."""
 THIN_FROM, THINNEST = 64, 4
@@ -34,7 +34,7 @@ class CellLevels:
     """Mean magnitude of the difference of two neighbours, (channels, K // group)."""
 
     def leave_out(self, channel: int, samples: Sequence[int]) -> None:
-        """Put the mean of its neighbours for each cell of a channel that one of these samples is in, in place."""
+        """Replace each cell of a channel that contains one of these samples by the mean of its neighbours, in place."""
         for row, size in ((self.means[channel], self.size), (self.noise[channel], self.size * self.group)):
             # The difference to the next sample is in the next cell where the sample is the last of its own.
             for k in sorted({(i + late) // size for i in samples for late in (0, 1)}):
@@ -43,7 +43,7 @@ class CellLevels:
 
 
 class Levels:
-    """Gathers the cells piece by piece; a cell never lies in two pieces, what is left over at the end is left out."""
+    """Gather the cells piece by piece; a cell never spans two pieces, and an incomplete last one is dropped."""
 
     def __init__(self, channels: int, count: int | None) -> None:
         """Start with no samples; `count`: the announced number of samples."""

@@ -1,7 +1,7 @@
 """Samples of a recording in pieces of one size, channel by channel, however the blocks came.
 
-So that what is found does not depend on how the recording was cut, and every look at a piece costs one call for all
-its channels.
+The findings thus do not depend on how the recording was cut, and each examination of a piece is one call for all its
+channels.
 """
 
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ HISTORY = 2 * MARGIN + 1
 
 Mask = NDArray[np.bool_]
 Samples = NDArray[np.int32 | np.float64]
-"""Either all of the one or all of the other type."""
+"""Samples that are all integers or all floats."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Piece:
 
 
 class Pieces:
-    """Blocks in, pieces out."""
+    """Cut blocks of samples into pieces."""
 
     def __init__(self, channels: int) -> None:
         self._channels = channels
@@ -66,7 +66,7 @@ class Pieces:
         self._filled = 0
         self._history = 0
         self.seen = 0
-        """Samples that came in."""
+        """Number of samples received so far."""
 
     def add(self, block: RawArray) -> Iterator[Piece]:
         """Pieces that a further block of shape (n, channels) completes. Raises `BadParameter` for another shape."""
@@ -108,7 +108,7 @@ def _numbers(block: RawArray, channels: int) -> Samples:
 
 
 def _fill(columns: Samples, history: int) -> Mask | None:
-    """Put the mean of the piece where a new sample is no number, in place; where there are such."""
+    """Replace new samples that are no numbers, if any, by the mean of the piece, in place."""
     new = columns[:, history:]
     if not new.size or np.all(np.isfinite(new.min(axis=1)) & np.isfinite(new.max(axis=1))):
         return None

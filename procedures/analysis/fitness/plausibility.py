@@ -1,4 +1,4 @@
-"""Wrong unit or rate: what a unit at rest reads against gravity and against the rate of a turning Earth."""
+"""Plausibility of unit and rate: readings of a unit at rest against gravity and the Earth's rate."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -163,7 +163,7 @@ class Readings:
         truth: float,
         candidates: dict[str, float],
     ) -> dict[str, Doubt]:
-        """The sentence for channels that read `read` where `truth` is so in the unit declared."""
+        """The sentence on channels that read `read` where `truth` is expected in the declared unit."""
         unit = self._channels[rows[0]].rate_unit
         looks = [name for name, size in candidates.items() if abs(read / (truth * size) - 1.0) <= TOLERANCE]
         if abs(read / (truth * self._rate_hz) - 1.0) <= TOLERANCE:
@@ -178,14 +178,14 @@ class Readings:
         return {self._names[row]: Doubt(sentence, bool(looks)) for row in rows}
 
     def _rows(self, triad: Sequence[str]) -> list[int]:
-        """Where a triad stands, whole and in SI; nothing otherwise."""
+        """Rows of a triad if it is complete and in SI; otherwise none."""
         wanted = "rad/s" if triad == GYRO else "m/s^2"
         rows = [self._names.index(name) for name in triad if name in self._names]
         return rows if len(rows) == 3 and all(self._channels[r].rate_unit == wanted for r in rows) else []
 
 
 def unlikely_rate(rate_hz: float) -> str | None:
-    """A sentence about a rate that no inertial unit has."""
+    """A sentence on a sampling rate that no inertial unit has, else None."""
     if SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
         return None
     return (
@@ -195,7 +195,7 @@ def unlikely_rate(rate_hz: float) -> str | None:
 
 
 def _factor(ratio: float) -> float | None:
-    """The simple factor or its inverse that a ratio is near to."""
+    """The simple factor, or its inverse, nearest to a ratio; None where none is near."""
     near = [f for g in FACTORS for f in (g, 1.0 / g) if abs(ratio / f - 1.0) <= FACTOR_TOLERANCE]
     return min(near, key=lambda f: abs(ratio / f - 1.0), default=None)
 

@@ -25,7 +25,7 @@ LEAST_PART = 1e-3
 KEPT = 1000
 """Most runs that are kept for a group."""
 SAME = 0.8
-"""Part of a run that lies within one of a larger group for it to be the same."""
+"""Share of a run that must lie within a larger group's run for both to be the same."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The inspection itself: blocks in, findings out, in one pass and in bounded memory for any length."""
+"""Inspection of a recording: blocks in, findings out, in one pass and in bounded memory for any length."""
 
 from collections.abc import Sequence
 from typing import cast
@@ -26,7 +26,7 @@ from procedures.core.recording import INCREMENTS, TRIADS, Channel, Quantity, Raw
 _SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT)
 
 FEW_SHARE = 1e-3
-"""Part of a channel's samples that may be outliers for a figure without them to be one of the channel."""
+"""Greatest share of outliers for which a result without them still represents the channel."""
 
 
 class FitnessStream:
@@ -84,7 +84,7 @@ class FitnessStream:
         return tuple(ChannelFitness(c.name, tuple(f)) for c, f in zip(self._channels, found, strict=True))
 
     def outliers(self) -> dict[int, list[Jump]]:
-        """The outliers of each column that has any, where they are few enough to be left out."""
+        """The outliers of each column, where they are few enough to be omitted."""
         return {c: jumps for c, jumps in enumerate(self._jumps.outliers) if jumps and self._few(c)}
 
     def _few(self, c: int) -> bool:

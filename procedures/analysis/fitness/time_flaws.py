@@ -22,9 +22,9 @@ LEAST_CHANGE = float(np.log(1.4))
 NOISE_SPREADS = 6.0
 """Least change of the noise in spreads, in addition to `LEAST_CHANGE`."""
 LEAST_NOISE = 0.5
-"""Resolutions that the noise must have for small steps of the level to be more than rounding."""
+"""Least noise, in resolutions, for which small steps of the level are more than rounding."""
 FINE_NOISE = 1.0
-"""Resolutions that the noise must have for its changes to be more than that."""
+"""Least noise, in resolutions, for which its changes are more than rounding."""
 LEAST_STEP = 0.01
 """Least height of any step, in resolutions."""
 ROUNDING = 2.0

@@ -1,4 +1,4 @@
-"""One channel of one launch: curves, band, coefficients three ways, wavelet split, averaging time."""
+"""One channel of one launch: curves, band, coefficients by three methods, wavelet split, averaging time."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""How well a static run will know a unit's noise: Cramér-Rao bounds from the spectrum, before anything moves."""
+"""Predicted uncertainty of noise coefficients from a static run: Cramér-Rao bounds from the expected spectrum."""
 
 from dataclasses import dataclass
 from math import pi, sqrt
@@ -26,7 +26,7 @@ class PredictedCoefficient:
 
     process: str
     unit: str
-    """SI."""
+    """SI unit of the coefficient."""
     value: float
     standard_uncertainty: float
     square_ratio: float

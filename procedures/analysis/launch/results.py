@@ -17,7 +17,7 @@ class Reading:
     standard_uncertainty: float | None = None
     lower: float | None = None
     upper: float | None = None
-    """Ends of the interval at the confidence asked for."""
+    """Ends of the interval at the requested confidence."""
     upper_limit: float | None = None
     """The coefficient is below this with a probability of 95 % (one-sided), observed or not."""
     p_value: float | None = None
@@ -31,7 +31,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class SpectralLine:
-    """A line that was taken out of the record before its noise was fitted."""
+    """A line that was removed from the record before its noise was fitted."""
 
     frequency_hz: float
     amplitude: float
@@ -107,7 +107,7 @@ class BandCurve:
 
 @dataclass(frozen=True)
 class Stage:
-    """The channel after one step of the analysis: what each step changes is seen from stage to stage."""
+    """The channel after one step of the analysis; successive stages show the effect of each step."""
 
     name: str
     """"as recorded", "trimmed", "self-heating removed", "kept by the wavelet split", "removed by the wavelet split"."""
@@ -143,7 +143,7 @@ class Transient:
     shape: str
     """"one exponential", "two exponentials", "raised cosine" or "ended exponential"."""
     amplitude: float
-    """At the first sample [rate]."""
+    """Amplitude at the first sample [rate]."""
     amplitude_sd: float
     end_s: float
     """Time after which it stays below `level`."""

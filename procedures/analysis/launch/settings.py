@@ -21,7 +21,7 @@ class LaunchSettings:
     heating_gyros: bool = False
     heating_accelerometers: bool = True
     wavelet_rule: WaveletRule | None = "rescaled"
-    """None: no split."""
+    """Rule of the wavelet thresholds; None: no split."""
     wavelet_levels: int = 6
     confidence: float = 0.95
     level: float = 0.01

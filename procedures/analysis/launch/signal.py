@@ -1,4 +1,4 @@
-"""One channel's cell means made fit for noise analysis: warm-up trimmed, self-heating removed; each step on record."""
+"""Preparation of one channel's cell means for noise analysis: warm-up trimmed, self-heating removed, steps logged."""
 
 from dataclasses import dataclass, field
 from math import ceil

@@ -26,7 +26,7 @@ class MeanCoefficient:
 
 @dataclass(frozen=True)
 class ChannelSummary:
-    """One channel over all launches."""
+    """Summary of one channel over all launches."""
 
     channel: str
     rate_unit: str
@@ -80,7 +80,7 @@ def _mean(process: str, channels: Sequence[ChannelNoise]) -> MeanCoefficient:
 
 
 def _averaging_time_s(noise: NoiseCoefficients) -> float | None:
-    """The averaging time; None where quantization dominates nowhere, or everywhere."""
+    """The averaging time from the mean coefficients; None where quantization dominates nowhere, or everywhere."""
     return averaging_time(noise).tau_s or None
 
 

@@ -123,7 +123,7 @@ class ThesisPrediction:
     """Azimuth error of one alignment by thesis 1.1: in-run noise alone, no calibration, launch or table in it."""
 
     added_deg: float
-    """The parts' magnitudes added, as printed."""
+    """Sum of the parts' magnitudes, as printed."""
     independent_deg: float
     """Root of the sum of their squares."""
 
@@ -146,7 +146,7 @@ def thesis_prediction(unit: Unit, site: Site, base_turn_arcsec: float, alignment
 
 
 def _angles(force: Array, rate: Array) -> Array:
-    """(heading, pitch, roll) [rad]."""
+    """Heading, pitch and roll of an attitude [rad]."""
     pitch = float(np.arctan2(force[0], np.hypot(force[1], force[2])))
     roll = float(np.arctan2(-force[2], force[1]))
     level = rotation_nb(0.0, pitch, roll) @ rate

@@ -1,4 +1,4 @@
-"""Where the three ways to noise coefficients disagree, in sentences. Numbers are relative: no unit is needed."""
+"""Disagreements of the three methods for noise coefficients, as sentences. Numbers are relative, without unit."""
 
 from math import hypot
 

@@ -66,7 +66,7 @@ class GaussMarkov:
 
 @dataclass(frozen=True)
 class Octave:
-    """How well the model describes the power between two frequencies."""
+    """Goodness of fit of the model between two frequencies."""
 
     low_hz: float
     high_hz: float
@@ -74,7 +74,7 @@ class Octave:
     dof: int
     p_value: float
     is_fast: bool
-    """From the full-rate samples, not from the cell means."""
+    """True: from the full-rate samples; False: from the cell means."""
     fitted: bool
     """False: left out of the fit."""
 

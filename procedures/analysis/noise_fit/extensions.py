@@ -31,7 +31,7 @@ LONGEST = 0.1
 SCORE = 2.7
 """Score, in standard deviations, from which on the extension is fitted."""
 GAIN_OF_TIME, GAIN_OF_CORNER = 16.0, 11.0
-"""Twice the log likelihood that an extension must gain: χ² of two and of one degree at 5e-4, of several times tried."""
+"""Required gain in twice the log likelihood: χ² of two and of one degree at 5e-4, for several times tried."""
 _RATIO = 2.0**0.5
 """Ratio of two successive trial times."""
 _PER_E_FOLD = 4
@@ -95,7 +95,7 @@ def gauss_markov(joined: Joined, time_s: float) -> Array:
 
 
 def flicker_from(joined: Joined, corner_s: float) -> Array:
-    """Expected power (b,) of unit B² with another shortest relaxation time than the columns were made with."""
+    """Expected power (b,) of a flicker of unit B² with the shortest relaxation time `corner_s`."""
     count = max(2, round(_PER_E_FOLD * abs(log(corner_s / _FIRST_CORNER_S))) + 1)
     times = np.geomspace(_FIRST_CORNER_S, corner_s, count)
     weights = np.full(count, log(corner_s / _FIRST_CORNER_S) / (count - 1))
@@ -136,7 +136,7 @@ def candidates(joined: Joined, every: int = 1) -> list[Extension]:
 
 
 def _score(joined: Joined, at: State, one: Extension) -> float:
-    """The score of the extension's power over its standard deviation, the fitted variances allowed for."""
+    """Score of the extension's power over its standard deviation, corrected for the fitted variances."""
     used = joined.fitted
     if one.time_s is not None:
         column = gauss_markov(joined, one.time_s)[used]
@@ -158,6 +158,6 @@ def _score(joined: Joined, at: State, one: Extension) -> float:
 
 
 def _gain(joined: Joined, at: State, one: Extension) -> float:
-    """Twice the log likelihood that the extension gains."""
+    """Twice the gain in log likelihood by the extension."""
     extended = one.applied(joined).used
     return 2.0 * (maximum(extended, range(extended.columns.shape[1])).log_likelihood - at.log_likelihood)

@@ -1,4 +1,4 @@
-"""A Gauss–Markov process that was found: correlation time and driving noise with their uncertainties."""
+"""Estimate of a detected Gauss–Markov process: correlation time and driving noise with their uncertainties."""
 
 from math import log, sqrt
 
@@ -41,7 +41,7 @@ def gauss_markov(plain: Joined, model: Extension, free: tuple[int, ...]) -> Gaus
 
 
 def _at(plain: Joined, time_s: float, free: tuple[int, ...]) -> tuple[State, float]:
-    """The fit with this correlation time, and the relative uncertainty of its variance."""
+    """Fit with a given correlation time, and the relative uncertainty of its variance."""
     spectrum = Extension(time_s=time_s).applied(plain).used
     used = [k for k in free if k < spectrum.columns.shape[1] - 1]
     used.append(spectrum.columns.shape[1] - 1)

@@ -29,7 +29,7 @@ _LIMIT = float(ndtri(0.95))
 
 
 def fit_allan(deviation: Deviation, *, from_s: float = 0.0, level: float = 0.01, confidence: float = 0.95) -> NoiseFit:
-    """Q, N, B, K, R of a rate's Allan deviation, overlapping or not, from the averaging time `from_s` on.
+    """Estimate Q, N, B, K, R from a rate's Allan deviation, overlapping or not, from the averaging time `from_s` on.
 
     A process is absent where its square is zero, or not significant at `level` (one-sided, normal); the least
     significant is left out first. Intervals are those of the squares. The slope's sign is not in an Allan variance:
@@ -77,7 +77,7 @@ class _Fit:
         self._variance, self._edf, self._columns = variance, edf, columns
 
     def solve(self, present: tuple[int, ...]) -> Array:
-        """v, (5,), zero where not present."""
+        """Solve for the squares v, (5,), zero for absent processes."""
         model, v = self._variance, np.zeros(len(PROCESSES))
         for _ in range(_ITERATIONS):
             weight = np.sqrt(0.5 * self._edf) / model
@@ -113,7 +113,7 @@ def _correlation(m: Array, rate_hz: float, count: int, v: Array) -> Array:
 
 
 def _significant(fit: _Fit, correlation: Array, z: float) -> tuple[tuple[int, ...], Array, Array]:
-    """The processes that stand z of their standard uncertainties above zero, v (5,), and the covariance of theirs."""
+    """The processes that exceed zero by z standard uncertainties, v (5,), and the covariance of theirs."""
     present = tuple(range(len(PROCESSES)))
     while True:
         v = fit.solve(present)
@@ -132,7 +132,7 @@ def _present(v: float, sd: float, z: float) -> Estimate:
 
 
 def _absent(v: float, sd: float) -> Estimate:
-    """By the fit with all processes."""
+    """Estimate of an absent process, by the fit with all processes."""
     return Estimate(None, None, None, None, sqrt(v + _LIMIT * sd), _p_value(v / sd))
 
 

@@ -31,7 +31,7 @@ _SAME_MODES = 3.0
 _TOLD = 0.25
 """Share of the cell frequency; lines above it belong to the fast part, or are aliases of it."""
 CHOSEN_BAND = 1.4
-"""Variance of an estimate from a band that its own record chose, over that from one which was given (Monte Carlo)."""
+"""Variance of an estimate from a band chosen by its own record, relative to that from a given band (Monte Carlo)."""
 LIMIT = 0.95
 """Probability of an upper limit."""
 
@@ -119,7 +119,7 @@ def _estimates(agreement: Agreement, selection: Selection, confidence: float) ->
 
 
 def _one_sided() -> float:
-    """Loss of twice the log likelihood at an upper limit: a one-sided interval is half of a two-sided one."""
+    """Twice the loss of log likelihood at an upper limit: a one-sided interval is half of a two-sided one."""
     return float(chdtri(1, 2.0 * (1.0 - LIMIT)))
 
 
@@ -129,7 +129,7 @@ def _present(
     """A process with variance v: ``coefficient = √v``, its uncertainty ``sd(v)/(2√v)``, its interval by profile.
 
     The profiles, each with sd(v): that of the processes present, then that of all. The interval is from the lowest to
-    the highest end: alone the first is blind to what was not observed, alone the second is low where all that it
+    the highest end: the first alone ignores what was not observed, the second alone is low where all that it
     allows is absent, since variances cannot be negative (N alone: upper limits held in 76 % instead of 95 %).
     """
     first, sd = profiles[0]
@@ -142,7 +142,7 @@ def _present(
 
 
 def _of_ramp(selection: Selection, confidence: float) -> Estimate:
-    """|R| with Student's interval."""
+    """The ramp |R| with Student's interval."""
     slope = selection.slope
     value, sd = abs(slope.slope), slope.standard_uncertainty
     limit = value + sd * slope.factor(LIMIT)

@@ -1,4 +1,4 @@
-"""Spectral lines: modes of a mean power spectrum that exceed their neighbourhood. Independent of any noise model."""
+"""Detection of spectral lines: modes of a mean power spectrum above their neighbourhood, without any noise model."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -15,7 +15,7 @@ LEVEL = 1e-6
 _HALF_WINDOW = 100
 _FEWEST_MODES = 32
 _FIRST = 8
-"""Below this mode of a segment the taper's main lobe meets the mean that was taken away."""
+"""First mode of a segment whose main lobe of the taper does not overlap the subtracted mean."""
 _GUARD = 2
 """Modes on each side of a line that are cut out with it: the main lobe of the taper."""
 _EFFICIENCY = 0.6
@@ -36,7 +36,7 @@ def levels_around(power: Array, dof: float, first: int = 0) -> tuple[Array, Arra
     """Level of the noise about each mode, as of a χ²_dof of unit scale, and from how many modes, (m,) each.
 
     The median of as many modes as lie within ±100, at low modes within a factor of two: on a slope its middle value.
-    Below the mode `first` it is not wanted.
+    Below the mode `first` it is not computed.
     """
     count = len(power)
     half = np.minimum(np.arange(count) // 2, _HALF_WINDOW)
@@ -62,10 +62,10 @@ def standing_out(dof: float, count: Array, level: float) -> Array:
 def find_lines(
     power: Array, dof: float, segment: int, rate_hz: float
 ) -> tuple[NDArray[np.bool_], tuple[SpectralLine, ...]]:
-    """Which modes belong to lines, (m,), and the lines, of mean powers (m,) of modes 0…m−1 of `segment` samples.
+    """Find the lines in mean powers (m,) of modes 0…m−1 of `segment` samples: the mask of their modes (m,), and the lines.
 
-    A mode stands out where its power over the level about it passes what noise passes with probability `LEVEL` in the
-    whole record. A sine of amplitude a puts a²L/4 into its modes, L samples a segment.
+    A mode belongs to a line where its power over the level about it exceeds the value that noise exceeds with
+    probability `LEVEL` in the whole record. A sine of amplitude a puts a²L/4 into its modes, L samples a segment.
     """
     out = np.zeros(len(power), dtype=bool)
     if len(power) <= _FEWEST_MODES:

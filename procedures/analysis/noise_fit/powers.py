@@ -3,7 +3,7 @@
 Slow: the orthonormal cosine transform (DCT-II) of all cell means. Its modes of white noise, of a random walk and, its
 first and last reading left free, of quantization are independent; those of a flicker nearly so (correlations of a few
 per cent between the lowest). A ramp is a mean of the modes, not a power: bins keep the products that its least squares
-need. Fast: tapered segments, overlapped so that every sample counts once. Cell means of a second fold the reading
+need. Fast: tapered segments, overlapped so that every sample counts once. Cell means of a second alias the reading
 noise of all frequencies into their band; the fast modes separate it from the slower processes by its f².
 """
 
@@ -28,14 +28,14 @@ from procedures.core.noise import NoiseCoefficients
 FLICKER_BAND_S = NoiseCoefficients().flicker_band_s
 """Default flicker band, that of `core.noise`."""
 SINGLE_MODES = 50
-"""The lowest modes of the whole record stand alone."""
+"""Lowest modes of the whole record that form a bin each."""
 BINS = 300
 """Bins over the others, evenly in the logarithm of frequency."""
 CROSSOVER_HZ = 0.03
-"""From here on the full-rate segments are used, where there are any."""
+"""Frequency from which on the full-rate segments are used, if any."""
 _MODES_AT_CROSSOVER = 4
 _CUT, _ROUNDS = 1e-5, 6
-"""Probability of a power that is cut down before the noise about a line is fitted, and how often."""
+"""Probability of a power that is clipped before the noise about a line is fitted, and the number of rounds."""
 VARIANCES = range(4)
 _EDGE = 8
 """The taper rises over this fraction, 1/8, of a segment."""
@@ -60,7 +60,7 @@ class Powers:
     period_s: float
     """Sampling period of the data behind the modes."""
     lines: tuple[SpectralLine, ...] = ()
-    """Cut out of the bins."""
+    """Spectral lines that were cut out of the bins."""
 
 
 def slow_powers(
@@ -107,7 +107,7 @@ def slow_powers(
 
 
 def _less(y: Array, rows: Array) -> Array:
-    """A series (n,) less what rows (r, n) explain of it by least squares, and less its mean."""
+    """A series (n,) without its mean and its least-squares fit by rows (r, n)."""
     centred = np.concatenate([rows - np.mean(rows, axis=1, keepdims=True), np.ones((1, len(y)))])
     size = np.sqrt(np.sum(centred**2, axis=1, keepdims=True))
     centred /= np.where(size > 0.0, size, 1.0)
@@ -171,7 +171,7 @@ class FastPowers:
         """Segments taken so far; `finish` needs one."""
 
     def add(self, block: Array | NDArray[np.int32]) -> None:
-        """The next samples of the channel, (n,) [rate]."""
+        """Add the next samples of the channel, (n,) [rate]."""
         y = _checked(block, self._count)
         self._count += len(y)
         done = 0
@@ -196,7 +196,7 @@ class FastPowers:
         self._segment[: self._edge] = self._segment[-self._edge :].copy()
 
     def finish(self) -> Powers:
-        """The spectrum from the crossover up, less its lines. Raises `UnfitRecording` where no segment was whole."""
+        """The spectrum from the crossover up, without its lines. Raises `UnfitRecording` where no segment was whole."""
         if self.segments == 0:
             raise UnfitRecording(f"{self._count} samples are less than one segment of {self._length}")
         length, hop = self._length, self._length - self._edge

@@ -25,13 +25,13 @@ from procedures.core.arrays import Array
 RAMP, ENDS = 0, (1, 2)
 """Regressors: the ramp; the first and the last reading, which are always free."""
 VARIANCES = range(4)
-"""Q², N², B², K²; a column after them is not tested, and always in."""
+"""Columns of Q², N², B², K²; a column after them is untested and always included."""
 _OTHERS = (QUANTIZATION, RANDOM_WALK, BIAS_INSTABILITY)
 
 
 @dataclass(frozen=True)
 class Slope:
-    """The ramp's slope as a fit sees it."""
+    """The ramp's slope in a fit, with its uncertainty."""
 
     slope: float
     standard_uncertainty: float

@@ -35,9 +35,9 @@ class WithoutLines:
     """A record without its spectral lines."""
 
     cells: Array
-    """(n,) [rate]"""
+    """Cell means without the lines, (n,) [rate]."""
     lines: tuple[SpectralLine, ...]
-    """By frequency."""
+    """The lines, sorted by frequency."""
     beside: NDArray[np.bool_]
     """Modes 1…n−1 of the cosine transform that are adjacent to a line, (n−1,)."""
 
@@ -80,7 +80,7 @@ def _detrended(y: Array) -> Array:
 
 
 def _strongest(y: Array, taper: Array, expected: Array) -> float | None:
-    """Cycles in the record of the mode that stands out most; None where none does."""
+    """Cycles in the record of the most prominent mode; None where none is significant."""
     power = np.abs(np.fft.rfft(y * taper)) ** 2
     power = power[:-1]
     around, _ = levels_around(power, 2.0, _MANY)

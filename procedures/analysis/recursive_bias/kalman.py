@@ -43,7 +43,7 @@ class RecursiveBias:
 
     @property
     def gains(self) -> Array:
-        """K(k) on what a measurement adds to the ones before it, shape (n,): S 5.181 where the noise is white.
+        """Gains K(k) on the innovation of each measurement, shape (n,): S 5.181 where the noise is white.
 
         ``x̂(k) = x̂(k−1) + K(k)·(z(k) − ẑ(k))``, with ẑ(k) the measurement expected from all before it.
         """
@@ -51,7 +51,7 @@ class RecursiveBias:
 
     @property
     def sd(self) -> float:
-        """Current standard uncertainty; infinite before anything is known."""
+        """Current standard uncertainty of the bias; infinite before anything is known."""
         if self.count:
             return float(1.0 / np.sqrt(self._information[self.count - 1]))
         return float(1.0 / np.sqrt(self._prior)) if self._prior > 0.0 else float("inf")
@@ -65,7 +65,7 @@ class RecursiveBias:
         return np.array(self._normalised)
 
     def update(self, measurement: float) -> float:
-        """Take the next measurement; returns the new estimate."""
+        """Process the next measurement and return the new estimate."""
         k = self.count
         if k == len(self._lower):
             raise BadParameter("measurements", k + 1, f"at most the {k} whose noise was declared")
@@ -81,7 +81,7 @@ class RecursiveBias:
         return self.estimate
 
     def enough_at(self, target_sd: float) -> int | None:
-        """Number of measurements that will be enough, known before the first; None where all n are too few."""
+        """Number of measurements that suffices, known before the first; None where all n are too few."""
         reached = np.flatnonzero(self.variances <= target_sd**2)
         return int(reached[0]) + 1 if reached.size else None
 

@@ -1,7 +1,7 @@
-"""Means of a channel over windows that follow one another, and the covariance of their noise.
+"""Means of a channel over successive windows, and the covariance of their noise.
 
-The noise of such means is not white. Quantization ties neighbours: both share the reading at their common edge, with
-opposite signs. Flicker and rate random walk tie all of them.
+The noise of such means is not white. Quantization correlates neighbours: both share the reading at their common edge,
+with opposite signs. Flicker and rate random walk correlate all of them.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import Recording
 
 WINDOWS_MAX = 300
-"""Windows a recording is cut into at the most: their covariance is a full matrix."""
+"""Most windows of a recording: their covariance is a full matrix."""
 WINDOWS_MIN = 20
 BATCHES = 10
 

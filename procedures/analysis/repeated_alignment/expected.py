@@ -185,5 +185,5 @@ def _spread(per_channel: Array, covariance: Array) -> Array:
 
 
 def rms_deg(covariance: Array) -> float:
-    """Root of the mean variance [deg]."""
+    """Root of the mean variance of a covariance [deg]."""
     return float(np.sqrt(np.mean(np.diagonal(covariance)))) / units.DEG

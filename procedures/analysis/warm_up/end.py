@@ -165,7 +165,7 @@ def _ended(series: CosineSeries, ones: Sequence[Fit]) -> list[Fit]:
 
 
 def _end(fit: Fit, level: float, length: float) -> tuple[float, float]:
-    """Last crossing of the level [s] from the first cell's beginning, and its standard uncertainty [s].
+    """Time of the last crossing of the level [s] from the first cell's beginning, and its standard uncertainty [s].
 
     ``u² = gᵀCg`` with ``g = −(∂s/∂θ)/(∂s/∂t)``, the curve's s at the crossing. Sought up to ten records' lengths.
     """

@@ -77,7 +77,7 @@ def _split(shapes: tuple[Shape, ...], parameters: Array) -> tuple[Array, tuple[A
 
 @dataclass(frozen=True)
 class Family:
-    """A shape over a grid of its own parameter."""
+    """One shape over a grid of its parameter."""
 
     shape: Shape
     grid: Array
