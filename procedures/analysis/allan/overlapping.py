@@ -3,7 +3,7 @@
 A series of up to `WHOLE` samples is exact at every size. A longer one, which `correlated` does faster where it can, is
 taken at two resolutions: cluster sizes up to `exact_limit` use every start k, larger ones the running sum at every
 s-th sample only. Each cluster mean is still exact, but the starts are 0, s, 2s… (4s, beyond `LONG`·s), and the cluster
-sizes multiples of that. The loss of precision depends on the noise. Where the rate is white or redder neighbouring starts
+sizes multiples of that. The loss depends on the noise. Where the rate is white or redder neighbouring starts
 hardly differ: below 0.01 %. Where white angle noise still dominates there, every start counts:
 ``1/√(2·POINTS·18/35)`` ≈ 0.1 %, one sigma.
 """

@@ -39,7 +39,7 @@ class Repeats:
     def held(self, in_runs: int, fine: NDArray[np.bool_]) -> list[int]:
         """The channels that show by changing only together that rows are sent more than once; none, if they do not.
 
-        `in_runs`: repeated rows that hang in long runs, which are judged elsewhere. `fine` (channels,): those that change
+        `in_runs`: repeated rows in long runs, which are judged elsewhere. `fine` (channels,): those that change
         by more than a step or two; of others `SEVERAL` must agree, since what is common to a few of them, a current or
         a reference, changes them together.
         """

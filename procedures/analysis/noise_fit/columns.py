@@ -127,6 +127,6 @@ def tapered_powers(gamma: Array, taper: Array) -> Array:
 
 
 def allan_columns(tau_s: Array) -> Array:
-    """Allan variance σ²(τ) for unit Q², N², B², K², R²; (k, 5): ``3/τ², 1/τ, 2 ln 2/π, τ/3, τ²/2`` (IEEE Std 952 Annex C)."""
+    """Allan variance for unit Q², N², B², K², R²; (k, 5): ``3/τ², 1/τ, 2 ln 2/π, τ/3, τ²/2`` (IEEE Std 952 Annex C)."""
     flat = np.full(len(tau_s), 2.0 * log(2.0) / pi)
     return np.stack([3.0 / tau_s**2, 1.0 / tau_s, flat, tau_s / 3.0, 0.5 * tau_s**2], axis=1)

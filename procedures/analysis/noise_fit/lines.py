@@ -62,7 +62,7 @@ def standing_out(dof: float, count: Array, level: float) -> Array:
 def find_lines(
     power: Array, dof: float, segment: int, rate_hz: float
 ) -> tuple[NDArray[np.bool_], tuple[SpectralLine, ...]]:
-    """Find the lines in mean powers (m,) of modes 0…m−1 of `segment` samples: the mask of their modes (m,), and the lines.
+    """The mask of line modes, (m,), and the lines, in mean powers (m,) of modes 0…m−1 of `segment` samples.
 
     A mode belongs to a line where its power over the level about it exceeds the value that noise exceeds with
     probability `LEVEL` in the whole record. A sine of amplitude a puts a²L/4 into its modes, L samples a segment.

@@ -135,9 +135,9 @@ def maximum(
 
 
 def _inside(spectrum: Spectrum, free: list[int], guess: Array) -> Array:
-    """The guess, moved off the edge where it leaves a bin without power: no step leads away from there.
+    """The guess, moved off the boundary if it leaves a bin without power: no step leads away from there.
 
-    A least squares guess sets to zero whatever does not contribute to the greatest bins (a low-pass, a lone quantization).
+    Least squares set to zero whatever does not contribute to the greatest bins (a low-pass, a lone quantization).
     """
     power = spectrum.columns @ guess
     if np.all(power > _LEAST_SHARE * _smooth(spectrum)):
