@@ -141,7 +141,7 @@ def _x(t: Array, f: float, alpha: int) -> Array:
 
 
 def _w(t: Array, alpha: int) -> Array:
-    """Generalised autocovariance of the integrated angle (eq. 7), but for a factor."""
+    """Generalised autocovariance of the integrated angle (eq. 7), up to a factor."""
     size, power = np.abs(t), 3 - alpha
     if alpha % 2 == 0:
         return (-1.0 if alpha == 2 else 1.0) * size**power

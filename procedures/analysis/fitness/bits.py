@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 CROSSINGS = 50
-"""Crossings between the two sides of the forbidden half that prove that the signal must pass through it."""
+"""Fewest direct crossings of the forbidden half, from sample to sample, that prove a bit to be stuck."""
 LEVELS = 16
 """Different values that a channel must take within a piece before a gap among them counts: with two levels, some bits
 never change."""

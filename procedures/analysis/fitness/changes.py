@@ -50,8 +50,8 @@ def changes(
     """Steps of each row of `series` (channels, K), none smaller than its `floor` (channels,), in order.
 
     `uneven` (channels, K), at least 1: ratio of a row's noise at each cell to its usual noise; a gap counts the less.
-    `least`: spreads that a gap must have. `flat`: the series does not drift, and means stand for the lines, which makes
-    the gap twice as certain.
+    `least`: required gap in spreads. `flat`: the series does not drift, and means replace the lines, which makes the
+    gap twice as certain.
     """
     found: list[list[Change]] = [[] for _ in series]
     if series.shape[1] < POSITIONS * SHORTEST:

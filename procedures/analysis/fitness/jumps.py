@@ -16,7 +16,7 @@ LEVELS = 4.0
 STRIDE = 8
 """Every n-th difference is used for the noise: cheap, and one outlier in a thousand of them moves it little."""
 TRUSTED = 1024
-"""Fewer differences than these are judged together with those of the piece before."""
+"""Fewest differences that are judged alone; fewer are combined with those of the previous pieces."""
 SHARP = 0.75
 """Part of a step, and of either side of an outlier, that lies between two samples; a motion takes longer."""
 LOOKED_AT = 256

@@ -27,7 +27,7 @@ class CellLevels:
 
     size: int
     means: Array
-    """(channels, K)"""
+    """Mean of every cell, (channels, K)."""
     group: int
     """Number of cells for each value of the noise."""
     noise: Array

@@ -43,7 +43,7 @@ class Doubt:
 
 
 class Readings:
-    """Mean magnitudes of what triads and single channels read, over short bursts throughout the recording."""
+    """Mean magnitudes of the readings of triads and single channels, over short bursts throughout the recording."""
 
     def __init__(self, channels: Sequence[Channel], rate_hz: float) -> None:
         self._rate_hz = rate_hz
@@ -137,7 +137,7 @@ class Readings:
                 for i, c in enumerate(self._channels)
                 if c.quantity in GYRO_QUANTITIES and c.rate_unit == "rad/s"
             }
-        # A good gyro reads the Earth's rate or little more; what another reads shows that its unit is wrong, not which.
+        # A good gyro reads the Earth's rate or little more; the reading of another shows that its unit is wrong, not which.
         good = limit < 10.0 * units.EARTH_RATE
         candidates = {"deg/s": 1.0 / units.DEG, "deg/h": 1.0 / units.DEG_PER_HOUR} if good else {}
         expected = f"less than {limit:.3g} rad/s at rest"
@@ -201,7 +201,7 @@ def _factor(ratio: float) -> float | None:
 
 
 def _degrees(names: Sequence[str], value: float, expected: str, walk: float | None) -> Doubt:
-    """Gyros whose reading at rest or whose noise is that of a value in degrees."""
+    """Doubt about gyros whose reading at rest or whose noise suggests a value in degrees."""
     shown = f"channels {names[0]} … {names[-1]} together read" if len(names) > 1 else f"channel {names[0]} reads"
     noise = "" if walk is None else f", with a random walk of about {walk / units.DEG_PER_SQRT_HOUR:.3g} deg/√h"
     return Doubt(

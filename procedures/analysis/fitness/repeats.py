@@ -40,7 +40,7 @@ class Repeats:
         """The channels that show by changing only together that rows are sent more than once; none, if they do not.
 
         `in_runs`: repeated rows in long runs, which are judged elsewhere. `fine` (channels,): those that change
-        by more than a step or two; of others `SEVERAL` must agree, since what is common to a few of them, a current or
+        by more than a step or two; of others `SEVERAL` must agree, since a common cause of a few of them, a current or
         a reference, changes them together.
         """
         if self.rows - in_runs < max(20, HELD_SHARE * self.pairs) or self.rows == self.pairs:

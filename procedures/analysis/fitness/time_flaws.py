@@ -14,7 +14,7 @@ from procedures.core.arrays import Array
 from procedures.core.recording import Channel
 
 SHORT_RUN = 10
-"""Rows of a short run: a data link that repeats more than these was hung."""
+"""Run of repeated rows from which on the data link was hung; a shorter one is a glitch."""
 SHORT_SHARE = 1e-3
 """Share of a channel's samples that may stand still before the channel is refused."""
 LEAST_CHANGE = float(np.log(1.4))
@@ -45,7 +45,7 @@ def steps_and_noise(cells: CellLevels, resolution: Array) -> tuple[list[list[Cha
     uneven = np.hstack([uneven, np.ones((len(uneven), short))]) if short > 0 else uneven
     floor = np.maximum(floor, LEAST_STEP * resolution)
     of_level = changes(cells.means, floor, uneven)
-    # Means are twice as certain as lines where there is no drift; what lines have found they would only find again.
+    # Means are twice as certain as lines where there is no drift; they would only repeat what lines detected.
     floor = np.where(usual > FINE_NOISE * resolution, floor, ROUNDING * resolution)
     floor = np.where([bool(f) for f in of_level], np.inf, floor)
     quiet = changes(cells.means, floor, uneven, flat=True)

@@ -45,7 +45,7 @@ class CorrelatedProcess:
     time_s: float
     time_sd_s: float | None
     driving: float
-    """q [rate/√s]."""
+    """Driving noise q [rate/√s]."""
     driving_sd: float | None
     sd: float
     """Standard deviation of the process, q·√(τ/2) [rate]."""
@@ -70,7 +70,7 @@ class LevelShift:
     at_s: float
     """Time since the launch."""
     height: float
-    """[rate]"""
+    """Height of the shift [rate]."""
     standard_uncertainty: float
 
 

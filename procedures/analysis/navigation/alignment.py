@@ -102,7 +102,7 @@ def azimuth_error(
 
     ``δ = b_aE·tan L/g + (b_gE + R/√T + Δφ/T)/(Ω·cos L)``, with b the instabilities of the east biases, R the angle
     random walk and Δφ the turn of the base meanwhile. The sum of the magnitudes is an upper figure; the second is the
-    root of the sum of their squares, what independent standard uncertainties give.
+    root of the sum of their squares, as for independent standard uncertainties.
     """
     require_alignable(latitude_deg)
     latitude = latitude_deg * units.DEG

@@ -126,8 +126,8 @@ def self_alignment(place: Place) -> Array:
 
     Levelling puts the measured specific force upright, gyrocompassing the measured rate to the north (S 3.163-3.166):
     ``β₀ = −a_N/g``, ``χ₀ = a_E/g``, ``α₀ = (χ₀·Ω sin φ − e_E)/(Ω cos φ)``: the error of thesis 1.1. Accelerometers
-    that stay as they are leave such a navigator almost at rest: an east one altogether, a north one but for a drift of
-    ``a_N/g·Ω``, since its tilt is a mistake of latitude.
+    with constant errors leave such a navigator almost at rest: an east one entirely, a north one except for a drift of
+    ``a_N/g·Ω``, since its tilt acts as an error of latitude.
     """
     initial = np.zeros((9, 6))
     initial[TILT_EAST, 3] = -1.0 / place.gravity_m_s2

@@ -55,7 +55,7 @@ class GaussMarkov:
     time_sd_s: float | None
     """Standard uncertainty; None where the record determines no more than the order of magnitude."""
     driving: float
-    """q [rate/√s]."""
+    """Driving noise q [rate/√s]."""
     driving_sd: float | None
 
     @property

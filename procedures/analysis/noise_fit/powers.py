@@ -68,7 +68,7 @@ def slow_powers(
 ) -> Powers:
     """The whole record's spectrum from its cell means, (n,) [rate], less its lines.
 
-    `regressors` (r, n): what the rate may follow other than a ramp (a temperature, a shift of the level), any units.
+    `regressors` (r, n): quantities that the rate may follow (a temperature, a shift of the level), in any units.
     Raises `UnfitRecording` and `BadParameter`.
     """
     _check_rate("cell_s", cell_s)
@@ -143,7 +143,7 @@ class FastPowers:
     """Mean spectrum of a channel's segments at its full rate, from blocks; memory of a few segments.
 
     A segment is the power of two of samples that has at least four modes below `crossover_hz`. Its edges, an eighth
-    each, are tapered by a quarter of a sine and shared with its neighbours; what is left at the end of the record is
+    each, are tapered by a quarter of a sine and shared with its neighbours; an incomplete last segment is
     not used. Samples are rates. Raises `UnfitRecording` (NaN) and `BadParameter`.
     """
 

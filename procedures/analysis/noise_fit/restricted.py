@@ -53,17 +53,17 @@ class State:
     """Quantities that follow from one vector v of variances."""
 
     variances: Array
-    """v, (p,)."""
+    """Variances v, (p,)."""
     power: Array
-    """S, (b,)."""
+    """Expected power S, (b,)."""
     residual: Array
-    """E/ν', (b,)."""
+    """Residual power E/ν', (b,)."""
     dof: Array
-    """ν', (b,)."""
+    """Residual degrees of freedom ν', (b,)."""
     amplitudes: Array
-    """β, (r,)."""
+    """Regressors' amplitudes β, (r,)."""
     amplitude_covariance: Array
-    """M⁻¹, (r, r)."""
+    """Covariance M⁻¹ of the amplitudes, (r, r)."""
     log_likelihood: float
     """Restricted log likelihood; comparable between fits with the same regressors."""
     plain_log_likelihood: float

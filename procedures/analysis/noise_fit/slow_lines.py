@@ -1,4 +1,4 @@
-"""Lines in the slow part of a record: found in the spectrum of all cell means, and taken out by least squares.
+"""Lines in the slow part of a record: detected in the spectrum of all cell means, and removed by least squares.
 
 A line of few cycles leaks into every mode of the whole record, so leaving modes out is not enough: the strongest one
 that stands out of its neighbourhood is fitted, then the next in the residuals, and all lines are refitted each time.

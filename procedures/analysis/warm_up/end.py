@@ -38,7 +38,7 @@ _NAMES: dict[Shape, str] = {
     ended_exponential: "ended exponential",
 }
 _BENDS: dict[Shape, float] = {exponential: 4.0, raised_cosine: 0.0, straight: 0.0}
-"""Starting values of an ended exponential, length in time constants, by the curve it starts from."""
+"""Starting value of an ended exponential's length, in time constants, by the curve it starts from."""
 _CLEARLY = 2.0
 """Twice the log likelihood by which a curve that ends must exceed exponentials, which never end."""
 
@@ -61,7 +61,7 @@ class WarmUp:
     first_cell: int
     """The first cell that begins after the end; the number of cells where `has_ended` is false."""
     level: float
-    """[rate]"""
+    """Level that defines the end [rate]."""
     p_value: float
     """Probability that noise alone resembles a transient as much."""
     noise: NoiseCoefficients

@@ -81,7 +81,7 @@ class Family:
 
     shape: Shape
     grid: Array
-    """(m,) [ln s]"""
+    """Grid of the parameter, (m,) [ln s]."""
     columns: Array
     """Cosine coefficients of the shape at each grid point, (n−1, m)."""
 
