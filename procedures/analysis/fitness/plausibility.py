@@ -137,7 +137,7 @@ class Readings:
                 for i, c in enumerate(self._channels)
                 if c.quantity in GYRO_QUANTITIES and c.rate_unit == "rad/s"
             }
-        # A good gyro reads the Earth's rate or little more; the reading of another shows that its unit is wrong, not which.
+        # A good gyro reads the Earth's rate or little more; any other reading shows that the unit is wrong, not which.
         good = limit < 10.0 * units.EARTH_RATE
         candidates = {"deg/s": 1.0 / units.DEG, "deg/h": 1.0 / units.DEG_PER_HOUR} if good else {}
         expected = f"less than {limit:.3g} rad/s at rest"
