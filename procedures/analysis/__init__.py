@@ -1,1 +1,1 @@
-"""Recordings in, numbers out: pure functions, one subject a file. Shares no equation with the simulators."""
+"""Analyses of recordings as pure functions, one subject per file. Shares no equation with the simulators."""

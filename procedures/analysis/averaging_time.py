@@ -1,4 +1,4 @@
-"""How long a mean must last before quantization no longer rules it (thesis 4.1.2, 4.1.3): where two lines cross."""
+"""Averaging time after which quantization no longer dominates a mean (thesis 4.1.2, 4.1.3): a crossing of lines."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -16,29 +16,29 @@ _FLICKER = 2.0 * log(2.0) / pi
 
 @dataclass(frozen=True)
 class AveragingTime:
-    """Where the quantization line falls below the rest of the noise."""
+    """Time at which the quantization line falls below the rest of the noise."""
 
     tau_s: float | None
-    """None where nothing else is there to fall below; 0 where there is no quantization."""
+    """Crossing time; None where there is no other noise, 0 where there is no quantization."""
     sd_s: float | None
-    """Standard uncertainty; None where the coefficients' was not given or there is no crossing."""
+    """Standard uncertainty; None without that of the coefficients, or without a crossing."""
     deviation: float | None
-    """Allan deviation of the whole noise there [rate]: of quantization and of the rest √½ of it each."""
+    """Allan deviation of the whole noise there [rate]; quantization and the rest contribute √½ of it each."""
 
 
 def allan_variance(noise: NoiseCoefficients, tau_s: float) -> float:
-    """``3Q²/τ² + N²/τ + (2 ln 2/π)B² + K²τ/3 + R²τ²/2`` [rate²] (thesis 3.2; IEEE Std 952 Annex C)."""
+    """Allan variance ``3Q²/τ² + N²/τ + (2 ln 2/π)B² + K²τ/3 + R²τ²/2`` [rate²] (thesis 3.2; IEEE Std 952 Annex C)."""
     if not 0.0 < tau_s < float("inf"):
         raise BadParameter("tau_s", tau_s, "finite and above 0 s")
     return 3.0 * (noise.quantization / tau_s) ** 2 + _rest(noise, tau_s)
 
 
 def averaging_time(noise: NoiseCoefficients, covariance: Array | None = None) -> AveragingTime:
-    """The root of ``3Q²/τ² = N²/τ + (2 ln 2/π)B² + K²τ/3 + R²τ²/2``, of which there is one: the rest falls slower.
+    """The only root of ``3Q²/τ² = N²/τ + (2 ln 2/π)B² + K²τ/3 + R²τ²/2``: the right side falls slower.
 
     `covariance` (5, 5), of the coefficients in the order Q, N, B, K, R, each in its own unit (`core.noise`), gives the
     standard uncertainty: with ``g = ln(3Q²/τ²) − ln(rest)`` linear in small errors, ``u² = (∂g/∂θ)ᵀC(∂g/∂θ)/(dg/dτ)²``.
-    Raises `BadParameter` where the covariance is none.
+    Raises `BadParameter` where the matrix is no covariance.
     """
     if covariance is not None:
         _check(covariance)

@@ -1,4 +1,4 @@
-"""Means of a recording's rates over short cells: what every slow question is asked of. One pass, bounded memory."""
+"""Means of a recording's rates over short cells, the basis of every slow analysis. One pass, bounded memory."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ class Cells:
     """Shape (channels, n), each in its channel's `rate_unit`."""
     cell_s: float
     since_launch_s: float
-    """From switching the unit on to the beginning of the first cell [s]."""
+    """Time from switching the unit on to the beginning of the first cell [s]."""
 
 
 def cell_samples(rate_hz: float, cell_s: float) -> int:
-    """Samples a cell: the whole number nearest to `cell_s`, at least one. Raises `BadParameter`."""
+    """Samples per cell: the whole number nearest to `cell_s`, at least one. Raises `BadParameter`."""
     if not 0.0 < cell_s < float("inf"):
         raise BadParameter("cell_s", cell_s, "finite and positive")
     return max(1, round(rate_hz * cell_s))
@@ -42,10 +42,10 @@ def channel_rows(info: RecordingInfo, names: Sequence[str], blocks: Iterator[Raw
 
 
 class CellStream:
-    """Gathers cell means from rows of rates."""
+    """Gather cell means from rows of rates."""
 
     def __init__(self, info: RecordingInfo, names: Sequence[str], cell_s: float) -> None:
-        """Raises `UnfitRecording` where there is not one whole cell, `BadParameter`."""
+        """Start with no samples. Raises `BadParameter`, and `UnfitRecording` where there is not one whole cell."""
         self._info, self._names = info, tuple(names)
         self._samples = cell_samples(info.rate_hz, cell_s)
         count = info.count // self._samples
@@ -56,7 +56,7 @@ class CellStream:
         self._rest = np.empty((len(self._names), 0))
 
     def add(self, rows: Array) -> None:
-        """The next samples, (channels, n)."""
+        """Add the next samples, (channels, n)."""
         if self._rest.shape[1]:
             rows = np.concatenate([self._rest, rows], axis=1)
         cells = rows.shape[1] // self._samples
@@ -67,7 +67,7 @@ class CellStream:
         self._rest = rows[:, used:].copy()
 
     def finish(self) -> Cells:
-        """All cells, once every sample came. Raises `UnfitRecording`."""
+        """All cells, after the last sample. Raises `UnfitRecording`."""
         info = self._info
         require_complete(info, self._filled * self._samples + self._rest.shape[1])
         return Cells(self._names, self._means, self._samples / info.rate_hz, info.since_launch_s)

@@ -1,11 +1,11 @@
-"""The noise of one long record of cell means, taken apart by cosines. Knows no transient.
+"""Noise of one long record of cell means, decorrelated by a cosine transform. Independent of any transient.
 
-The cosines of a discrete cosine transform (type II, orthonormal) take a rate random walk and a white noise apart
-exactly, a flicker noise and a quantization noise nearly: their coefficients are all but uncorrelated. So the
-likelihood of a record is that of its coefficients' squares (Whittle's), with the *exact* variance of each, and
-dividing by its root whitens whatever curve is to be fitted. The mean (k = 0) says nothing about noise and is left out.
+A discrete cosine transform (type II, orthonormal) decorrelates a rate random walk and a white noise exactly, a flicker
+noise and a quantization noise nearly: the coefficients are all but uncorrelated. So the likelihood of a record is that
+of its coefficients' squares (Whittle's), with the *exact* variance of each, and division by its root whitens any curve
+that is fitted. The mean (k = 0) holds no information on noise and is left out.
 
-What each process puts into a coefficient is `noise_fit.columns`'; the flicker noise is taken as 1/f throughout.
+The power of each process in a coefficient is that of `noise_fit.columns`; flicker noise is taken as 1/f throughout.
 """
 
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.noise import NoiseCoefficients
 
 MOST = 2048
-"""A longer series is averaged in groups to at most so many cells."""
+"""Most cells of a series; a longer one is averaged in groups."""
 FEWEST = 64
-"""Fewer cells do not tell noise from transient."""
+"""Fewest cells that distinguish noise from a transient."""
 WHOLE_BAND = (0.0, inf)
 _SINGLE, _PER_E_FOLD = 24, 8
 _TOLERANCE = 1e-6
@@ -31,7 +31,7 @@ _TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class CosineSeries:
-    """A series by its cosines."""
+    """A series with its cosine coefficients."""
 
     values: Array
     """Means over the grouped cells, (n,) [rate]; cells at the end that fill no group are left out."""
@@ -40,7 +40,7 @@ class CosineSeries:
     coefficients: Array
     """Orthonormal cosine coefficients k = 1…n−1, (n−1,) [rate]."""
     unit_variances: Array
-    """Their variances per unit Q², N², B² and K², (4, n−1)."""
+    """Variances of the coefficients per unit Q², N², B² and K², (4, n−1)."""
 
     @property
     def edges_s(self) -> Array:
@@ -49,7 +49,7 @@ class CosineSeries:
 
 
 def cosine_series(cells: Array, cell_s: float, most: int = MOST) -> CosineSeries:
-    """Groups cell means (n,) [rate] of length `cell_s` [s]. Raises `BadParameter` and `UnfitRecording`."""
+    """Group cell means (n,) [rate] of length `cell_s` [s]. Raises `BadParameter` and `UnfitRecording`."""
     if not 0.0 < cell_s < float("inf"):
         raise BadParameter("cell_s", cell_s, "finite and above 0 s")
     if cells.ndim != 1 or len(cells) < FEWEST:
@@ -76,24 +76,24 @@ def unit_variances(n: int, cell_s: float) -> Array:
 
 @dataclass(frozen=True)
 class FittedNoise:
-    """Noise by maximum likelihood."""
+    """Noise fitted by maximum likelihood."""
 
     noise: NoiseCoefficients
     variances: Array
-    """Of the cosine coefficients k = 1…n−1, (n−1,) [rate²]."""
+    """Variances of the cosine coefficients k = 1…n−1, (n−1,) [rate²]."""
     deviance: float
     """Minus twice the log likelihood, up to a constant of the record."""
 
     @property
     def weights(self) -> Array:
-        """What whitens a cosine coefficient, (n−1,) [1/rate]."""
+        """Whitening factors of the cosine coefficients, (n−1,) [1/rate]."""
         return 1.0 / np.sqrt(self.variances)
 
 
 def fit_noise(coefficients: Array, units: Array) -> FittedNoise:
-    """Q, N, B and K, none negative, most likely for cosine coefficients (n−1,) with `unit_variances` (4, n−1).
+    """Maximum-likelihood Q, N, B and K, none negative, of cosine coefficients (n−1,) with `unit_variances` (4, n−1).
 
-    Minimises ``Σ ln s_k + c_k²/s_k`` over ``s = Σ θ_j·u_jk`` by Fisher scoring, each step a non-negative least squares
+    Minimize ``Σ ln s_k + c_k²/s_k`` over ``s = Σ θ_j·u_jk`` by Fisher scoring, each step a non-negative least squares
     with weights 1/s². Neighbouring coefficients of high k, where s is smooth, are taken together.
     """
     starts = _bins(len(coefficients))

@@ -1,12 +1,12 @@
-"""Individuals control chart: is a quantity that is measured again and again still what it was?
+"""Individuals control chart: detection of a change in a quantity that is measured repeatedly.
 
-For single values x_1…x_n in the order of their making the spread of the process is taken from the moving ranges of two
+For single values x_1…x_n in the order of measurement the spread of the process is taken from the moving ranges of two
 neighbours, so that a slow drift does not widen its own limits: ``σ = mR̄/d2``, d2 = 1.128 for two, and the limits are
 ``x̄ ± 3σ = x̄ ± 2.66·mR̄`` (Shewhart's chart for individuals: NIST/SEMATECH e-Handbook 6.3.2.2; Montgomery,
 Introduction to Statistical Quality Control, 6.4; ISO 7870-2).
 
 The run rules are those of the Western Electric handbook (1956; NIST/SEMATECH e-Handbook 6.3.2): of a process that did
-not change 1 point in 370 lies beyond 3σ, and the four rules together cry wolf once in 92 points.
+not change 1 point in 370 lies beyond 3σ, and the four rules together raise a false alarm once in 92 points.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ D4 = 3.267
 """Upper limit of a moving range of two, in mean moving ranges."""
 LEAST_POINTS = 2
 ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
-"""What a mean of some values, and their distance from it, may be off by, relative to the greatest of them."""
+"""Rounding error of a mean and of distances from it, relative to the greatest value."""
 
 
 @dataclass(frozen=True)
@@ -55,14 +55,14 @@ class ControlLimits:
     upper: float
     mean_moving_range: float
     moving_range_upper: float
-    """A step between neighbours that is greater is a signal of its own."""
+    """Upper limit of a step between neighbours; a greater one is a signal of its own."""
     points: int
-    """How many values they rest on."""
+    """Number of values that the limits rest on."""
 
 
 @dataclass(frozen=True)
 class Signal:
-    """A rule that is broken at a point, which is the last of those that break it."""
+    """A rule violation, placed at the last of the points that break the rule."""
 
     index: int
     rule: str
@@ -71,7 +71,7 @@ class Signal:
 
 
 def control_limits(values: Sequence[float]) -> ControlLimits:
-    """Centre and limits from values in the order of their making, at least two, all finite. Raises `BadParameter`."""
+    """Centre and limits from values in the order of measurement, at least two, all finite. Raises `BadParameter`."""
     x = _finite(values)
     if len(x) < LEAST_POINTS:
         raise BadParameter("values", len(x), f"a control chart needs at least {LEAST_POINTS}")
@@ -84,8 +84,8 @@ def control_limits(values: Sequence[float]) -> ControlLimits:
 def signals(values: Sequence[float], limits: ControlLimits) -> tuple[Signal, ...]:
     """Every point at which a rule is broken, in order; a point that lies on a line is not beyond it.
 
-    A point breaks a rule of a window when it belongs to those beyond the line itself: the one that came back does not.
-    Where the spread is zero every departure from the centre is beyond every line, but for the rounding of doubles.
+    A point breaks a rule of a window when it belongs to those beyond the line itself: a point back within it does not.
+    Where the spread is zero every departure from the centre is beyond every line, except by the rounding of doubles.
     """
     x = _finite(values)
     rounding = ROUNDING * max(float(np.max(np.abs(x), initial=0.0)), abs(limits.centre))

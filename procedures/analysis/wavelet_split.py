@@ -1,14 +1,14 @@
-"""A signal in two parts by thresholded wavelets (thesis 3.1.2, appendix A): what is kept, and noise that is removed.
+"""Split of a signal by thresholded wavelets (thesis 3.1.2, appendix A) into a kept part and removed noise.
 
 The only file that imports pywt. The details d of each level are shrunk softly by a threshold of the `heursure` rule
 (the thesis's ``wden(v, 'heursure', 's', 'one', 6, 'sym8')``; Donoho, Johnstone, J. Am. Stat. Assoc. 90, 1995). For n
 details of unit noise it is the universal ``√(2 ln n)`` where ``(Σd² − n)/n < (log₂ n)^1.5/√n``, else the lesser of
 that and the t that makes Stein's unbiased risk ``n − 2·#{|d| ≤ t} + Σ min(d², t²)`` least.
 
-What unit noise is decides everything:
+The definition of unit noise decides the split:
 
-* "thesis": no rescaling, so unit noise means *one unit of the series*, which the thesis had in deg/h; `unit_size` says
-  what that is. The same record in other units is split otherwise.
+* "thesis": no rescaling, so unit noise means *one unit of the series*, which the thesis had in deg/h; `unit_size` sets
+  it. The same record in other units is split differently.
 * "rescaled": unit noise is each level's own, its details' median absolute deviation over 0.6745: no unit matters.
 
 J levels reach to 2^J samples, a *time*: 64 s at the thesis's 1 Hz and 0.64 s at 100 Hz. Quantization is averaged away
@@ -36,7 +36,7 @@ _NORMAL_MAD = 0.6745
 
 @dataclass(frozen=True)
 class Level:
-    """What was done at one level, 1 the finest."""
+    """Thresholding of one level, of which 1 is the finest."""
 
     number: int
     from_s: float
@@ -44,7 +44,7 @@ class Level:
     to_s: float
     details: int
     noise: float
-    """What counted as unit noise [unit of the series]."""
+    """Size of the unit noise [unit of the series]."""
     threshold: float
     """[unit of the series]"""
     shrunk_to_zero: float
@@ -53,18 +53,18 @@ class Level:
 
 @dataclass(frozen=True)
 class WaveletSplit:
-    """``kept + removed`` is the signal, to rounding."""
+    """Result of a split; ``kept + removed`` is the signal, to rounding."""
 
     kept: Array
     """(n,) [unit of the series]"""
     removed: Array
     """(n,) [unit of the series]"""
     levels: tuple[Level, ...]
-    """Finest first."""
+    """The levels, the finest first."""
     wavelet: str
     rule: Rule
     edge_s: float
-    """So near an end [s] the mirror image has a part in what is kept."""
+    """Distance [s] from an end within which the mirror image affects the kept part."""
 
 
 def wavelet_split(
@@ -76,15 +76,15 @@ def wavelet_split(
     wavelet: str = "sym8",
     levels: int = 6,
 ) -> WaveletSplit:
-    """Splits a series (n,) of means over cells of `cell_s` [s], in any unit.
+    """Split a series (n,) of means over cells of `cell_s` [s], in any unit.
 
-    `unit_size` is for the rule "thesis" alone: what it takes for one, in the unit of the series
+    `unit_size` is for the rule "thesis" alone: its unit noise, in the unit of the series
     (`units.DEG_PER_HOUR` for a series in rad/s to be split as the thesis did). Raises `BadParameter` for a wavelet that
     is not orthogonal, for levels that the series is too short for, for a unit that is missing or has no use, and
     `UnfitRecording` for values that are not finite.
     """
     length = _checked(cells, cell_s, rule, unit_size, wavelet, levels)
-    # the mean adds nothing but rounding: it is the coarsest part, which is kept
+    # the mean would only add rounding: it belongs to the coarsest part, which is kept
     mean = float(np.mean(cells))
     parts = pywt.wavedec(cells - mean, wavelet, mode=EDGES, level=levels)
     done: list[Level] = []
@@ -102,17 +102,17 @@ def wavelet_split(
 
 
 def shortest_s(levels: int, cell_s: float, wavelet: str = "sym8") -> float:
-    """The shortest series [s] that can be split into so many levels: ``2^levels·(filter − 1)`` cells (PyWavelets)."""
+    """The shortest series [s] that can be split into `levels` levels: ``2^levels·(filter − 1)`` cells (PyWavelets)."""
     return (_filter_length(wavelet) - 1) * 2**levels * cell_s
 
 
 def most_levels(cells: int, wavelet: str = "sym8") -> int:
-    """Levels into which a series of so many cells can be split at most; 0: it is too short for any."""
+    """Greatest number of levels into which a series of `cells` cells can be split; 0: it is too short for any."""
     return int(pywt.dwt_max_level(cells, _filter_length(wavelet)))
 
 
 def heursure(details: Array) -> float:
-    """The threshold of details (n,) whose noise is one; dimensionless."""
+    """The dimensionless threshold of details (n,) of unit noise."""
     n = len(details)
     if n < 2:
         return 0.0
@@ -130,7 +130,7 @@ def _noise(details: Array) -> float:
 
 
 def _checked(cells: Array, cell_s: float, rule: Rule, unit_size: float | None, wavelet: str, levels: int) -> int:
-    """The length of the wavelet's filter."""
+    """Check the arguments; return the length of the wavelet's filter."""
     if not 0.0 < cell_s < float("inf"):
         raise BadParameter("cell_s", cell_s, "finite and above 0 s")
     if rule not in ("thesis", "rescaled"):
@@ -149,7 +149,7 @@ def _checked(cells: Array, cell_s: float, rule: Rule, unit_size: float | None, w
 
 
 def _filter_length(wavelet: str) -> int:
-    """By name, of the orthogonal wavelets of pywt."""
+    """Filter length of an orthogonal wavelet of pywt, by its name."""
     named = re.fullmatch(r"(haar)|(db|sym|coif)([1-9]\d?)", wavelet)
     if named is not None and named[1]:
         return 2

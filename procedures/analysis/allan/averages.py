@@ -1,12 +1,12 @@
-"""Means of the running sum over short blocks, and what they leave out: for clusters of many blocks.
+"""Block means of the running sum, and the remainders within the blocks: sums of squares for clusters of many blocks.
 
 With a_b the mean and e the remainder of x in blocks of s samples, and clusters of ``m = M·s`` samples,
 ``Σ_k (Δ_m^d x_k)² = s·Σ_b (Δ_M^d a_b)² + Σ_k (Δ_m^d e_k)²``. The first sum has s times fewer terms and takes in every
 start. In the second, products of remainders m and more samples apart have no expectation, so that it is
-``C(2d, d)·Σ e²``. To leave them out costs a variance only: where white angle noise rules alone (the worst case),
+``C(2d, d)·Σ e²``. Omitting them costs a variance only: where white angle noise alone dominates (the worst case),
 ``√Σ_{j≥1} C(2d, d+j)² / (C(2d, d)·√terms)`` of σ for Allan and Hadamard, 0.023 % and 0.028 % of 8.64 million terms.
-A rate that wanders (flicker, random walk) leaves out ``≈ (s/m)²/4``: 2·10⁻⁴ of σ² at the smallest such cluster. Only
-a periodic signal faster than the blocks is not so forgotten; `lines` finds it. The strength of the remainders is known
+A drifting rate (flicker, random walk) leaves out ``≈ (s/m)²/4``: 2·10⁻⁴ of σ² at the smallest such cluster. Only
+a periodic signal faster than the blocks keeps its products; `lines` detects it. The strength of the remainders is known
 for every window of the correlation (61 440 samples, for Allan), which matters where the noise comes in bursts.
 """
 
@@ -18,27 +18,27 @@ from numpy.typing import NDArray
 from procedures.core.arrays import Array
 
 LEAST = 32
-"""Samples a block, at the least."""
+"""Fewest samples of a block."""
 MOST_BLOCKS = 1 << 21
-"""Blocks that are held, at the most."""
+"""Most blocks that are held in memory."""
 CHORD = 32
-"""Blocks over which the mean rate is taken off the remainder."""
+"""Blocks over which the mean rate is subtracted from the remainder."""
 NEIGHBOURS = 64
-"""Frequencies among whose median a line stands out."""
+"""Number of neighbouring frequencies whose median a line exceeds."""
 STANDS_OUT = 4.0
-"""A line has so many times that median."""
+"""Ratio of a line to that median, at least."""
 
 
 def block_of(count: int) -> int:
-    """s: samples a block, a power of two."""
+    """Samples per block, s: a power of two."""
     return LEAST << max(0, ceil(log2(count / (LEAST * MOST_BLOCKS))))
 
 
 def remainder_kernel(s: int) -> Array:
     """κ(l), (CHORD·s,), with ``Σ_l κ(l) R(l) = Σ e²``, R the samples' lagged products, l of both signs.
 
-    e is what is left of x in a block when its mean and, since that is no noise, the line of the mean rate over `CHORD`
-    blocks around it is taken off; averaged over where the blocks begin.
+    e is x in a block without its mean and, since it is no noise, without the line of the mean rate over `CHORD`
+    blocks around it; averaged over the starts of the blocks.
     """
     span = CHORD * s
     begin = (span - s) // 2
@@ -53,15 +53,15 @@ def remainder_kernel(s: int) -> Array:
 
 
 def lines(spectrum: Array) -> float:
-    """Part of the remainders' spectrum (n,) that is in lines: far above the median of the neighbouring frequencies."""
+    """Share of spectral lines in the remainders' spectrum (n,): power far above the median of its neighbourhood."""
     bands = spectrum[: len(spectrum) // NEIGHBOURS * NEIGHBOURS].reshape(-1, NEIGHBOURS)
     above = bands - STANDS_OUT * np.median(bands, axis=1)[:, None]
-    # The first band is where the remainders begin: steep, and without lines that matter.
+    # The first band, where the remainders begin, is steep and has no lines of importance.
     return float(np.sum(above[1:], where=above[1:] > 0.0) / np.sum(bands))
 
 
 class BlockMeans:
-    """The running sum at the beginning of every block, and its mean over it, from samples."""
+    """The running sum at the beginning of every block, and its mean over the block, from samples."""
 
     def __init__(self, count: int) -> None:
         self.size = s = block_of(count)
@@ -74,7 +74,7 @@ class BlockMeans:
         self._done = 0
 
     def add(self, y: Array) -> None:
-        """The next samples, (n,)."""
+        """Add the next samples, (n,)."""
         if len(self._carry):
             y = np.concatenate([self._carry, y])
         whole = len(y) // self.size
@@ -88,11 +88,11 @@ class BlockMeans:
         self._done += whole
 
     def means(self) -> Array:
-        """a_b, (count // s,)."""
+        """The block means a_b, (count // s,)."""
         return self.begins[:-1] + self._means
 
 
 def weighted_mean(ends: Array, totals: Array, starts: NDArray[np.int64], length: int) -> Array:
-    """Mean per sample over [start, start + length) of what has the running totals `totals` at `ends`, (k,)."""
+    """Mean per sample over [start, start + length), (k,), of a quantity with the running totals `totals` at `ends`."""
     upper, lower = (np.interp(at, ends, totals) for at in (starts + length, starts))
     return (upper - lower) / length

@@ -22,9 +22,9 @@ from procedures.core.arrays import Array
 WHOLE = 1 << 21
 """A series up to this length is held whole, and every start of every size is used."""
 POINTS = 1 << 20
-"""Of a longer one, half as many to as many points are held; of the sizes below, about so many terms are taken."""
+"""Points held of a longer series (half as many at least), and about the number of terms of each smaller size."""
 STARTS = 128
-"""Sizes of at least so many held points start at the points; smaller ones at chosen samples, exactly."""
+"""Least size, in held points, whose starts are the held points; smaller ones start at chosen samples, exactly."""
 LONG, THIN = 1 << 11, 4
 """Sizes of at least `LONG` held points start at every `THIN`-th of them."""
 _CHUNK = 1 << 18
@@ -50,7 +50,7 @@ class BandStream:
     Up to `WHOLE` samples the band is exact. Beyond, the offsets are thinned evenly: about `POINTS` squared differences
     remain at each size (of the smallest sizes twice as many, from every stretch of the record). The mean is then
     good to 0.1 %, and so are the extremes where the rate is white or redder, since neighbouring starts hardly differ.
-    Where white angle noise rules, every start is an independent draw, and the extremes are those of the starts taken.
+    Under white angle noise, every start is an independent draw, and the extremes are those of the starts taken.
     Gaps are refused.
     """
 
@@ -78,7 +78,7 @@ class BandStream:
         self._waiting: list[Array] = []
 
     def add(self, block: Array | NDArray[np.int32]) -> None:
-        """The next samples of the channel, (n,). Raises `UnfitRecording`."""
+        """Add the next samples of the channel, (n,). Raises `UnfitRecording`."""
         for piece in self._integral.add(block):
             first = -self._index % self._stride
             kept = piece.x[first :: self._stride]
@@ -100,7 +100,7 @@ class BandStream:
         self._x = self._x[-kept:]
 
     def finish(self) -> Band:
-        """The band, once all samples came. Raises `UnfitRecording`."""
+        """The band, after the last sample. Raises `UnfitRecording`."""
         self._integral.check_end(self._count)
         rows: list[tuple[float, ...]] = []
         if self._near:
@@ -160,7 +160,7 @@ class _Near:
         self._row = 0
 
     def _add(self, x: Array, rows: int, columns: int) -> None:
-        """Terms that start at the first `rows` clusters of `x`, at the first offsets."""
+        """Add the terms that start at the first `rows` clusters of `x`, at the first offsets."""
         step = x.strides[0]
         height = max(1, _CACHED // columns)
         for a in range(0, rows, height):
@@ -172,7 +172,7 @@ class _Near:
             self._sums[:columns] += squared(d) if columns == 1 else np.einsum("ij,ij->j", d, d)
 
     def add(self, x: Array, first: int) -> None:
-        """Its share of the terms that fit into `x`, which begins at sample `first`, for every offset."""
+        """Add its share of the terms that fit into `x`, which begins at sample `first`, for every offset."""
         last = first + len(x) - 1 - (self._offsets - 1) * self._spread
         rows = last // self.m - self._row - 1
         if rows > 0:

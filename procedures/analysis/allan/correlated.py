@@ -1,8 +1,8 @@
 """The sums of the overlapping members of a long series, every start and every size of them, in bounded memory.
 
 Cluster sizes up to `NEAR` blocks are exact (`lagged`), larger ones are differences of block means with the remainders
-added (`averages`), which takes in every start too, and costs a variance of ``(0.023 %)²`` of σ where white angle noise
-rules alone in 8.64 million samples and next to nothing where it does not. A modified statistic smooths over its own
+added (`averages`), which includes every start too, and costs a variance of ``(0.023 %)²`` of σ where white angle noise
+alone dominates 8.64 million samples, and next to nothing elsewhere. A modified statistic smooths over its own
 cluster: there a start a block is as good as all, and exact at these.
 """
 
@@ -23,13 +23,13 @@ from procedures.core.errors import UnfitRecording
 NEAR = 32
 """Blocks of the largest cluster that is exact."""
 LONG, THIN = 256, 4
-"""Of a modified statistic, sizes of at least `LONG` blocks start at every `THIN`-th of them."""
+"""Sizes of at least `LONG` blocks of a modified statistic start at every `THIN`-th block."""
 FEW = 64
 """With fewer blocks to start at, the starts are the blocks' first samples, not all samples."""
 ROUNDING = 1e-5
-"""The worst relative rounding of a sum that passes."""
+"""Greatest acceptable relative rounding error of a sum."""
 LINES = 5e-4
-"""The worst relative error of σ by lines that passes."""
+"""Greatest acceptable relative error of σ by spectral lines."""
 TAIL = 1 << 16
 
 
@@ -63,7 +63,7 @@ class CorrelatedSums:
         self._index = 0
 
     def add(self, y: Array) -> None:
-        """The next samples, (n,)."""
+        """Add the next samples, (n,)."""
         end = self._index + len(y)
         if self._index < len(self._head):
             taken = y[: len(self._head) - self._index]
@@ -89,13 +89,13 @@ class CorrelatedSums:
         return np.concatenate([near, far[0]]), np.concatenate([np.array(terms, np.int64), far[1]])
 
     def starts(self) -> NDArray[np.int64]:
-        """The terms that are averaged, (k,): all that fit for exact sizes, of larger ones one a spacing."""
+        """Number of averaged terms, (k,): all that fit for exact sizes, one per spacing for larger ones."""
         near = [self._statistic.starts(self._count, int(m)) for m in self._near]
         far = [self._far_terms(i) for i in range(len(self._near), len(self.sizes))]
         return np.array(near + far, np.int64)
 
     def held(self) -> Held:
-        """What the identification needs."""
+        """The points of the running sum that the noise identification needs."""
         return Held(self._blocks.begins, self._blocks.size, np.cumsum(self._tail))
 
     def _span(self, m: int) -> int:

@@ -1,4 +1,4 @@
-"""An Allan deviation with its uncertainty, from an array or from blocks of any length. Knows no files and no chance."""
+"""An Allan deviation with its uncertainty, from an array or from blocks of any length. No files, no randomness."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,23 +25,23 @@ class Deviation:
     rate_hz: float
     count: int
     sizes: Sizes
-    """m: samples a cluster."""
+    """Cluster sizes m in samples."""
     tau_s: Array
     deviation: Array
     terms: NDArray[np.int64]
-    """Squared differences that were averaged."""
+    """Number of squared differences that were averaged."""
     left_out: NDArray[np.int64]
-    """Those left out because they touch a gap."""
+    """Number of terms omitted because they touch a gap."""
     strides: NDArray[np.int64]
     """Samples between neighbouring terms; 1 is exact, more: see `correlated` and `overlapping`."""
     alpha: Array
-    """Exponent of the rate's spectral density that the edf were taken for."""
+    """Exponent of the rate's spectral density that the edf assume."""
     edf: Array
     lower: Array
     upper: Array
     confidence: float
     missing: int
-    """Samples that were NaN."""
+    """Number of samples that were NaN."""
     first_missing: int | None
 
 
@@ -78,7 +78,7 @@ class DeviationStream:
             self._sums = CorrelatedSums(statistic, count, wanted)
 
     def add(self, block: Array | NDArray[np.int32]) -> None:
-        """The next samples of the channel, (n,)."""
+        """Add the next samples of the channel, (n,)."""
         if self._integral.count + len(block) > self._count:
             raise UnfitRecording(f"more samples came than the {self._count} that were announced")
         if isinstance(self._sums, CorrelatedSums):
@@ -89,7 +89,7 @@ class DeviationStream:
                 self._sums.add(piece)
 
     def finish(self) -> Deviation:
-        """The deviation, once all samples came; cluster sizes without a single term (gaps) do not appear."""
+        """The deviation, after the last sample; cluster sizes without a single term (gaps) do not appear."""
         self._integral.check_end(self._count)
         sums, terms = self._sums.finish()
         if isinstance(self._sums, CorrelatedSums):

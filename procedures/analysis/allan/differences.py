@@ -9,14 +9,14 @@ from procedures.analysis.allan.statistic import Sizes, Statistic
 from procedures.core.arrays import Array
 
 BLOCK = 1 << 15
-"""Terms at once: what they take fits into the cache."""
+"""Terms per step; their memory fits into the cache."""
 
 _UNTHREADED = 1 << 13
-"""OpenBLAS gives longer products to threads, which on a busy machine cost a thousand times the product."""
+"""Longest product of one thread; OpenBLAS runs longer ones in threads, a thousandfold cost on a busy machine."""
 
 
 def squared(d: Array) -> float:
-    """``Σ d²`` of a vector, (n,)."""
+    """Sum of squares ``Σ d²`` of a vector, (n,)."""
     parts = (d[a : a + _UNTHREADED] for a in range(0, len(d), _UNTHREADED))
     return sum(float(np.dot(part, part)) for part in parts)
 
@@ -52,7 +52,7 @@ def sum_of_smoothed_squares(x: Array, missing: Counts | None, m: int, reach: int
     """``Σ_{k<stop} (Σ_{i<m} Δ_m² x_{k+i})²`` and its number of terms: the modified Allan's, without a sum of sums.
 
     `x` (n,) with ``stop + 3m − 2 < n``; a term is left out where `missing` differs `reach` points on. Running sums
-    start anew with every stretch, so that they stay small.
+    restart with every stretch, so that they stay small.
     """
     total, terms = 0.0, 0
     stretch = max(BLOCK, 2 * m)
@@ -86,7 +86,7 @@ class NonOverlappingSums:
         self._last_gaps = [np.zeros(1, np.int64) for _ in sizes]
 
     def add(self, piece: Piece) -> None:
-        """The next piece of the running sum."""
+        """Add the next piece of the running sum."""
         self._late.add(piece)
         p = self._statistic.differences
         for i, size in enumerate(self.sizes):
@@ -110,9 +110,9 @@ class NonOverlappingSums:
         return self._sums, self._terms
 
     def held(self) -> Held:
-        """What the identification needs."""
+        """The points of the running sum that the noise identification needs."""
         return self._late.held()
 
     def starts(self) -> NDArray[np.int64]:
-        """The terms that fit, gaps or not, (k,)."""
+        """Number of terms that fit, with or without gaps, (k,)."""
         return np.array([self._statistic.starts(self._count, int(m)) for m in self.sizes], np.int64)

@@ -3,18 +3,17 @@
 C. A. Greenhall and W. J. Riley, "Uncertainty of Stability Variances Based on Finite Differences", PTTI 2003, the
 combined algorithm; NIST SP 1065, 5.4.1 (edf) and eq. 45 (interval).
 
-How often the intervals hold the truth was measured (`tests.validation.allan`, 2000 records of 1024 samples, sampled
-power laws, the noise identified and not given): as often as they say for white angle and white rate noise, and
-elsewhere but for
+The coverage of the intervals was measured (`tests.validation.allan`, 2000 records of 1024 samples, sampled power laws,
+the noise identified and not given): it is nominal for white angle and white rate noise, and elsewhere except for
 
 * the longest sizes, with 1 to 8 degrees of freedom, where a sum of squares is no χ²: up to 76 % instead of 68.3 %,
   98 % instead of 95 %;
 * flicker angle noise of the overlapping members, whose edf are 10 to 20 % too low: up to 78 % and 97 %;
-* flicker rate noise, which 64 points and fewer mistake for a random walk in 61 of 100 records: overlapping 72 % (with
+* flicker rate noise, which looks like a random walk in 61 of 100 records of 64 points and fewer: overlapping 72 % (with
   few degrees of freedom 77 %) and 97 %, non-overlapping Hadamard 65 % and 93 %;
 * m = 1 of flicker and random walk of the rate, where a sampled noise is not the formula's: 64 to 71 %, 93 to 96 %.
 
-Nowhere do they hold it less often than 64 % and 92.7 % of the time.
+The least coverage anywhere is 64 % and 92.7 %.
 """
 
 from functools import lru_cache
@@ -28,7 +27,7 @@ from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 
 ONE_SIGMA = float(erf(np.sqrt(0.5)))
-"""The usual confidence, 68.27 %."""
+"""Confidence of one sigma, 68.27 %."""
 _MOST = 100
 """J_max: terms summed before a closed form takes over."""
 
@@ -63,7 +62,7 @@ _FLICKER = {2: (15.23, 12.0), 3: (47.8, 40.0)}  # d: b0, b1 of Table 3
 
 @lru_cache(maxsize=1 << 14)
 def degrees_of_freedom(statistic: Statistic, alpha: int, m: int, count: int, *, averaged: bool = False) -> float:
-    """edf of a member of the family at cluster size m of `count` samples, for the exponent α (see `identification`).
+    """Degrees of freedom, edf, of a member at cluster size m of `count` samples, for exponent α (see `identification`).
 
     d is the statistic's order, S the starts a cluster (m overlapping, else 1), L the samples of x in one term, M the
     terms, ``r = M/S`` and ``J = min(M, (d + 1)S)``. Every case is ``1/edf = Σ_j w_j s_z(j/S)² / (s_z(0)² M)`` or the
@@ -142,7 +141,7 @@ def _x(t: Array, f: float, alpha: int) -> Array:
 
 
 def _w(t: Array, alpha: int) -> Array:
-    """Generalised autocovariance of the integrated angle (eq. 7), but for a factor."""
+    """Generalised autocovariance of the integrated angle (eq. 7), up to a factor."""
     size, power = np.abs(t), 3 - alpha
     if alpha % 2 == 0:
         return (-1.0 if alpha == 2 else 1.0) * size**power

@@ -1,4 +1,4 @@
-"""Which power law rules at a cluster size, by lag-1 autocorrelation (Riley and Greenhall 2004; NIST SP 1065, 5.5.6).
+"""The dominant power law at a cluster size, by lag-1 autocorrelation (Riley and Greenhall 2004; NIST SP 1065, 5.5.6).
 
 The spectral density of the rate is taken as ∝ f^α: α = 2 white and 1 flicker angle noise, 0 white (random walk of the
 angle), −1 flicker (bias instability), −2 random walk of the rate, −3 and −4 its flicker and integrated walk.
@@ -14,17 +14,17 @@ from procedures.analysis.allan.statistic import Sizes
 from procedures.core.arrays import Array
 
 FEWEST = 30
-"""Below so many points the method decides nothing."""
+"""Fewest points for which the method decides anything."""
 SURE = 120
-"""With so many points a rounded exponent rarely errs."""
+"""Number of points from which on a rounded exponent is rarely wrong."""
 MOST = 2048
-"""More points than these do not change a rounded exponent."""
+"""Most points used; more do not change a rounded exponent."""
 _HELD = 1 << 17
 _LATE = 1 << 16
 
 
 def lag1_exponent(x: Array, most_differences: int) -> float:
-    """α, not rounded, from values of the running sum one cluster apart, (n,).
+    """The exponent α, not rounded, from values of the running sum one cluster apart, (n,).
 
     A quadratic (offset and ramp of the rate) is removed; x is differenced until ``δ = r₁/(1 + r₁) < 1/4``, r₁ the
     lag-1 autocorrelation; then ``α = 2 − 2(δ + d)``, d the number of differences.
@@ -56,14 +56,14 @@ class Held:
     """Values of a running sum that the identification needs."""
 
     points: Array
-    """At every `stride`-th sample, (n,)."""
+    """The running sum at every `stride`-th sample, (n,)."""
     stride: int
     late: Array
-    """At each of the last samples."""
+    """The running sum at each of the last samples."""
 
 
 class LatePoints:
-    """Keeps what the identification needs of a running sum: every s-th value, and all of the last ones."""
+    """Keep the values of a running sum that the identification needs: every s-th, and all of the last ones."""
 
     def __init__(self, count: int) -> None:
         self._stride = max(1, count // _HELD)
@@ -72,7 +72,7 @@ class LatePoints:
         self._index, self._skipped = 1, count + 1 - len(self._late)
 
     def add(self, piece: Piece) -> None:
-        """The next piece of the running sum."""
+        """Add the next piece of the running sum."""
         first = -self._index % self._stride
         kept = piece.x[first :: self._stride]
         at = (self._index + first) // self._stride
@@ -84,16 +84,16 @@ class LatePoints:
             self._late[end - len(kept) : end] = kept
 
     def held(self) -> Held:
-        """After the last piece."""
+        """The kept values, after the last piece."""
         return Held(self._points, self._stride, self._late)
 
 
 def exponents(held: Held, sizes: Sizes, order: int) -> Array:
-    """α rounded at each size (k,), for a statistic's order, −2 (Allan) or −4 (Hadamard) to 2.
+    """The rounded exponent α at each size (k,), for a statistic's order, −2 (Allan) or −4 (Hadamard) to 2.
 
-    Where fewer than `FEWEST` points are left, that of the smaller size. Taking every m-th point folds flicker angle
-    noise into what looks white, and few points scatter, so α does not rise where it is known better already: from
-    flicker to white angle noise, or with fewer than `SURE` points at all.
+    With fewer than `FEWEST` points, α of the smaller size is used. Taking every m-th point aliases flicker angle noise
+    into apparent white noise, and few points scatter, so α does not rise where a smaller size determines it better:
+    from flicker to white angle noise, or with fewer than `SURE` points at all.
     """
     alpha = np.zeros(len(sizes))
     before: float | None = None

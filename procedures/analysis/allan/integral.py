@@ -1,4 +1,4 @@
-"""The running sum of a channel from blocks of samples, and where its gaps are. Bounded memory."""
+"""The running sum of a channel from blocks of samples, and the places of its gaps. Bounded memory."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class Piece:
 
 
 class Integral:
-    """Sums a channel: ``x_k = Σ_{i<k} (y_i − y_ref)``, x_0 = 0, y a rate.
+    """The running sum of a channel: ``x_k = Σ_{i<k} (y_i − y_ref)``, x_0 = 0, y a rate.
 
     The reference y_ref, the first block's mean, changes no difference of second order; it keeps x small. A sample that
     is NaN is a gap: refused, or (``gaps="aware"``) counted in `Piece.missing`; an infinite one is always refused.
@@ -39,7 +39,7 @@ class Integral:
         if gaps not in ("refuse", "aware"):
             raise BadParameter("gaps", gaps, "'refuse' or 'aware'")
         self.scale = rate_hz if increments else 1.0
-        """Of a sample to a rate."""
+        """Factor from a sample to a rate."""
         self._gaps: Gaps = gaps
         self._last = 0.0
         self._reference: float | None = None
@@ -69,14 +69,14 @@ class Integral:
             yield np.asarray(block[start : start + PIECE], dtype=np.float64)
 
     def check_end(self, expected: int | None = None) -> None:
-        """After the last block. Raises `UnfitRecording` where the channel is constant or its length is not as said."""
+        """Check the whole channel. Raises `UnfitRecording` where it is constant or its length is not `expected`."""
         if expected is not None and self.count != expected:
             raise UnfitRecording(f"{self.count} samples came where {expected} were announced")
         if not self._varies:
             raise UnfitRecording(f"the channel is constant ({self._first!r}): a stuck channel has no noise to analyse")
 
     def _checked(self, y: Array) -> tuple[Array, NDArray[np.bool_] | None]:
-        """The samples less the reference, zero where one is missing, and which are (None: none)."""
+        """The samples less the reference, zero where one is missing, and the mask of missing ones (None: none)."""
         bad = None if np.isfinite(np.sum(y)) else ~np.isfinite(y)
         if bad is not None and np.any(bad):
             y = self._without(y, bad)

@@ -16,14 +16,14 @@ from procedures.analysis.allan.statistic import Sizes, Statistic
 from procedures.core.arrays import Array
 
 SPAN = 32
-"""Transforms are so many times as long as the longest lag: little is spent on padding."""
+"""Ratio of a transform's length to the longest lag; large, so that little is spent on padding."""
 
 
 class LaggedProducts:
     """``R(l) = Σ_k y_k y_{k+l}`` for l < `reach`, accumulated from pieces of any length; no sample is left out.
 
     Windows overlap by `reach` samples, so that every pair lies in one of them; pairs inside the overlaps, which lie in
-    two, are taken off again.
+    two, are subtracted again.
     """
 
     def __init__(self, reach: int, kernel: Array) -> None:
@@ -39,7 +39,7 @@ class LaggedProducts:
         """``Σ_l κ(l) R(l)``, l of both signs, up to each of `ends` (one a window)."""
 
     def add(self, y: Array) -> None:
-        """The next samples, (n,)."""
+        """Add the next samples, (n,)."""
         self._rest = np.concatenate([self._rest, y])
         step = self._window - self._reach
         rows = (len(self._rest) - self._window) // step + 1
@@ -50,7 +50,7 @@ class LaggedProducts:
             self._rest = self._rest[rows * step :]
 
     def finish(self) -> Array:
-        """R, (reach,), after the last piece."""
+        """The lagged products R, (reach,), after the last piece."""
         if len(self._rest):
             self._take(self._rest[None, :], len(self._rest))
         products = np.fft.irfft(_paired(self._power), self._length)[: self._reach]
@@ -83,7 +83,7 @@ def _powers(rows: Array, length: int) -> Array:
 
 
 def _paired(squares: Array) -> Array:
-    """|Y|² from squares of parts, (n/2,) from (n,)."""
+    """Squared magnitudes |Y|² from squares of parts, (n/2,) from (n,)."""
     return squares[0::2] + squares[1::2]
 
 

@@ -3,8 +3,8 @@
 A series of up to `WHOLE` samples is exact at every size. A longer one, which `correlated` does faster where it can, is
 taken at two resolutions: cluster sizes up to `exact_limit` use every start k, larger ones the running sum at every
 s-th sample only. Each cluster mean is still exact, but the starts are 0, s, 2s… (4s, beyond `LONG`·s), and the cluster
-sizes multiples of that. What it costs depends on the noise. Where the rate is white or redder neighbouring starts
-hardly differ: below 0.01 %. Where white angle noise still rules there, every start counts:
+sizes multiples of that. The loss depends on the noise. Where the rate is white or redder neighbouring starts
+hardly differ: below 0.01 %. Where white angle noise still dominates there, every start counts:
 ``1/√(2·POINTS·18/35)`` ≈ 0.1 %, one sigma.
 """
 
@@ -20,15 +20,15 @@ from procedures.core.arrays import Array
 WHOLE = 1 << 21
 """A series up to this length is held and differenced whole."""
 POINTS = 1 << 20
-"""Of a longer one, at least so many points are held."""
+"""Fewest points held of a longer series."""
 LONG = 1 << 14
-"""Of sizes of so many held points every fourth point is a start."""
+"""Size, in held points, from which on every fourth point is a start."""
 SMOOTH = 16
-"""A modified statistic is smooth over its own cluster: so many starts a cluster are as good as all."""
+"""Starts per cluster of a modified statistic that are as good as all, since it is smooth over its cluster."""
 
 
 def stride_of(count: int) -> int:
-    """s: the step of the held points, a power of two; 1 where the series is held whole."""
+    """Step s of the held points, a power of two; 1 where the series is held whole."""
     return 1 if count <= WHOLE else 1 << int(np.log2(count / POINTS))
 
 
@@ -101,7 +101,7 @@ class OverlappingSums:
         self._take(Piece(np.zeros(1), None))
 
     def add(self, piece: Piece) -> None:
-        """The next piece of the running sum."""
+        """Add the next piece of the running sum."""
         self._late.add(piece)
         self._take(piece)
 
@@ -151,10 +151,10 @@ class OverlappingSums:
         return self._sums, self._terms
 
     def held(self) -> Held:
-        """What the identification needs."""
+        """The points of the running sum that the noise identification needs."""
         return self._late.held()
 
     def starts(self) -> NDArray[np.int64]:
-        """The starts that fit, gaps or not, (k,)."""
+        """Number of starts that fit, with or without gaps, (k,)."""
         whole = np.array([self._statistic.starts(self._count, int(m)) for m in self.sizes], np.int64)
         return (whole - 1) // self.strides + 1

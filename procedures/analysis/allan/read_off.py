@@ -1,7 +1,7 @@
-"""The graphical method made algorithmic: straight stretches of an Allan plot, and the coefficient on each line.
+"""The graphical method as an algorithm: straight stretches of an Allan plot, and the coefficient on each line.
 
 IEEE Std 952 Annex C, thesis 3.1: ``σ = √3·Q/τ``, ``N/√τ``, ``√(2 ln 2/π)·B``, ``K·√(τ/3)``, ``R·τ/√2``; so each line is
-read at √3 s, 1 s, on its plateau over 0.664, at 3 s and at √2 s. A process whose slope the plot nowhere keeps is
+read at √3 s, 1 s, on its plateau over 0.664, at 3 s and at √2 s. A process whose slope appears nowhere on the plot is
 absent (None), which is not zero. In a mixture every line also carries its neighbours' noise: N and above all B read
 too high where the stretch is short. The fits of a model do not.
 """
@@ -18,11 +18,11 @@ from procedures.core.errors import BadParameter
 WINDOW = 0.25
 """Decades over which a local slope is taken."""
 SHORTEST = 0.5
-"""Decades that a stretch spans at least: a bend from one slope to the next but one keeps to none for so long."""
+"""Least length of a stretch in decades; a bend between two slopes keeps an intermediate one for less."""
 TOLERANCE = 0.1
-"""A local slope may differ by so much from its line's, or by its own standard deviation."""
+"""Greatest difference of a local slope from its line's, unless its own standard deviation is greater."""
 SHARPEST = 0.125
-"""A local slope with a greater standard deviation tells no line from the next."""
+"""Greatest standard deviation of a local slope that still distinguishes one line from the next."""
 
 LINES = {
     "quantization": (-1.0, sqrt(3.0)),
@@ -36,20 +36,20 @@ LINES = {
 
 @dataclass(frozen=True)
 class Line:
-    """One straight stretch and what was read on it."""
+    """One straight stretch and the coefficient read on it."""
 
     slope: float
     coefficient: float
     """Q [rate·s], N [rate·√s], B [rate], K [rate/√s] or R [rate/s]."""
     coefficient_sd: float
-    """From the degrees of freedom of the stretch's best point alone: bias by other processes is not in it."""
+    """Standard deviation from the degrees of freedom of the best point; bias by other processes is not included."""
     from_s: float
     to_s: float
 
 
 @dataclass(frozen=True)
 class ReadOff:
-    """The lines found; None where a process is absent."""
+    """The lines that were found; None where a process is absent."""
 
     quantization: Line | None
     random_walk: Line | None

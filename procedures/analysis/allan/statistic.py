@@ -1,4 +1,4 @@
-"""The members of the Allan family, and the cluster sizes they are asked for. Knows formulas, no samples.
+"""The members of the Allan family, and their cluster sizes. Formulas only, no samples.
 
 With x the running sum of the rate, ``x_k = Σ_{i<k} y_i`` (k = 0…N), m the cluster size and Δ_m the difference over m,
 every member is a mean square of a difference (NIST SP 1065, 5.2):
@@ -23,16 +23,16 @@ from procedures.core.errors import BadParameter, UnfitRecording
 Sizes = NDArray[np.int64]
 
 FEWEST_SAMPLES = 12
-"""Fewer samples tell nothing about a noise."""
+"""Fewest samples for an Allan deviation."""
 
 
 @dataclass(frozen=True)
 class Statistic:
-    """One member of the family."""
+    """One member of the Allan family."""
 
     name: str
     order: int
-    """d: differences of x; 2 Allan, 3 Hadamard."""
+    """Number d of differences of x: 2 for Allan, 3 for Hadamard."""
     overlapping: bool
     modified: bool = False
     is_time: bool = False
@@ -40,18 +40,18 @@ class Statistic:
 
     @property
     def differences(self) -> int:
-        """p: differences of the series that is differenced, x or (modified) its running sum."""
+        """Number p of differences of the series: x, or (modified) its running sum."""
         return self.order + self.modified
 
     def starts(self, count: int, m: int) -> int:
-        """Starts k at which a term of cluster size m fits into `count` samples; of the non-overlapping, terms."""
+        """Number of starts k where a term of cluster size m fits into `count` samples; non-overlapping: of terms."""
         last = count + self.modified - self.differences * m
         if last < 0:
             return 0
         return last + 1 if self.overlapping else last // m + 1
 
     def largest(self, count: int) -> int:
-        """The largest cluster size of which one term fits."""
+        """The largest cluster size at which one term fits."""
         return (count + self.modified) // self.differences
 
     def variance(self, sums: Array, terms: Array, sizes: Sizes, rate_hz: float) -> Array:
@@ -96,7 +96,7 @@ def one_two_four_sizes(largest: int) -> Sizes:
 
 
 def checked_sizes(sizes: Sequence[int] | Sizes | None, count: int, statistic: Statistic) -> Sizes:
-    """The cluster sizes asked for, ascending, or the default ones. Raises `UnfitRecording` and `BadParameter`."""
+    """The requested cluster sizes, ascending, or the default ones. Raises `UnfitRecording` and `BadParameter`."""
     if count < FEWEST_SAMPLES:
         raise UnfitRecording(f"{count} samples are too few for an Allan deviation; it takes {FEWEST_SAMPLES}")
     largest = statistic.largest(count)

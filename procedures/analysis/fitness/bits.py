@@ -4,22 +4,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 CROSSINGS = 50
-"""Consecutive samples on either side of the forbidden half, so often, that the signal must pass through it."""
+"""Fewest direct crossings of the forbidden half, from sample to sample, that prove a bit to be stuck."""
 LEVELS = 16
-"""Different values that a channel must take within a piece before a hole among them is one: two levels have bits that
+"""Different values that a channel must take within a piece before a gap among them counts: with two levels, some bits
 never change."""
 SPREAD = 4
-"""Different values from which on their common factor is a resolution."""
+"""Number of different values from which on their common factor counts as a resolution."""
 EXAMINED = 1024
 """Samples of a piece in which different values are counted."""
 
 
 class Bits:
-    """Which bits of one channel ever change.
+    """The bits of one channel that ever change.
 
-    Values that leave no hole between their least and greatest change every bit below the highest that changes: to pass
+    Values that leave no gap between their least and greatest change every bit below the highest that changes: to pass
     a multiple of 2^j they go from …0111 to …1000. So a bit that never changes below one that does is stuck, provided
-    that the signal does go to and fro between the values above and below, sample by sample, and takes many values.
+    that the signal does move to and fro between the values above and below, sample by sample, and takes many values.
     """
 
     def __init__(self) -> None:
@@ -38,7 +38,7 @@ class Bits:
         return max((self.changing & -self.changing).bit_length() - 1, 0)
 
     def add(self, x: NDArray[np.int32], ones: np.int32, zeros: np.int32) -> None:
-        """New samples (n,), the OR `ones` and the AND `zeros` of them all."""
+        """Add samples (n,), with the OR `ones` and the AND `zeros` of them all."""
         self._or, self._and = self._or | ones, self._and & zeros
         held = self._held()
         if not held and (self._levels >= SPREAD or not self.lowest):
@@ -50,15 +50,15 @@ class Bits:
                 self._crossings[bit] = self._crossings.get(bit, 0) + int(np.count_nonzero(flips >> np.uint32(bit + 1)))
 
     def stuck(self) -> dict[int, int]:
-        """Bits that are stuck, and at what."""
+        """The stuck bits, each with the value it is stuck at."""
         return {b: int(self._or) >> b & 1 for b in self._held() if self._crossings.get(b, 0) >= CROSSINGS}
 
     def coarse(self) -> int:
-        """How many of the lowest bits never change though higher ones do."""
+        """Number of the lowest bits that never change although higher ones do."""
         return self.lowest if self._levels >= SPREAD else 0
 
     def remainder(self) -> int:
-        """What the lowest bits always are."""
+        """The constant value of the lowest bits that never change."""
         return int(self._or) & ((1 << self.lowest) - 1)
 
     def _held(self) -> list[int]:

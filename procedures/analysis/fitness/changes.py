@@ -1,7 +1,7 @@
-"""Abrupt changes in series of cell means: steps, told from drift, from slow noise of any colour, and from outliers.
+"""Abrupt changes in series of cell means: steps, distinguished from drift, slow noise of any colour, and outliers.
 
 At every border k between two cells a line is fitted to the h cells on either side; where the two lines meet the border
-they differ by the gap G_h(k), which is nothing for a straight drift. The spread of G_h over the whole series is that of
+they differ by the gap G_h(k), which is zero for a straight drift. The spread of G_h over the whole series is that of
 its own noise at that scale, white or slow, so a gap counts only where it is many times it. A step opens the
 same gap at every scale, a bend one that grows with h: so a quarter of the cells must show half of it, and the medians
 on either side as well, which an outlier does not move.
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from procedures.core.arrays import Array
 
 SIGNIFICANT, FLAT = 8.0, 7.0
-"""Spreads that a gap of lines, and one of means, must have where nothing else is asked for. The spread of a short
+"""Default least gap of lines, and of means, in spreads. The spread of a short
 series is known to 20 %; 10 000 borders and scales of a recording then give a false alarm in some thousands."""
 SHORTEST = 4
-"""Cells on either side of a border, at least."""
+"""Fewest cells on either side of a border."""
 POSITIONS = 16
 """Stretches of h cells that a series must have for its spread to be known."""
 QUANTILE, NORMAL = 0.8, 1.2815515655446004
@@ -27,20 +27,20 @@ QUANTILE, NORMAL = 0.8, 1.2815515655446004
 SHARP = 0.5
 """Part of a gap that must be there at a quarter of the scale, and between the medians."""
 SEEN = 6.0
-"""A step so many times the spread at a scale is seen at that scale."""
+"""Least step, in spreads at a scale, that is detectable at that scale."""
 ROUNDING = 1e-12
-"""Relative: a series that is nothing but now and then has a spread no smaller than this."""
+"""Least spread relative to the greatest gap, for a series that is zero nearly everywhere."""
 MOST = 12
-"""Steps of one series that are told apart."""
+"""Most steps of one series that are separated."""
 TRIES = 40
 
 
 @dataclass(frozen=True)
 class Change:
-    """One step of a series."""
+    """One step in a series."""
 
     index: int
-    """First cell behind it."""
+    """The first cell after the step."""
     height: float
 
 
@@ -49,9 +49,9 @@ def changes(
 ) -> list[list[Change]]:
     """Steps of each row of `series` (channels, K), none smaller than its `floor` (channels,), in order.
 
-    `uneven` (channels, K), at least 1: how many times its usual noise a row has at each cell; a gap counts the less.
-    `least`: spreads that a gap must have. `flat`: the series does not drift, and means stand for the lines, which makes
-    the gap twice as certain.
+    `uneven` (channels, K), at least 1: ratio of a row's noise at each cell to its usual noise; a gap counts the less.
+    `least`: required gap in spreads. `flat`: the series does not drift, and means replace the lines, which makes the
+    gap twice as certain.
     """
     found: list[list[Change]] = [[] for _ in series]
     if series.shape[1] < POSITIONS * SHORTEST:
@@ -88,7 +88,7 @@ def _gaps(y: Array, h: int, flat: bool) -> Array:
 
 
 def _intercept(total: Array, moment: Array, h: int) -> Array:
-    """Where the line through h cells meets the border: total Σy and moment Σy·u, u the distance from the border."""
+    """Value at the border of the line through h cells: total Σy and moment Σy·u, u the distance from the border."""
     mean = total / h
     slope = (moment / h - mean * h / 2.0) / ((h * h - 1.0) / 12.0)
     return mean - slope * h / 2.0
@@ -102,7 +102,7 @@ def _spread(gaps: Array) -> Array:
 
 
 def _of_row(y: Array, floor: float, uneven: Array, flat: bool, least: float) -> list[Change]:
-    """The largest first; each is taken out before the next is sought."""
+    """Find the steps of one row, the largest first; each is removed before the next is sought."""
     y = y.copy()
     found: list[Change] = []
     barred = np.zeros(len(y) + 1, np.bool_)
@@ -139,7 +139,7 @@ class _Scale:
 
 
 def _best(scales: Sequence[_Scale], barred: NDArray[np.bool_], most: float) -> tuple[int, int] | None:
-    """Border and scale of the gap that is most beyond its spread; None where none is."""
+    """Border and scale of the gap that exceeds its spread most; None where none does."""
     best = None
     for scale in scales:
         score = np.abs(scale.gaps) / scale.spread
@@ -151,7 +151,7 @@ def _best(scales: Sequence[_Scale], barred: NDArray[np.bool_], most: float) -> t
 
 
 def _is_sharp(scales: Sequence[_Scale], k: int, height: float) -> bool:
-    """Whether the gap is there at the least scale that could show it: that of a bend or of a transient is not."""
+    """True if the least scale that could show the gap does; that of a bend or of a transient does not appear there."""
     for scale in scales:
         near = slice(max(k - 1 - scale.h, 0), k + 2 - scale.h)
         gaps, spread = scale.gaps[near], scale.spread[near]
@@ -168,7 +168,7 @@ def _beside(uneven: Array, h: int) -> Array:
 
 
 def _height(y: Array, k: int, h: int, flat: bool) -> float:
-    """The gap at border k without the two cells beside it, within either of which the step may lie."""
+    """The gap at border k without the two adjacent cells, either of which may contain the step."""
     u = np.arange(1, h, dtype=np.float64) + 0.5
     left, right = y[k - h : k - 1][::-1], y[k + 1 : k + h]
     apart = float(right.mean() - left.mean())
@@ -176,7 +176,7 @@ def _height(y: Array, k: int, h: int, flat: bool) -> float:
 
 
 def _is_step(y: Array, k: int, h: int, height: float) -> bool:
-    """Whether the gap is there close by, and between the medians."""
+    """True if the gap also appears at a quarter of the scale and between the medians."""
     near = _near(y, k, max(1, h // 4), height)
     u = np.arange(h, dtype=np.float64) + 0.5
     left, right = y[k - h : k][::-1], y[k : k + h]
@@ -186,7 +186,7 @@ def _is_step(y: Array, k: int, h: int, height: float) -> bool:
 
 
 def _near(y: Array, k: int, q: int, height: float) -> float:
-    """The jump over the q cells on either side, less what goes on beside it; the two cells at the border are left out,
+    """The jump over the q cells on either side, less the usual jump nearby; the two cells at the border are left out,
     since a step may lie within either.
     """
     here = _jump(y, k, q)

@@ -1,7 +1,7 @@
-"""Samples that are copies: a channel repeats the one before far more often than its own small changes allow.
+"""Copied samples: a channel repeats the previous sample far more often than its own small changes allow.
 
-Where a quantity is rounded to multiples of q and its changes are large beside q, a change of nothing is about as likely
-as one of +q or −q. Many more repeats than changes of one step were made by somebody: a table of two rates filled by
+Where a quantity is rounded to multiples of q and its changes are large relative to q, a change of zero is about as
+likely as one of +q or −q. Many more repeats than changes of one step are artificial: a table of two rates filled by
 copying, or a row sent more than once.
 """
 
@@ -12,22 +12,22 @@ from procedures.analysis.fitness.pieces import Samples
 from procedures.core.arrays import Array
 
 COARSE = 3.0
-"""Steps that half of the changes must be larger than, for the repeats to prove anything."""
+"""Size, in steps, that half of the changes must exceed for the repeats to prove anything."""
 TIMES = 3.0
-"""Repeats for each change of one step, of which half a one was to be expected."""
+"""Least repeats for each change of one step, where half a repeat is expected."""
 LEAST = 50
 LEAST_SHARE = 0.01
-"""Copies below this part are left to the runs."""
+"""Least share of copies; fewer are left to the search for runs."""
 PART = 1024
-"""Differences that are judged together."""
+"""Number of differences that are judged together."""
 STRIDE = 17
-"""Every so many differences are looked at, from another one on in each piece, so that each phase of copying comes."""
+"""Every n-th difference is examined, with another offset in each piece, so that every phase of copying occurs."""
 FIRST = 4
-"""Pieces of which each is looked at."""
+"""First pieces, in which every difference is examined."""
 
 
 class Copies:
-    """Counts repeats, changes of one step, and larger ones, of every channel."""
+    """Count the repeats, the changes of one step, and the larger ones of every channel."""
 
     def __init__(self, channels: int) -> None:
         self.step = np.full(channels, np.inf)
@@ -36,12 +36,12 @@ class Copies:
         self._one = np.zeros(channels, np.int64)
         self._large = np.zeros(channels, np.int64)
         self._proven = np.zeros(channels, np.int64)
-        """Repeats in stretches whose changes speak against repeats by chance."""
+        """Repeats in stretches whose changes rule out repeats by chance."""
         self._looked = 0
         self._pieces = 0
 
     def add(self, d: Samples, resolution: Array) -> None:
-        """Differences (channels, n); `resolution` [raw] of integer channels, 0 of others: there the least change."""
+        """Add differences (channels, n); `resolution` [raw] of integer channels; 0 of others (least change)."""
         stride = 1 if self._pieces < FIRST else STRIDE
         some = np.abs(d[:, self._pieces % stride :: stride].astype(np.float64))
         self._pieces += 1
@@ -56,7 +56,7 @@ class Copies:
             self._count(part, step)
 
     def _count(self, some: Array, step: Array) -> None:
-        """A stretch short enough for a channel to have one noise in it."""
+        """Count a stretch that is short enough for a channel's noise to be constant in it."""
         same = _counted(some == 0.0)
         one = _counted(some < 1.5 * step) - same
         large = _counted(some >= COARSE * step)
@@ -67,17 +67,17 @@ class Copies:
         self._proven += np.where(proves, same, 0)
 
     def fine(self) -> NDArray[np.bool_]:
-        """Whether most changes of a channel are larger than a few of its steps, (channels,)."""
+        """Mask of the channels, (channels,), most of whose changes exceed a few of their steps."""
         return self._large > 0.5 * (self._looked - self._same)
 
     def by_chance(self, c: int) -> float:
-        """Part of the samples that repeat the one before because the quantity did: half as many as change by a step."""
+        """Share of samples that repeat the previous one by chance: half as many as change by one step."""
         return float(self._one[c]) / max(2 * self._looked, 1)
 
     def copied(self, in_runs: Array) -> list[int]:
         """Columns of the channels whose repeats are beyond what their changes allow.
 
-        `in_runs`: part of all samples (channels,) that repeat in long runs, which are another matter.
+        `in_runs`: part of all samples (channels,) that repeat in long runs, which are judged elsewhere.
         """
         many = self._proven - in_runs * self._looked > np.maximum(LEAST_SHARE * self._looked, LEAST)
         return np.flatnonzero(many & (self._proven > 0.5 * self._same)).tolist()

@@ -1,4 +1,4 @@
-"""Saturated: samples pile up at the largest or the smallest value of a channel."""
+"""Saturation of a channel: samples pile up at its largest or its smallest value."""
 
 from dataclasses import dataclass, field
 
@@ -10,19 +10,19 @@ from procedures.analysis.fitness.pieces import Mask, Samples
 from procedures.core.arrays import Array
 
 NEIGHBOURS = 8
-"""Levels that must exist beside the outermost one: a counter that says −1, 0, 1 has no tail to be cut off."""
+"""Levels that must exist in addition to the outermost one: a counter that reads −1, 0, 1 has no tail to cut off."""
 STEEPEST = 2.5
-"""The outermost level may hold so many times its neighbours: more than the √2 + 1 of a sine wave's crest."""
+"""Greatest ratio of the outermost level to its neighbours: more than the √2 + 1 of a sine wave's crest."""
 ALONE = 0.4
 """Part of the samples of the outermost `NEIGHBOURS` + 1 levels that the first may hold: a sine's crest holds 1/3."""
 CLIFF = 4.0
-"""Where the next level holds so many times those behind it, the noise is narrower than a level: no tail either."""
+"""Ratio of the next level to those behind it from which on the noise is narrower than a level: no tail either."""
 BUSY = 0.3
-"""So large a part of exact repeats off the edge says the same."""
+"""Share of exact repeats off the edge from which on the noise counts as narrow, too."""
 CHANCE = 1e-10
-"""Allowed of a false alarm of one edge."""
+"""Accepted probability of a false alarm at one edge."""
 RAILS = frozenset((2**15 - 1, -(2**15), 2**16 - 1, 2**23 - 1, -(2**23), 2**24 - 1, 2**31 - 1, -(2**31)))
-"""Where the counts of converters of 16, 24 and 32 bits end, signed and unsigned."""
+"""Ends of the range of converters of 16, 24 and 32 bits, signed and unsigned."""
 FEW = 64
 """Counts that a piece may span to be sorted by counting."""
 
@@ -38,30 +38,30 @@ class Edge:
 
     sign: int
     levels: dict[float, int] = field(default_factory=dict[float, int])
-    """How often samples stand at each, outermost first, at most `NEIGHBOURS` + 1."""
+    """Number of samples at each level, outermost first, at most `NEIGHBOURS` + 1 levels."""
     first_index: int = 0
     pairs: int = 0
-    """Exact repeats that stand at the outermost level."""
+    """Number of exact repeats at the outermost level."""
 
     @property
     def extreme(self) -> float:
-        """The outermost level."""
+        """The value of the outermost level."""
         return next(iter(self.levels))
 
     @property
     def count(self) -> int:
-        """Samples that stand there."""
+        """Number of samples at the outermost level."""
         return self.levels[self.extreme]
 
     @property
     def near(self) -> int:
-        """The most that stand at any of the next three levels."""
+        """Greatest number of samples at any of the next three levels."""
         return max(list(self.levels.values())[1:4], default=0)
 
     def add(self, x: Samples, extreme: float, same: Mask, start: int, few: Levels | None) -> None:
-        """New samples (n,) from index `start`, and the outermost of them.
+        """Add samples (n,) from index `start`, with the outermost of them, `extreme`.
 
-        `same` says which repeat the one before, (n,) or (n − 1,); `few`: all levels of them, where these are few.
+        `same`: mask of those that repeat the previous one, (n,) or (n − 1,); `few`: all their levels, where few.
         """
         full = len(self.levels) > NEIGHBOURS
         innermost = next(reversed(self.levels)) if self.levels else extreme
@@ -77,7 +77,7 @@ class Edge:
             self.pairs += int(np.count_nonzero(at_extreme[len(at_extreme) - len(same) :] & same))
 
     def piles_up(self, repeats: int, count: int, other: "Edge") -> bool:
-        """Whether the outermost level holds more than a tail can, beyond chance.
+        """True if the outermost level holds more samples than a tail can, beyond chance.
 
         A tail does not rise outwards: of the n samples at the outermost level and the fullest of the next three the
         former holds at most ``STEEPEST/(1 + STEEPEST)``, and of all levels that are kept `ALONE`, binomial.
@@ -94,7 +94,7 @@ class Edge:
         return bool(min(steep, alone) < CHANCE)
 
     def _merge(self, found: Levels) -> None:
-        """Levels, ascending, that are whole as far inward as the kept ones reach."""
+        """Merge ascending levels that are complete as far inward as the kept ones reach."""
         keep = slice(-NEIGHBOURS - 1, None) if self.sign > 0 else slice(NEIGHBOURS + 1)
         new = False
         for level, count in zip(found[0][keep].tolist(), found[1][keep].tolist(), strict=True):
@@ -106,7 +106,7 @@ class Edge:
 
 
 def counted(x: Samples, low: int, high: int) -> Levels | None:
-    """All levels of integer samples (n,) between `low` and `high` and how often they stand there, where few."""
+    """All levels of integer samples (n,) between `low` and `high` with their counts; None unless they are few."""
     if high - low >= FEW:
         return None
     if high - low < VERY_FEW:

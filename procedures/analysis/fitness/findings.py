@@ -1,4 +1,4 @@
-"""What an inspection says: findings a channel, each with a sentence for a person, and what may be set."""
+"""Results of an inspection, findings per channel with a sentence each, and the settings of an inspection."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,16 +9,16 @@ from procedures.core.errors import BadParameter, UnfitRecording
 
 
 class Severity(StrEnum):
-    """What a finding means to an analysis."""
+    """Consequence of a finding for an analysis."""
 
     REFUSE = "refuse"
-    """No number of this channel can be believed."""
+    """The channel's numbers cannot be trusted; the analysis is refused."""
     WARN = "warn"
-    """The analysis goes on, and its result says this."""
+    """The analysis continues, and its result carries the sentence."""
 
 
 class Kind(StrEnum):
-    """What is wrong with a channel."""
+    """Kinds of flaws of a channel."""
 
     TOO_FEW = "too_few"
     INCOMPLETE = "incomplete"
@@ -41,63 +41,63 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One flaw of one channel."""
+    """One flaw found in one channel."""
 
     kind: Kind
     severity: Severity
     sentence: str
-    """Names the channel, the value and what was expected."""
+    """Sentence naming the channel, the value and the expected one."""
     first_index: int | None = None
-    """Sample where it is first seen, counted from 0; None where it is of the whole recording."""
+    """First sample concerned, counted from 0; None where the whole recording is."""
     count: int = 0
-    """Samples concerned."""
+    """Number of samples concerned."""
     of_row: bool = False
-    """Whether whole rows are concerned, whatever the channel: such a finding is never of a channel alone."""
+    """True if whole rows are concerned, irrespective of the channel."""
 
 
 @dataclass(frozen=True)
 class ChannelFitness:
-    """All findings of one channel; none: it is fit."""
+    """All findings of one channel; it is fit where there are none."""
 
     channel: str
     findings: tuple[Finding, ...]
 
     @property
     def refused(self) -> bool:
-        """Whether any finding forbids an analysis."""
+        """True if any finding forbids an analysis."""
         return any(f.severity is Severity.REFUSE for f in self.findings)
 
 
 @dataclass(frozen=True)
 class FitnessSettings:
-    """What is expected of a recording. SI."""
+    """Requirements on a recording, in SI."""
 
     least_samples: int = 20
-    """Fewer are refused: the standard uncertainty of a mean is taken from 20 batches (see `station_means`)."""
+    """Fewest samples accepted: the standard uncertainty of a mean is taken from 20 batches (see `station_means`)."""
     gaps: Literal["refuse", "aware"] = "refuse"
-    """Samples that are no numbers: "refuse", or "aware": a warning, for an analysis that leaves gaps out."""
+    """Treatment of samples that are no numbers: "refuse", or "aware", a warning for an analysis that omits gaps."""
     counters_may_rest: bool = False
-    """A counter that stands still is warned of, not refused: across the Earth's rate it gives no pulse for minutes, so
-    a dwell of a calibration may well be silent. A static run that is silent has nothing to analyse."""
+    """A counter that stands still causes a warning, not a refusal: across the Earth's rate it gives no pulse for
+    minutes, so a dwell of a calibration may well be silent. A silent static run has nothing to analyse."""
     at_rest: bool = True
     """The unit neither turns faster than the Earth nor is accelerated but by gravity: units and jumps can be judged."""
     beside_others: bool = False
     """The recording is one of several stations: a channel that reads one value is judged over all of them (see
-    `station_means`), so a counter that is silent is not even warned of, and samples that are constant are."""
+    `station_means`), so a silent counter causes no warning, and constant samples cause one."""
     means_only: bool = False
-    """The analysis takes means: rows sent more than once and copied samples leave these right, and are warned of."""
+    """The analysis uses means, which repeated rows and copied samples leave right: these only cause warnings."""
     seeks_scale: bool = False
-    """The analysis is to find scale factors: a reading that is off by a factor is warned of, not refused."""
+    """The analysis determines scale factors: a reading that is off by a factor causes a warning, not a refusal."""
     reads_gravity: bool = True
     """The accelerometers feel gravity, not a current that is fed into their converter."""
     mends_outliers: bool = False
-    """Outliers that are few will be replaced by the mean of their neighbours, and the sentence says so."""
+    """Few outliers are replaced by the mean of their neighbours, as the sentence then states."""
     gravity_m_s2: float | None = None
-    """Of the site [m/s²]; None: standard gravity."""
+    """Gravity at the site [m/s²]; None: standard gravity."""
     gyro_rest_rad_s: float = 0.5
-    """A gyro at rest reads less [rad/s]: ours; data sheets of consumer gyros allow ±20 °/s = 0.35 rad/s of zero-rate
-    output. Degrees a second cannot be told from radians by this unless the gyro is better, so set it to the Earth's
-    rate plus a bound of the bias where that is known."""
+    """Bound on the reading of a gyro at rest [rad/s], our choice; data sheets of consumer gyros allow ±20 °/s = 0.35
+    rad/s of zero-rate output. The bound distinguishes degrees a second from radians only for a better gyro, so set it
+    to the Earth's rate plus a bound of the bias where that is known."""
 
     def __post_init__(self) -> None:
         for name, value, low, high in (

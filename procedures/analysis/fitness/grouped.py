@@ -1,4 +1,4 @@
-"""Findings of one recording or of many stations in as few sentences as say them all."""
+"""Findings of one recording or of many stations, merged into as few sentences as possible."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from procedures.analysis.fitness.findings import ChannelFitness, Finding, Kind, Severity
 
 NAMED = 12
-"""Stations that a sentence names; of more it says how many."""
+"""Most stations that a sentence names; of further ones it gives the number."""
 
 
 @dataclass
 class _Group:
-    """One kind of flaw of one channel, or of several that have it alike."""
+    """One kind of flaw of one channel, or of several channels that share it."""
 
     sentence: str
     label: str
@@ -23,8 +23,8 @@ def grouped(
 ) -> tuple[str, ...]:
     """Sentences about recordings, (label, findings) each; `but` for one kind.
 
-    Of a single recording each different sentence once. Of several, each kind of flaw of a channel once, with the
-    station where it is seen first and the names of the others.
+    For a single recording, each different sentence once. For several, each kind of flaw of a channel once, with the
+    station where it appears first and the names of the others.
     """
     groups: dict[tuple[Kind, str], _Group] = {}
     for label, fitness in found:
@@ -40,7 +40,7 @@ def grouped(
 
 
 def _together(fitness: Iterable[ChannelFitness], severity: Severity) -> Iterable[tuple[str, Finding, tuple[str, ...]]]:
-    """Each sentence with the channels that it is of: alike ones are said of all their channels at once."""
+    """Each sentence with its channels; equal sentences are merged into one for all their channels."""
     alike: dict[tuple[Kind, str], tuple[Finding, list[str]]] = {}
     for channel in fitness:
         begin = f"channel {channel.channel}: "

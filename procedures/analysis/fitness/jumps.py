@@ -12,27 +12,27 @@ SIGMAS = 12.0
 WHITE = 2.0 / np.sqrt(np.pi)
 """Mean magnitude of the difference of two samples of white noise of unit standard deviation."""
 LEVELS = 4.0
-"""Resolutions that a jump is at least: a counter at rest gives a pulse now and then, and none in between."""
+"""Least jump in resolutions: a counter at rest gives a single pulse now and then."""
 STRIDE = 8
-"""Every so many differences tell the noise: cheap, and one outlier in a thousand of them moves it little."""
+"""Every n-th difference is used for the noise: cheap, and one outlier in a thousand of them moves it little."""
 TRUSTED = 1024
-"""Fewer differences than these are judged together with those of the piece before."""
+"""Fewest differences that are judged alone; fewer are combined with those of the previous pieces."""
 SHARP = 0.75
 """Part of a step, and of either side of an outlier, that lies between two samples; a motion takes longer."""
 LOOKED_AT = 256
-"""Jumps of a piece that are told apart; where there are more the channel is no quiet one, and they are not steps."""
+"""Most jumps of a piece that are classified; a channel with more is not quiet, and they are not steps."""
 LONELY = 3.0
-"""An outlier is so many times farther away than any of the samples about it is from its neighbours."""
+"""Least ratio of an outlier's distance to any distance of neighbouring samples around it."""
 KEPT = 1000
-"""Outliers and steps that are kept of a channel; the others are counted."""
+"""Most outliers and steps that are kept for a channel; further ones are only counted."""
 
 
 @dataclass(frozen=True)
 class Jump:
-    """One outlier, or one step."""
+    """One outlier or one step."""
 
     index: int
-    """The sample that is out, or the first behind the step."""
+    """The outlying sample, or the first one after the step."""
     size: float
     """Raw: from the mean of its two neighbours, or the height."""
     noise: float
@@ -50,7 +50,7 @@ class Jumps:
         self._noise_count = 0
 
     def add(self, piece: Piece, resolution: Array) -> None:
-        """One more piece; `resolution` [raw] of each integer channel, (channels,)."""
+        """Add one more piece; `resolution` [raw] of each integer channel, (channels,)."""
         differences = piece.differences
         noise = self._noise(piece.d)
         if not differences.shape[1]:
@@ -95,7 +95,7 @@ class Jumps:
 
 
 def _alone(d: Samples, centre: int, away: float) -> bool:
-    """Whether the differences about an outlier, but for its own two, are small beside it: no burst of noise."""
+    """True if the differences around an outlier, except its own two, are small relative to it: no burst of noise."""
     about = np.concatenate([d[max(centre - MARGIN, 0) : centre - 1], d[centre + 1 : centre + MARGIN]])
     if not len(about):
         return True
@@ -104,7 +104,7 @@ def _alone(d: Samples, centre: int, away: float) -> bool:
 
 
 def _height(x: Samples, j: int) -> float:
-    """Of the step between samples j and j + 1: the difference of the medians of `MARGIN` samples on either side."""
+    """Height of the step from sample j to j + 1: the difference of the medians of `MARGIN` samples on either side."""
     before, after = x[max(j + 1 - MARGIN, 0) : j + 1], x[j + 1 : j + 1 + MARGIN]
     if min(len(before), len(after)) < MARGIN // 2:
         return 0.0

@@ -1,4 +1,4 @@
-"""Level and noise of every channel over short cells: what steps and changes of the noise are sought in."""
+"""Level and noise of every channel over short cells, in which steps and changes of the noise are sought."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,32 +9,32 @@ from procedures.analysis.fitness.pieces import PIECE, Piece
 from procedures.core.arrays import Array
 
 LEAST_CELLS = 1024
-"""Cells of a recording of known length, at least where it has so many samples, and less than twice as many."""
+"""Fewest cells of a recording of known length with at least as many samples; it has less than twice as many."""
 NOISE_SAMPLES = 32
-"""Differences that one value of the noise rests on, at least."""
+"""Fewest differences behind one value of the noise."""
 STRIDE = 8
-"""Every so many differences tell the noise of a long cell."""
+"""Every n-th difference is used for the noise of a long cell."""
 THIN_FROM, THINNEST = 64, 4
-"""Cells of more than so many samples are averaged over every second, those of twice as many over every fourth at the
-most: half the certainty for a quarter of the time."""
+"""Cells of more than `THIN_FROM` samples are averaged over every second sample, those of twice as many over every
+`THINNEST`-th at most: half the certainty for a quarter of the time."""
 UNKNOWN = 256
 """Samples a cell where the length is not announced."""
 
 
 @dataclass(frozen=True)
 class CellLevels:
-    """Raw units; K cells of `size` samples, and K // `group` values of the noise."""
+    """Levels and noise in raw units: K cells of `size` samples, and K // `group` values of the noise."""
 
     size: int
     means: Array
-    """(channels, K)"""
+    """Mean of every cell, (channels, K)."""
     group: int
-    """Cells that a value of the noise is of."""
+    """Number of cells for each value of the noise."""
     noise: Array
     """Mean magnitude of the difference of two neighbours, (channels, K // group)."""
 
     def leave_out(self, channel: int, samples: Sequence[int]) -> None:
-        """Put the mean of its neighbours for each cell of a channel that one of these samples is in, in place."""
+        """Replace each cell of a channel that contains one of these samples by the mean of its neighbours, in place."""
         for row, size in ((self.means[channel], self.size), (self.noise[channel], self.size * self.group)):
             # The difference to the next sample is in the next cell where the sample is the last of its own.
             for k in sorted({(i + late) // size for i in samples for late in (0, 1)}):
@@ -43,10 +43,10 @@ class CellLevels:
 
 
 class Levels:
-    """Gathers the cells piece by piece; a cell never lies in two pieces, what is left over at the end is left out."""
+    """Gather the cells piece by piece; a cell never spans two pieces, and an incomplete last one is dropped."""
 
     def __init__(self, channels: int, count: int | None) -> None:
-        """`count`: samples that are announced."""
+        """Start with no samples; `count`: the announced number of samples."""
         shortest = UNKNOWN if count is None else max(1, count // LEAST_CELLS)
         self._size = min(PIECE, 1 << (shortest.bit_length() - 1))
         self._stride = max(1, min(STRIDE, self._size // NOISE_SAMPLES // 2))
@@ -54,7 +54,7 @@ class Levels:
         self._noise: list[Array] = [np.empty((channels, 0))]
 
     def add(self, piece: Piece) -> None:
-        """The next piece."""
+        """Add the next piece of samples."""
         x, size = piece.x, self._size
         cells = x.shape[1] // size
         if not cells or not piece.columns.shape[1] > 1:
@@ -69,7 +69,7 @@ class Levels:
             self._noise.append(some.reshape(len(x), cells, -1).mean(axis=2))
 
     def finish(self) -> CellLevels:
-        """All cells."""
+        """The levels and the noise of all cells."""
         means, noise = np.hstack(self._means), np.hstack(self._noise)
         group = -(-NOISE_SAMPLES * self._stride // self._size)
         used = noise.shape[1] // group * group

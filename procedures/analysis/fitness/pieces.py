@@ -1,7 +1,7 @@
 """Samples of a recording in pieces of one size, channel by channel, however the blocks came.
 
-So that what is found does not depend on how the recording was cut, and every look at a piece costs one call for all
-its channels.
+The findings thus do not depend on how the recording was cut, and each examination of a piece is one call for all its
+channels.
 """
 
 from collections.abc import Iterator
@@ -17,13 +17,13 @@ from procedures.core.recording import RawArray
 PIECE = 16384
 """Samples a piece: six channels of it fit into the cache."""
 MARGIN = 8
-"""Samples on either side of a jump that tell what it is."""
+"""Samples on either side of a jump that are used to classify it."""
 HISTORY = 2 * MARGIN + 1
 """Samples that a piece keeps of the one before: each jump is then seen once with its surroundings."""
 
 Mask = NDArray[np.bool_]
 Samples = NDArray[np.int32 | np.float64]
-"""Either all of the one or all of the other type."""
+"""Samples that are all integers or all floats."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Piece:
 
 
 class Pieces:
-    """Blocks in, pieces out."""
+    """Cut blocks of samples into pieces."""
 
     def __init__(self, channels: int) -> None:
         self._channels = channels
@@ -66,7 +66,7 @@ class Pieces:
         self._filled = 0
         self._history = 0
         self.seen = 0
-        """Samples that came in."""
+        """Number of samples received so far."""
 
     def add(self, block: RawArray) -> Iterator[Piece]:
         """Pieces that a further block of shape (n, channels) completes. Raises `BadParameter` for another shape."""
@@ -89,7 +89,7 @@ class Pieces:
                 self._history = self._filled = HISTORY
 
     def finish(self) -> Iterator[Piece]:
-        """What is left, as the last piece, without new samples where nothing is left; none for no samples at all."""
+        """The remaining samples as the last piece, which may be without new ones; no piece without any samples."""
         if self._buffer is not None and self._filled:
             yield self._piece(self._buffer, last=True)
 
@@ -108,7 +108,7 @@ def _numbers(block: RawArray, channels: int) -> Samples:
 
 
 def _fill(columns: Samples, history: int) -> Mask | None:
-    """Put the mean of the piece where a new sample is no number, in place; where there are such."""
+    """Replace new samples that are no numbers, if any, by the mean of the piece, in place."""
     new = columns[:, history:]
     if not new.size or np.all(np.isfinite(new.min(axis=1)) & np.isfinite(new.max(axis=1))):
         return None

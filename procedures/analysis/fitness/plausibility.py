@@ -1,4 +1,4 @@
-"""Wrong unit or rate: what a unit at rest reads against gravity and against the rate of a turning Earth."""
+"""Plausibility of unit and rate: readings of a unit at rest against gravity and the Earth's rate."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ from procedures.core.recording import ACCELEROMETER, GYRO, INCREMENTS, TRIADS, C
 BURST = 128
 """Samples that are averaged before a magnitude is taken, so that noise does not pass for a reading."""
 BURSTS = 8
-"""Of these at the beginning of a piece."""
+"""Number of bursts at the beginning of a piece."""
 TOLERANCE = 0.3
-"""Of the magnitude of gravity, relative: nominal scales are known to some per cent, but the thesis's own unit (its
+"""Relative tolerance of gravity's magnitude: nominal scales are known to some per cent, but the thesis's own unit (its
 table 5.1) gives 0.81 … 0.86 of its input; the nearest wrong unit, feet, is a factor of 3.3 away."""
 COLDEST_C, HOTTEST_C = -100.0, 200.0
 FACTORS = (2.0, 4.0, 5.0)
-"""Of a rate, or of the number of samples that were summed; of a range that was set otherwise than declared."""
+"""Simple factors of a wrong rate, of a wrong number of summed samples, or of a range set otherwise than declared."""
 FACTOR_TOLERANCE = 0.12
 """Relative: nominal scales are known to some per cent, and the nearest two factors are 25 % apart."""
 DOUBTFUL_RATE_RAD_S = 0.1
@@ -43,7 +43,7 @@ class Doubt:
 
 
 class Readings:
-    """Mean magnitudes of what triads and single channels read, over short bursts throughout the recording."""
+    """Mean magnitudes of the readings of triads and single channels, over short bursts throughout the recording."""
 
     def __init__(self, channels: Sequence[Channel], rate_hz: float) -> None:
         self._rate_hz = rate_hz
@@ -70,7 +70,7 @@ class Readings:
         self._pieces += 1
 
     def doubts(self, settings: FitnessSettings, mean: Array, noise: Array) -> dict[str, Doubt]:
-        """What is doubted, channel by channel; `mean` of each and `noise`, the standard deviation of white one, raw."""
+        """Doubts by channel name; `mean` and `noise`, the standard deviation of white noise, of each channel, raw."""
         if not self._pieces or not settings.at_rest:
             return self._temperatures() if self._pieces else {}
         return {**self._temperatures(), **self._gyros(settings, mean, noise), **self._accelerometers(settings)}
@@ -137,13 +137,13 @@ class Readings:
                 for i, c in enumerate(self._channels)
                 if c.quantity in GYRO_QUANTITIES and c.rate_unit == "rad/s"
             }
-        # A good gyro reads the Earth's rate or little more; what another reads shows that its unit is wrong, not which.
+        # A good gyro reads the Earth's rate or little more; any other reading shows that the unit is wrong, not which.
         good = limit < 10.0 * units.EARTH_RATE
         candidates = {"deg/s": 1.0 / units.DEG, "deg/h": 1.0 / units.DEG_PER_HOUR} if good else {}
         expected = f"less than {limit:.3g} rad/s at rest"
         found: dict[str, Doubt] = {}
         for group, burst in read.items():
-            # Single bursts tell a motion from a rest; what a unit at rest reads is surer from all samples.
+            # Single bursts distinguish motion from rest; the reading at rest is more certain from all samples.
             value = min(burst, float(np.linalg.norm(self._scale.rates(mean)[list(group)])))
             names = [self._names[i] for i in group]
             walk = float(np.max((noise * np.abs(self._scale.gain))[list(group)])) / self._rate_hz**0.5
@@ -163,7 +163,7 @@ class Readings:
         truth: float,
         candidates: dict[str, float],
     ) -> dict[str, Doubt]:
-        """The sentence for channels that read `read` where `truth` is so in the unit declared."""
+        """The sentence on channels that read `read` where `truth` is expected in the declared unit."""
         unit = self._channels[rows[0]].rate_unit
         looks = [name for name, size in candidates.items() if abs(read / (truth * size) - 1.0) <= TOLERANCE]
         if abs(read / (truth * self._rate_hz) - 1.0) <= TOLERANCE:
@@ -178,14 +178,14 @@ class Readings:
         return {self._names[row]: Doubt(sentence, bool(looks)) for row in rows}
 
     def _rows(self, triad: Sequence[str]) -> list[int]:
-        """Where a triad stands, whole and in SI; nothing otherwise."""
+        """Rows of a triad if it is complete and in SI; otherwise none."""
         wanted = "rad/s" if triad == GYRO else "m/s^2"
         rows = [self._names.index(name) for name in triad if name in self._names]
         return rows if len(rows) == 3 and all(self._channels[r].rate_unit == wanted for r in rows) else []
 
 
 def unlikely_rate(rate_hz: float) -> str | None:
-    """A sentence about a rate that no inertial unit has."""
+    """A sentence on a sampling rate that no inertial unit has, else None."""
     if SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
         return None
     return (
@@ -195,13 +195,13 @@ def unlikely_rate(rate_hz: float) -> str | None:
 
 
 def _factor(ratio: float) -> float | None:
-    """The simple factor or its inverse that a ratio is near to."""
+    """The simple factor, or its inverse, nearest to a ratio; None where none is near."""
     near = [f for g in FACTORS for f in (g, 1.0 / g) if abs(ratio / f - 1.0) <= FACTOR_TOLERANCE]
     return min(near, key=lambda f: abs(ratio / f - 1.0), default=None)
 
 
 def _degrees(names: Sequence[str], value: float, expected: str, walk: float | None) -> Doubt:
-    """Gyros whose reading at rest or whose noise is that of a value in degrees."""
+    """Doubt about gyros whose reading at rest or whose noise suggests a value in degrees."""
     shown = f"channels {names[0]} … {names[-1]} together read" if len(names) > 1 else f"channel {names[0]} reads"
     noise = "" if walk is None else f", with a random walk of about {walk / units.DEG_PER_SQRT_HOUR:.3g} deg/√h"
     return Doubt(

@@ -1,4 +1,4 @@
-"""Rows that are sent more than once: all channels repeat at once, more often than noise lets them."""
+"""Rows that are sent more than once: all channels repeat at once, more often than their noise allows."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,25 +8,25 @@ from procedures.analysis.fitness.pieces import Mask
 Counts = NDArray[np.int64]
 
 HELD = 0.8
-"""All channels that change in so many of the changed rows change together: rows are held."""
+"""Share of the changed rows from which on channels change together, so that rows are held."""
 HELD_SHARE = 0.01
-"""Repeated rows below this part are left to the longest run."""
+"""Least share of repeated rows; fewer are left to the search for the longest run."""
 
 SEVERAL = 5
 
 
 class Repeats:
-    """Rows that repeat the row before, over all channels."""
+    """Rows that repeat the previous row in all channels."""
 
     def __init__(self, channels: int) -> None:
         self.zeros = np.zeros(channels, np.int64)
-        """Samples of each channel that repeat the one before."""
+        """Number of samples of each channel that repeat the previous one."""
         self.rows = 0
         self.pairs = 0
         self.first_index = 0
 
     def add(self, same: Mask, zeros: Counts, start: int) -> None:
-        """Which samples repeat the one before, (channels, n), how many in each, and the index of the first of them."""
+        """Add the mask of repeats of the previous sample, (channels, n), their number by channel, and their start."""
         count = same.shape[1]
         rows: Mask = np.logical_and.reduce(same, axis=0)
         repeated = int(np.count_nonzero(rows))
@@ -39,8 +39,8 @@ class Repeats:
     def held(self, in_runs: int, fine: NDArray[np.bool_]) -> list[int]:
         """The channels that show by changing only together that rows are sent more than once; none, if they do not.
 
-        `in_runs`: repeated rows that hang in long runs, which are another matter. `fine` (channels,): those that change
-        by more than a step or two; of others `SEVERAL` must agree, since what is common to a few of them, a current or
+        `in_runs`: repeated rows in long runs, which are judged elsewhere. `fine` (channels,): those that change
+        by more than a step or two; of others `SEVERAL` must agree, since a common cause of a few of them, a current or
         a reference, changes them together.
         """
         if self.rows - in_runs < max(20, HELD_SHARE * self.pairs) or self.rows == self.pairs:

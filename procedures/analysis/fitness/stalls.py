@@ -10,22 +10,22 @@ from procedures.analysis.fitness.pieces import Mask
 from procedures.core.arrays import Array
 
 SHORTEST = 5
-"""Repeats in a row, at least."""
+"""Fewest consecutive repeats of a run."""
 BUSY = 0.6
-"""A channel bears witness where less than so large a part of its samples repeat the one before."""
+"""A channel counts as evidence if a smaller share of its samples repeat the previous one."""
 CHANCE = 1e-9
-"""Allowed of a false alarm of a recording and a group."""
+"""Accepted probability of a false alarm per recording and group."""
 WINDOW = 64
-"""Samples whose part of repeats is taken at a time."""
+"""Samples of a window in which the share of repeats is determined."""
 USUAL = 0.8
 """A run is judged against this quantile of the windows of its piece: a channel whose level drifts between two counts
 repeats more often at some times than at others."""
 LEAST_PART = 1e-3
-"""Part of repeats that a channel is taken to have at least."""
+"""Least share of repeats that a channel is assumed to have."""
 KEPT = 1000
-"""Runs that are kept of a group."""
+"""Most runs that are kept for a group."""
 SAME = 0.8
-"""Part of a run that lies within one of a larger group for it to be the same."""
+"""Share of a run that must lie within a larger group's run for both to be the same."""
 
 
 @dataclass(frozen=True)
@@ -38,21 +38,21 @@ class Run:
 
 @dataclass
 class Group:
-    """Channels that are looked at together: all of them, a triad, or one."""
+    """Channels that are examined together: all of them, a triad, or one."""
 
     rows: tuple[int, ...]
     runs: list[Run] = field(default_factory=list[Run])
     lost: int = 0
-    """Runs beyond those that are kept."""
+    """Number of runs beyond those that are kept."""
     open: int = 0
-    """Repeats at the end of the piece before, that a run may go on from."""
+    """Repeats at the end of the previous piece, which a run may continue."""
 
 
 class Stalls:
-    """Gathers the runs of all groups piece by piece."""
+    """Gather the runs of all groups piece by piece."""
 
     def __init__(self, groups: Sequence[tuple[int, ...]], channels: int) -> None:
-        """`groups` of channels' columns, the larger ones first."""
+        """Start with no samples; `groups`: columns of channels, the larger groups first."""
         self._groups = [Group(rows) for rows in groups]
         self._part = np.full(channels, np.nan)
         self.repeats = np.zeros(channels, np.int64)
@@ -61,7 +61,7 @@ class Stalls:
         self._seen = 0
 
     def add(self, same: Mask, zeros: NDArray[np.int64], start: int) -> None:
-        """Which samples repeat the one before, (channels, n), how many in each, and the index of the first of them."""
+        """Add the mask of repeats of the previous sample, (channels, n), their number by channel, and their start."""
         if not same.shape[1]:
             return
         self.repeats += zeros
@@ -82,7 +82,7 @@ class Stalls:
     def finish(self, able: NDArray[np.bool_]) -> list[Group]:
         """Every group with the runs that are its own, beyond chance against the whole recording.
 
-        `able` (channels,): those that bear witness alone or as a triad. A counter that gives single pulses does not:
+        `able` (channels,): those that are evidence alone or as a triad. A counter that gives single pulses is not:
         how regularly they come depends on where its input stands between two pulses.
         """
         for group in self._groups:
@@ -105,8 +105,8 @@ class Stalls:
         return self._groups
 
     def _usual(self, same: Mask) -> Array:
-        """Usual part of repeats of each channel in a window of this piece, (channels,); windows that repeat throughout
-        are those that are to be judged. Where there is no other the piece before tells it.
+        """Usual share of repeats of each channel in a window of this piece, (channels,), without windows that repeat
+        throughout, which are to be judged. Where there is no other window, the share of the previous piece is used.
         """
         width = WINDOW if same.shape[1] >= 2 * WINDOW else same.shape[1]
         windows = same.shape[1] // width
@@ -141,9 +141,9 @@ class Stalls:
             group.lost += 1
 
     def _shortest(self, group: Group, part: Array) -> float:
-        """Least length of a run that is beyond chance, and no less than `SHORTEST`; infinite where nothing tells.
+        """Least length of a run that is beyond chance, `SHORTEST` at least; infinite where there is no evidence.
 
-        ``N·Π p_c^L < CHANCE`` over the channels that bear witness, solved for L.
+        ``N·Π p_c^L < CHANCE`` over the channels that count as evidence, solved for L.
         """
         p = part[list(group.rows)]
         witnesses = p[p < BUSY]
@@ -154,7 +154,7 @@ class Stalls:
 
 
 def _has_run(same: Mask, zeros: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether `SHORTEST` repeats stand in a row, (channels,)."""
+    """Mask of the channels, (channels,), with `SHORTEST` consecutive repeats."""
     if same.shape[1] < SHORTEST or not np.any(zeros >= SHORTEST):
         return zeros >= min(SHORTEST, same.shape[1])
     two = same[:, 1:] & same[:, :-1]

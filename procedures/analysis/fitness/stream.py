@@ -1,4 +1,4 @@
-"""The inspection itself: blocks in, findings out, one pass and bounded memory whatever the recording's length."""
+"""Inspection of a recording: blocks in, findings out, in one pass and in bounded memory for any length."""
 
 from collections.abc import Sequence
 from typing import cast
@@ -26,11 +26,11 @@ from procedures.core.recording import INCREMENTS, TRIADS, Channel, Quantity, Raw
 _SPOILS_NOISE = (Kind.REPEATED, Kind.STANDS_STILL, Kind.COPIED, Kind.WRAPPED, Kind.CONSTANT)
 
 FEW_SHARE = 1e-3
-"""Part of a channel's samples that may be outliers for a figure without them to be one of the channel."""
+"""Greatest share of outliers for which a result without them still represents the channel."""
 
 
 class FitnessStream:
-    """Inspects a recording block by block; the findings do not depend on how it was cut into blocks."""
+    """Inspect a recording block by block; the findings do not depend on how it was cut into blocks."""
 
     def __init__(
         self,
@@ -39,7 +39,7 @@ class FitnessStream:
         count: int | None = None,
         settings: FitnessSettings | None = None,
     ) -> None:
-        """`count`: samples that are announced; None: not known."""
+        """Start with no samples; `count`: the announced number of samples, None where not known."""
         if not 0.0 < rate_hz < np.inf:
             raise BadParameter("rate_hz", rate_hz, "must be finite and greater than 0")
         self._channels = tuple(channels)
@@ -62,12 +62,12 @@ class FitnessStream:
         self._is_integer = False
 
     def add(self, block: RawArray) -> None:
-        """The next samples, shape (n, channels), int32 or float64. Raises `BadParameter` for another shape."""
+        """Add the next samples, shape (n, channels), int32 or float64. Raises `BadParameter` for another shape."""
         for piece in self._pieces.add(block):
             self._inspect(piece)
 
     def finish(self) -> tuple[ChannelFitness, ...]:
-        """What was found, channel by channel; no block may follow."""
+        """The findings, channel by channel; no block may follow."""
         for piece in self._pieces.finish():
             self._inspect(piece)
         words = Wording(self._pieces.seen, self._rate_hz)
@@ -84,7 +84,7 @@ class FitnessStream:
         return tuple(ChannelFitness(c.name, tuple(f)) for c, f in zip(self._channels, found, strict=True))
 
     def outliers(self) -> dict[int, list[Jump]]:
-        """The outliers of each column that has any, where they are few enough to be left out."""
+        """The outliers of each column, where they are few enough to be omitted."""
         return {c: jumps for c, jumps in enumerate(self._jumps.outliers) if jumps and self._few(c)}
 
     def _few(self, c: int) -> bool:
@@ -135,7 +135,7 @@ class FitnessStream:
         return np.array([float(1 << b.lowest) if self._is_integer else 0.0 for b in self._bits])
 
     def _of_values(self, c: int, channel: Channel, words: Wording) -> list[Finding]:
-        """Length, missing samples, and what a channel's values alone say."""
+        """Findings on length, missing samples, and the values of one channel alone."""
         settings, edges = self._settings, self._edges[c]
         found = raw_flaws.length(channel.name, words.seen, self._count, settings)
         if not words.seen:
@@ -153,7 +153,7 @@ class FitnessStream:
         return found + (raw_flaws.coarse_bits(channel.name, self._bits[c], words.seen) if self._is_integer else [])
 
     def _of_repeats(self, found: list[list[Finding]], words: Wording) -> None:
-        """Rows sent more than once, copied channels, hung links, channels that stand still."""
+        """Add findings on repeated rows, copied channels, hung links, and channels that stand still."""
         sampled = np.array([c.quantity not in INCREMENTS for c in self._channels])
         groups = self._stalls.finish(sampled | self._copies.fine())
         rows = self._repeats.rows
@@ -187,7 +187,7 @@ class FitnessStream:
         for together in self._alike(copied):
             names = [self._channels[c].name for c in together]
             repeats = int(self._repeats.zeros[together[0]])
-            # A copied sample cannot have repeated by chance; of the others some did, which are no copies.
+            # A copied sample cannot have repeated by chance; some of the other samples did, and are no copies.
             repeats -= round(self._copies.by_chance(together[0]) * words.seen)
             finding = time_flaws.copied(names, repeats, not witnesses and not held, words, self._settings)
             for c in together:
@@ -210,7 +210,7 @@ class FitnessStream:
         return groups
 
     def _of_readings(self, found: list[list[Finding]], words: Wording) -> None:
-        """Units and rates that what a unit at rest reads speaks against."""
+        """Add findings on units and rates that contradict the readings of a unit at rest."""
         cells = self._levels.finish()
         noise, mean = cells.noise, cells.means.mean(axis=1) if cells.means.shape[1] else np.full(len(found), np.nan)
         usual = np.median(noise, axis=1) / WHITE if noise.shape[1] else np.zeros(len(found))
@@ -225,7 +225,7 @@ class FitnessStream:
             found[c].append(Finding(kind, severity, doubt.sentence, 0, words.seen, of_row=doubt.of_rate))
 
     def _of_course(self, found: list[list[Finding]], words: Wording) -> None:
-        """Outliers, steps, changes of the noise: against noise, which is not what it was where samples pile up."""
+        """Add findings on outliers, steps and changes of the noise, unless piled-up samples falsify the noise."""
         cells = self._levels.finish()
         for c, jumps in enumerate(self._jumps.outliers):
             cells.leave_out(c, [jump.index for jump in jumps])

@@ -1,4 +1,4 @@
-"""What is said of the course of a recording: outliers, steps, changes of the noise, runs and copies of samples."""
+"""Findings on the course of a recording: outliers, steps, changes of the noise, runs and copies of samples."""
 
 from collections.abc import Sequence
 
@@ -14,21 +14,21 @@ from procedures.core.arrays import Array
 from procedures.core.recording import Channel
 
 SHORT_RUN = 10
-"""Rows: a data link that repeats fewer has stumbled, one that repeats more was hung."""
+"""Run of repeated rows from which on the data link was hung; a shorter one is a glitch."""
 SHORT_SHARE = 1e-3
-"""Part of a channel's samples that may stand still before nothing of it can be believed."""
+"""Share of a channel's samples that may stand still before the channel is refused."""
 LEAST_CHANGE = float(np.log(1.4))
-"""Of the noise, in the logarithm: temperature and the place of a level between two counts change it by less."""
+"""Least change of the noise, in the logarithm; temperature and a level's place between two counts change it less."""
 NOISE_SPREADS = 6.0
-"""Spreads that a change of the noise must have: it is no smaller than `LEAST_CHANGE` besides."""
+"""Least change of the noise in spreads, in addition to `LEAST_CHANGE`."""
 LEAST_NOISE = 0.5
-"""Resolutions that the noise must have for small steps of the level to be more than rounding."""
+"""Least noise, in resolutions, for which small steps of the level are more than rounding."""
 FINE_NOISE = 1.0
-"""Resolutions that the noise must have for its changes to be more than that."""
+"""Least noise, in resolutions, for which its changes are more than rounding."""
 LEAST_STEP = 0.01
-"""Resolutions that any step must have."""
+"""Least height of any step, in resolutions."""
 ROUNDING = 2.0
-"""Resolutions that a step must have where the noise is less."""
+"""Least height of a step, in resolutions, where the noise is smaller."""
 
 
 def steps_and_noise(cells: CellLevels, resolution: Array) -> tuple[list[list[Change]], list[list[Change]]]:
@@ -45,7 +45,7 @@ def steps_and_noise(cells: CellLevels, resolution: Array) -> tuple[list[list[Cha
     uneven = np.hstack([uneven, np.ones((len(uneven), short))]) if short > 0 else uneven
     floor = np.maximum(floor, LEAST_STEP * resolution)
     of_level = changes(cells.means, floor, uneven)
-    # Means are twice as certain as lines where there is no drift; what lines have found they would only find again.
+    # Means are twice as certain as lines where there is no drift; they would only repeat what lines detected.
     floor = np.where(usual > FINE_NOISE * resolution, floor, ROUNDING * resolution)
     floor = np.where([bool(f) for f in of_level], np.inf, floor)
     quiet = changes(cells.means, floor, uneven, flat=True)
@@ -55,7 +55,7 @@ def steps_and_noise(cells: CellLevels, resolution: Array) -> tuple[list[list[Cha
 
 
 def outliers(channel: Channel, jumps: Sequence[Jump], count: int, mended: bool, words: Wording) -> list[Finding]:
-    """Single samples far from both neighbours; `mended`: the figures are made without them."""
+    """Findings on single samples far from both neighbours; `mended`: the results are computed without them."""
     if not jumps:
         return []
     first = jumps[0]
@@ -74,7 +74,7 @@ def outliers(channel: Channel, jumps: Sequence[Jump], count: int, mended: bool, 
 def steps(
     channel: Channel, sharp: Sequence[Jump], gradual: Sequence[Change], size: int, words: Wording
 ) -> list[Finding]:
-    """Shifts of the level: those that one sample shows, and those that the means of cells of `size` samples show."""
+    """Findings on shifts of the level: those visible in one sample, and those in means of cells of `size` samples."""
     places = [(j.index, j.size, "sample") for j in sharp]
     for change in gradual:
         index = change.index * size
@@ -94,7 +94,7 @@ def steps(
 
 
 def noise_changes(channel: Channel, found: Sequence[Change], size: int, words: Wording) -> list[Finding]:
-    """Changes of the noise; `size`: samples of one value of it."""
+    """Findings on changes of the noise; `size`: samples behind one value of it."""
     if not found:
         return []
     shown = "; ".join(
@@ -106,7 +106,7 @@ def noise_changes(channel: Channel, found: Sequence[Change], size: int, words: W
 
 
 def hung(group: Group, words: Wording) -> Finding:
-    """Rows that repeat in a run."""
+    """Finding on rows that repeat in a run."""
     longest = max(group.runs, key=lambda run: run.length)
     told = (
         f"{longest.length} rows in a row repeat the one before exactly, from sample {words.at(longest.first_index)}: "
@@ -121,7 +121,7 @@ def hung(group: Group, words: Wording) -> Finding:
 
 
 def stands_still(group: Group, names: Sequence[str], words: Wording) -> Finding:
-    """One channel or triad that repeats in runs while others move."""
+    """Finding on one channel or triad that repeats in runs while others move."""
     longest = max(group.runs, key=lambda run: run.length)
     total, count = sum(run.length for run in group.runs), len(group.runs) + group.lost
     times = "once" if count == 1 else f"{count} times"
@@ -136,7 +136,7 @@ def stands_still(group: Group, names: Sequence[str], words: Wording) -> Finding:
 
 
 def copied(names: Sequence[str], repeats: int, alone: bool, words: Wording, settings: FitnessSettings) -> Finding:
-    """Channels that are copied; `alone`: there is no other channel that moves meanwhile."""
+    """Finding on copied channels; `alone`: no other channel moves meanwhile."""
     rate = words.rate_hz * (1.0 - repeats / max(words.seen - 1, 1))
     who = f"channel {names[0]}" if len(names) == 1 else f"channels {names[0]} … {names[-1]}"
     begin = f"{who}: {words.share(repeats)} repeat the one before exactly"

@@ -1,7 +1,7 @@
 """Recordings that are inspected while an analysis reads them: one pass serves both.
 
-The first pass over a recording's blocks is the inspection's too; where it ends with a refusal the analysis ends there,
-before it has judged anything. Outliers that are few can be mended for a second analysis.
+The first pass over a recording's blocks also serves the inspection; a refusal at its end stops the analysis before any
+result. A few outliers can be mended for a second analysis.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,13 +21,13 @@ WRONG_TEMPERATURES = (Kind.WRAPPED, Kind.WRONG_UNIT, Kind.NOT_FINITE)
 
 @dataclass(frozen=True)
 class Inspection:
-    """How the recordings of an analysis are inspected."""
+    """Settings for the inspection of an analysis's recordings."""
 
     settings: FitnessSettings = field(default_factory=FitnessSettings)
     channels: tuple[str, ...] | None = None
-    """Those whose findings matter to the analysis; None: all."""
+    """Channels whose findings matter to the analysis; None: all."""
     temperatures: bool = False
-    """Whether the analysis rests on temperatures; where it does not, those that cannot be right are warned of."""
+    """True if the analysis depends on temperatures; otherwise impossible ones only cause warnings."""
 
     def matters(self, found: ChannelFitness, channel: Channel) -> ChannelFitness | None:
         """The findings of a channel as far as they matter to the analysis."""
@@ -39,7 +39,7 @@ class Inspection:
         return replace(found, findings=tuple(wrong))
 
     def of_station(self, station: Station | None) -> FitnessSettings:
-        """What is expected of one recording: a station may turn on purpose, or feed a current in place of gravity."""
+        """Requirements on one recording: a station may turn on purpose, or feed a current in place of gravity."""
         if station is None:
             return self.settings
         turns, fed = station.turn is not None, station.current_ma is not None
@@ -58,16 +58,16 @@ class Watched:
 
     @property
     def info(self) -> RecordingInfo:
-        """Of the recording itself."""
+        """Description of the underlying recording."""
         return self._recording.info
 
     @property
     def is_read(self) -> bool:
-        """Whether a whole pass has been made."""
+        """True once a whole pass has been made."""
         return self._fitness is not None
 
     def blocks(self) -> Iterator[RawArray]:
-        """The blocks; the end of the first pass raises `UnfitRecording` where the recording is refused."""
+        """Yield the blocks; the end of the first pass raises `UnfitRecording` where the recording is refused."""
         if self._fitness is not None:
             yield from self._again()
             return
@@ -80,7 +80,7 @@ class Watched:
             (self._watch or Watch.of(self)).refuse()
 
     def fitness(self) -> tuple[ChannelFitness, ...]:
-        """The findings; where no analysis has read to the end, the recording is read for them."""
+        """The findings by channel; the recording is read for them unless an analysis has read it to the end."""
         if self._fitness is None:
             stream = self._stream()
             for block in self._recording.blocks():
@@ -91,16 +91,16 @@ class Watched:
 
     @property
     def refused(self) -> bool:
-        """Whether a finding forbids the analysis."""
+        """True if a finding forbids the analysis."""
         return any(f.refused for f in self.fitness())
 
     @property
     def has_outliers(self) -> bool:
-        """Whether there are some to mend."""
+        """True if there are outliers to mend."""
         return bool(self._outliers)
 
     def mend(self) -> None:
-        """From now on give the mean of its two neighbours for each outlier."""
+        """Replace each outlier in later passes by the mean of its two neighbours."""
         self._mended = True
 
     def _stream(self) -> FitnessStream:
@@ -137,20 +137,20 @@ class Watched:
 
 
 class Watch:
-    """The recordings of one analysis, and what is said of them together."""
+    """The recordings of one analysis, with their merged findings."""
 
     def __init__(self, recordings: Sequence[Recording], inspection: Inspection) -> None:
         self.recordings = tuple(Watched(r, inspection, self) for r in recordings)
 
     @classmethod
     def of(cls, watched: Watched) -> "Watch":
-        """Of one recording that is watched already."""
+        """Watch a single recording that is already a `Watched`."""
         watch = cls((), Inspection())
         watch.recordings = (watched,)
         return watch
 
     def refuse(self, but: Kind | None = None) -> None:
-        """Raise `UnfitRecording` with all refusals of all recordings, where there are any; `but` for one kind."""
+        """Raise `UnfitRecording` with all refusals of all recordings, if any, except those of kind `but`."""
         sentences = self._told(Severity.REFUSE, self.recordings, but)
         if not sentences:
             return
@@ -158,11 +158,11 @@ class Watch:
         raise UnfitRecording(alone + "; ".join(sentences))
 
     def warnings(self) -> tuple[str, ...]:
-        """What a person should know of the recordings that were read; those that no analysis read are not its own."""
+        """Warnings on the recordings that were read; a recording that the analysis did not read does not count."""
         return self._told(Severity.WARN, [r for r in self.recordings if r.is_read])
 
     def mend(self) -> bool:
-        """Mend the outliers of those that were read; whether there are any."""
+        """Mend the outliers of the recordings that were read; return whether there are any."""
         found = [r for r in self.recordings if r.is_read and r.has_outliers]
         for recording in found:
             recording.mend()

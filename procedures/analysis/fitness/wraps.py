@@ -1,7 +1,7 @@
 """Jumps of 2^n: signed counts that were read as unsigned, counters that wrap, temperatures of too few bits.
 
-Where a channel lies in a range of 2^n and every large difference of two samples is nearly 2^n, the jumps are made by
-the range and not by the quantity; taken modulo 2^n the channel is quiet.
+Where a channel lies in a range of 2^n and every large difference of two samples is nearly 2^n, the jumps come from the
+range and not from the quantity; taken modulo 2^n the channel is quiet.
 """
 
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ LEAST_BITS, MOST_BITS = 7, 33
 NEAR = 1.0 / 8.0
 """A jump is nearly 2^n within this part of it; other differences must be smaller than that."""
 OTHERS = 0.02
-"""Part of the large differences that may be of another size: outliers."""
+"""Share of the large differences that may have another size: outliers."""
 BETWEEN, SAMPLED = 0.05, 16
-"""So large a part of every sixteenth difference between an eighth and seven eighths of the largest: it is noise."""
+"""Share of every sixteenth difference between 1/8 and 7/8 of the largest from which on the jumps are noise."""
 TEMPERATURE_K = (128.0, 256.0)
 """Ranges of temperatures in whole or fractional kelvins of eight and nine bits."""
 
@@ -32,10 +32,10 @@ class Wrap:
 
 
 class Wraps:
-    """Counts jumps by their size."""
+    """Count the jumps of every channel by size."""
 
     def __init__(self, gains_k: list[float | None]) -> None:
-        """`gains_k`: kelvins a raw unit for each channel that is a temperature, None for others."""
+        """Start with no samples; `gains_k`: kelvins per raw unit of each temperature channel, None for others."""
         number = len(gains_k)
         self._gains = gains_k
         self._near = np.zeros((number, MOST_BITS + 1), np.int64)
@@ -44,7 +44,7 @@ class Wraps:
         self._kelvins = np.zeros((number, len(TEMPERATURE_K)), np.int64)
 
     def add(self, piece: Piece) -> None:
-        """The next piece."""
+        """Add the next piece of samples."""
         d = piece.d
         if not d.shape[1]:
             return
@@ -59,7 +59,7 @@ class Wraps:
                 self._count(c, row, piece.start + piece.x.shape[1] - len(row), gain)
 
     def found(self, c: int, low: float, high: float) -> Wrap | None:
-        """Of a channel whose values lie between `low` and `high`."""
+        """The wrap of a channel whose values lie between `low` and `high`, or None."""
         gain = self._gains[c]
         for size, count in zip(TEMPERATURE_K, self._kelvins[c].tolist(), strict=True):
             if gain is not None and count:

@@ -1,1 +1,1 @@
-"""What recordings of a unit at rest say of its noise: launches analysed from raw counts to Tables 4.1 and 4.2."""
+"""Noise of a unit from recordings at rest: launches analysed from raw counts to Tables 4.1 and 4.2."""

@@ -1,7 +1,7 @@
 """A launch at rest from raw counts to noise coefficients: two passes over its blocks, in bounded memory.
 
-The first pass inspects the samples and gathers cell means. They tell what to trim and to remove. The second pass takes
-what is faster than a cell from every sample after the trim; everything slower comes from the cells.
+The first pass inspects the samples and gathers cell means, which determine what is trimmed and removed. The second pass
+computes everything faster than a cell from every sample after the trim; everything slower comes from the cells.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,22 +24,22 @@ from procedures.core.errors import UnfitRecording
 from procedures.core.recording import Quantity, RawArray, Recording
 
 INSPECTION = Inspection(FitnessSettings())
-"""A launch is at rest throughout."""
+"""Inspection settings of a launch: the unit is at rest throughout."""
 FEWEST_CELLS = 120
-"""Fewer cells are no launch to analyse."""
+"""Fewest cells of a launch that can be analysed."""
 CROSSOVER = 0.03
-"""Of a cell's frequency: above it the spectrum is taken from every sample, below it from the cells, whose means fold
-the reading noise of all higher frequencies into theirs."""
+"""Share of the cell frequency above which the spectrum is taken from every sample; below it from the cells, whose means
+alias the reading noise of all higher frequencies."""
 SLOW_MODES = 64
-"""So many modes of the spectrum at least are taken from the cells."""
+"""Fewest modes of the spectrum that are taken from the cells."""
 LONG, AT_ONCE = 20_000_000, 2
-"""Of a recording of more samples than `LONG`, so many channels at once: memory is spared, and time spent reading."""
+"""A recording of more than `LONG` samples is analysed `AT_ONCE` channels at a time: less memory, more reading."""
 FEWEST_A_CELL = 8
-"""With fewer samples a cell nothing is gained by looking faster."""
+"""Fewest samples a cell for which the full rate is analysed; with fewer it adds no information."""
 
 
 def analyse_launch(recording: Recording, label: str, settings: LaunchSettings) -> LaunchNoise:
-    """Every channel but temperatures. Raises `UnfitRecording` naming recording, channel and value; `BadParameter`."""
+    """Analyse all channels but temperatures. Raises `UnfitRecording` (recording, channel, value) and `BadParameter`."""
     info = recording.info
     names = tuple(c.name for c in info.channels if c.quantity is not Quantity.TEMPERATURE)
     if not names:
@@ -68,7 +68,7 @@ def analyse_launch(recording: Recording, label: str, settings: LaunchSettings) -
 def _first_pass(
     recording: Recording, names: Sequence[str], settings: LaunchSettings
 ) -> tuple[Cells, dict[str, Beside]]:
-    """Cell means, temperatures' too, and what else is known, channel by channel. Raises `UnfitRecording`."""
+    """Gather cell means, also of temperatures, and the context of each channel. Raises `UnfitRecording`."""
     info = recording.info
     temperatures = temperature_names(info)
     columns = [info.column(name) for name in names]
@@ -97,14 +97,14 @@ def _first_pass(
 
 @dataclass
 class _Streams:
-    """What one channel's fast part gathers, once the samples that were trimmed have passed."""
+    """The streams of one channel's fast part, fed after the trimmed samples have passed."""
 
     deviation: DeviationStream
     powers: FastPowers
     trimmed: int
 
     def add(self, row: Array) -> None:
-        """The next samples, (n,) [rate]."""
+        """Add the next samples, (n,) [rate]."""
         passed = min(self.trimmed, len(row))
         self.trimmed -= passed
         if passed < len(row):
@@ -120,7 +120,7 @@ def _second_pass(
     *,
     correlate: bool,
 ) -> list[tuple[Deviation | None, Powers | None]]:
-    """Deviations at short times and powers at high frequencies, from every sample. Raises `Uncorrelatable`."""
+    """Compute deviations at short times and powers at high frequencies from every sample. Raises `Uncorrelatable`."""
     info = recording.info
     samples = cell_samples(info.rate_hz, settings.cell_s)
     crossover_hz = max(CROSSOVER * info.rate_hz / samples, SLOW_MODES * 0.5 / info.duration_s)

@@ -1,4 +1,4 @@
-"""What is known beside a channel's samples: findings, temperatures, and whether its noise is less than a count."""
+"""Context of a channel's samples: inspection findings, temperatures, and whether its noise is less than a count."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,13 +11,13 @@ from procedures.core.arrays import Array
 from procedures.core.recording import INCREMENTS, Channel, Quantity, RawArray, RecordingInfo
 
 LOOKED_AT = 200_000
-"""Samples of a channel from which its resolution is judged."""
+"""Number of first samples of a channel from which its resolution is judged."""
 COUNTER, CONVERTER = 0.35, 0.2
-"""Variance in counts² of samples below which the error of reading is no white noise.
+"""Variance of samples [counts²] below which the reading error is no white noise: of a counter, of a converter.
 
-A plain counter of an even turn has at most ¼, and ⅙ of evenly spread readings; one of independent readings with a
-triangular dither ½. Rates converted with rounding have 1/12 beside their own noise: below 0.12 (0.35 of a count) the
-rounded noise depends on where between two counts the mean lies.
+A plain counter at a constant rate has at most ¼, and ⅙ for evenly spread readings; one of independent readings with a
+triangular dither has ½. Rates converted with rounding have 1/12 in addition to their own noise: below 0.12 (0.35 of a
+count) the rounded noise depends on where between two counts the mean lies.
 """
 _SMOOTHED_CELLS, _SMOOTHED_PART = 61, 20
 _GROUPS = 256
@@ -25,17 +25,17 @@ _GROUPS = 256
 
 @dataclass(frozen=True)
 class Beside:
-    """Of one channel."""
+    """Findings, resolution and temperatures of one channel."""
 
     findings: tuple[str, ...] = ()
     coarse: str = ""
-    """A sentence where the noise is less than a count."""
+    """Sentence on a noise of less than a count; empty where it is more."""
     temperatures: dict[str, Array] = field(default_factory=dict[str, Array])
     """Cell means (n,) of each temperature channel [its unit]."""
 
 
 def temperature_names(info: RecordingInfo) -> tuple[str, ...]:
-    """The temperature channels."""
+    """The names of the temperature channels."""
     return tuple(c.name for c in info.channels if c.quantity is Quantity.TEMPERATURE)
 
 
@@ -69,7 +69,7 @@ def most_followed(series: Array, temperatures: dict[str, Array]) -> str | None:
 
 
 class Resolution:
-    """Gathers the variance of the first samples of channels that send whole counts."""
+    """Gather the variance of the first samples of channels that send whole counts."""
 
     def __init__(self, channels: Sequence[Channel]) -> None:
         self._channels = tuple(channels)
@@ -77,7 +77,7 @@ class Resolution:
         self._seen = 0
 
     def add(self, block: RawArray, columns: Sequence[int]) -> None:
-        """The next samples (n, …), of which these columns are the channels."""
+        """Add the next samples (n, …); `columns` are the indices of the channels."""
         if self._seen < LOOKED_AT:
             part = block[: LOOKED_AT - self._seen][:, list(columns)]
             self._parts.append(part)

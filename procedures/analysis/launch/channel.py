@@ -1,4 +1,4 @@
-"""One channel of one launch: curves, band, coefficients three ways, wavelet split, averaging time."""
+"""One channel of one launch: curves, band, coefficients by three methods, wavelet split, averaging time."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -35,11 +35,11 @@ from procedures.core.arrays import Array
 from procedures.core.units import DEVIATION_DISPLAY
 
 BAND_TERMS = 8
-"""The band ends where every start has about twice so many terms."""
+"""The band ends at the cluster time where every start still has about twice this number of terms."""
 
 
 _ROUNDING = 1e-12
-"""Of a series, so much may differ between its parts by rounding alone."""
+"""Relative difference within a part of a series that rounding alone may cause."""
 
 
 def channel_noise(
@@ -52,12 +52,12 @@ def channel_noise(
     beside: Beside,
     settings: LaunchSettings,
 ) -> ChannelNoise:
-    """Everything that is found of a channel; `fast` and `powers` are of every sample, None where there are none."""
+    """Analyse one channel completely; `fast` and `powers` come from every sample, None where the fast part is off."""
     cell_s, series = cells.cell_s, signal.cells
     slow = _deviation(series, cell_s, settings)
     whole = slow if fast is None else joined(fast, slow)
     graphical = read_off(whole)
-    # from one cell on: what the notch filter leaves of the dither stands above the model at shorter times
+    # from one cell on: at shorter times the residual dither behind the notch filter exceeds the model
     least_squares = fit_allan(whole, from_s=cell_s, level=settings.level, confidence=settings.confidence)
     found = found_noise(signal, cells, powers, beside, settings)
     likelihood, warnings = found.fit, found.warnings(rate_unit)
@@ -94,7 +94,7 @@ def channel_noise(
 
 
 def joined(fast: Deviation, slow: Deviation) -> Deviation:
-    """Short times from every sample, longer ones from the cells, as one Allan deviation of the former's rate."""
+    """One Allan deviation at the full rate: short cluster times from every sample, longer ones from the cells."""
     later = slow.tau_s > fast.tau_s[-1] * (1.0 + 1e-9)
     factor = round(fast.rate_hz / slow.rate_hz)
 
@@ -125,7 +125,7 @@ def _sizes(count: int, settings: LaunchSettings) -> Sizes:
 
 
 def _stages(steps: Sequence[Step], cell_s: float, settings: LaunchSettings) -> list[Stage]:
-    """Each step's curve from one cell on, and what is read off it."""
+    """The Allan curve of each step from one cell on, and the coefficients read off it."""
     found: list[Stage] = []
     for step in steps:
         curve = _deviation(step.cells, cell_s, settings)
@@ -134,7 +134,7 @@ def _stages(steps: Sequence[Step], cell_s: float, settings: LaunchSettings) -> l
 
 
 def _split(series: Array, cell_s: float, rate_unit: str, settings: LaunchSettings) -> list[Stage]:
-    """What the wavelet split keeps, to read N and B of, and what it removes, to read Q of (thesis 3.1.2)."""
+    """The part that the wavelet split keeps, to read N and B from, and the removed part, for Q (thesis 3.1.2)."""
     if settings.wavelet_rule is None:
         return []
     unit, size = DEVIATION_DISPLAY[rate_unit]
@@ -166,7 +166,7 @@ def _split(series: Array, cell_s: float, rate_unit: str, settings: LaunchSetting
 
 
 def _band(series: Array, cell_s: float, settings: LaunchSettings) -> BandCurve:
-    """From the cells: below one cell there is no band to see, and of few terms some start gives nearly nothing."""
+    """The band over all starts, from the cells: it vanishes below one cell; with few terms its minimum is near zero."""
     sizes = decade_sizes(ALLAN.largest(len(series)) // BAND_TERMS, 1.0 / settings.points_per_decade)
     stream = BandStream(1.0 / cell_s, len(series), sizes=sizes)
     stream.add(series)
@@ -197,7 +197,7 @@ def _of(estimate: Estimate) -> Reading:
 
 
 def _averaging(fit: NoiseFit) -> Averaging:
-    """From the efficient estimates, with their covariance."""
+    """The averaging time from the efficient estimates and their covariance."""
     if not (fit.quantization.described and fit.random_walk.described):
         return Averaging(None, None, "the noise model does not describe the fast part of the noise")
     covariance = np.zeros((len(PROCESSES), len(PROCESSES)))

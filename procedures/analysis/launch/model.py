@@ -1,4 +1,4 @@
-"""The likelihood fit of one channel, with what its rate follows beside noise, and sentences on what the model lacks."""
+"""The likelihood fit of one channel with its regressors (temperature, shift of the level), and the warnings on it."""
 
 from dataclasses import dataclass
 from math import log
@@ -18,15 +18,15 @@ from procedures.core.arrays import Array
 from procedures.core.units import DEVIATION_DISPLAY
 
 TEMPERATURE_LEVEL, TEMPERATURE_GAIN = 1e-3, 4.0
-"""Probability that a temperature which matters nothing is said to matter, and what it must gain over drifting noise."""
+"""Probability that an irrelevant temperature is accepted, and the required gain over drifting noise."""
 SHIFT_LEVEL, SHIFT_GAIN = 1e-3, 2.0
-"""The same of a shift of the level: a probability over all cells where it may be, a gain beside ln(cells)."""
+"""The same for a shift of the level: a probability over all cells where it may be, a gain in excess of ln(cells)."""
 SHOWN_LINES = 5
 
 
 @dataclass(frozen=True)
 class FoundNoise:
-    """What the likelihood says of a channel."""
+    """Results of the likelihood fit of a channel."""
 
     fit: NoiseFit
     coarse: str
@@ -35,12 +35,12 @@ class FoundNoise:
 
     @property
     def correlated(self) -> CorrelatedProcess | None:
-        """The Gauss–Markov process, where there is one."""
+        """The Gauss–Markov process of the fit, if any."""
         g = self.fit.gauss_markov
         return None if g is None else CorrelatedProcess(g.time_s, g.time_sd_s, g.driving, g.driving_sd, g.sd)
 
     def warnings(self, rate_unit: str) -> tuple[str, ...]:
-        """What a reader must know before believing a coefficient."""
+        """Warnings to read before a coefficient is trusted."""
         unit, size = DEVIATION_DISPLAY[rate_unit]
         found = [self.coarse] if self.coarse else list[str]()
         lines = [] if self.coarse else sorted(self.fit.lines, key=lambda line: -line.amplitude)
@@ -65,7 +65,7 @@ class FoundNoise:
         return (*found, *self._model(unit, size), *self.fit.remarks)
 
     def _model(self, unit: str, size: float) -> tuple[str, ...]:
-        """On what the model has beside the five coefficients."""
+        """Sentences on the extension of the five-coefficient model."""
         g, corner = self.fit.gauss_markov, self.fit.flicker_corner_s
         found: list[str] = []
         if g is not None:
@@ -82,7 +82,7 @@ class FoundNoise:
 def found_noise(
     signal: CleanSignal, cells: Cells, powers: Powers | None, beside: Beside, settings: LaunchSettings
 ) -> FoundNoise:
-    """Fits what is left of a channel's cells, with the likeliest temperature and shift of the level as regressors."""
+    """Fit the noise of a channel's clean cells, with the likeliest temperature and shift of the level as regressors."""
     series, cell_s = signal.cells, cells.cell_s
     temperatures = {name: row[signal.first_cell :] for name, row in beside.temperatures.items()}
     followed = most_followed(series, {n: row for n, row in temperatures.items() if np.ptp(row) > 0.0})

@@ -1,4 +1,4 @@
-"""How well a static run will know a unit's noise: Cramér-Rao bounds from the spectrum, before anything moves."""
+"""Predicted uncertainty of noise coefficients from a static run: Cramér-Rao bounds from the expected spectrum."""
 
 from dataclasses import dataclass
 from math import pi, sqrt
@@ -12,21 +12,21 @@ from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import GYRO
 
 CELL_S = 1.0
-"""Faster parts of the spectrum are left out of the bound: what they tell more of is quantization alone."""
+"""Cell length; the bound omits the faster part of the spectrum, which improves the quantization alone."""
 MOST_MODES = 200_000
-"""Longer records are taken with longer cells."""
+"""Most cells of a record; longer records use longer cells."""
 SURE = 2.33
-"""A coefficient of less than so many standard uncertainties of its square is likely to be reported as not observed
-(one-sided test at 1 %)."""
+"""Least ratio of a coefficient's square to the square's standard uncertainty; below it the coefficient is likely to be
+reported as not observed (one-sided test at 1 %)."""
 
 
 @dataclass(frozen=True)
 class PredictedCoefficient:
-    """One noise coefficient that is expected and how well it will be known."""
+    """One expected noise coefficient and the uncertainty of its estimate."""
 
     process: str
     unit: str
-    """SI."""
+    """SI unit of the coefficient."""
     value: float
     standard_uncertainty: float
     square_ratio: float
@@ -70,7 +70,7 @@ def predicted_noise(
 
 
 def unresolved_noise(channel: str, noise: NoiseCoefficients, duration_s: float) -> list[str]:
-    """A sentence for each process that one launch is too short to tell from the others."""
+    """A sentence for each process that one launch is too short to distinguish from the others."""
     shown = units.NOISE_DISPLAY["rad/s" if channel in GYRO else "m/s^2"]
     sentences: list[str] = []
     for p in predicted_noise(channel, noise, duration_s):

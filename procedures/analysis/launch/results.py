@@ -1,4 +1,4 @@
-"""What is found of one launch, channel by channel: plain values, SI, ready to be stored.
+"""Results of the analysis of one launch, channel by channel: plain values in SI, ready to be stored.
 
 *Rate* is a channel's own: angular rate [rad/s], specific force [m/s²], or counts.
 """
@@ -11,72 +11,72 @@ PROCESSES = ("quantization", "random_walk", "bias_instability", "rate_random_wal
 
 @dataclass(frozen=True)
 class Reading:
-    """One coefficient by one way. `value` is None where the process was not observed."""
+    """One coefficient by one method. `value` is None where the process was not observed."""
 
     value: float | None
     standard_uncertainty: float | None = None
     lower: float | None = None
     upper: float | None = None
-    """Ends of the interval at the confidence asked for."""
+    """Ends of the interval at the requested confidence."""
     upper_limit: float | None = None
     """The coefficient is below this with a probability of 95 % (one-sided), observed or not."""
     p_value: float | None = None
-    """How probable the data are without the process."""
+    """Probability of such data without the process."""
     from_s: float | None = None
     to_s: float | None = None
-    """Where on the plot a graphical value was read."""
+    """Range of cluster times on the plot where a graphical value was read."""
     described: bool = True
-    """False: the noise model does not describe the record where this is read; the limit holds whatever is there."""
+    """False: the noise model does not describe the part of the record that determines this; the limit still holds."""
 
 
 @dataclass(frozen=True)
 class SpectralLine:
-    """A line that was taken out of the record before its noise was fitted."""
+    """A line that was removed from the record before its noise was fitted."""
 
     frequency_hz: float
     amplitude: float
-    """Of the sine [rate]."""
+    """Amplitude of the sine [rate]."""
 
 
 @dataclass(frozen=True)
 class CorrelatedProcess:
-    """A Gauss–Markov process ``dx/dt = −x/τ + q·w`` beside the five."""
+    """A Gauss–Markov process ``dx/dt = −x/τ + q·w`` in addition to the five."""
 
     time_s: float
     time_sd_s: float | None
     driving: float
-    """q [rate/√s]."""
+    """Driving noise q [rate/√s]."""
     driving_sd: float | None
     sd: float
-    """Of the process, q·√(τ/2) [rate]."""
+    """Standard deviation of the process, q·√(τ/2) [rate]."""
 
 
 @dataclass(frozen=True)
 class TemperatureSlope:
-    """How the channel follows a temperature beside it."""
+    """Dependence of the channel on a recorded temperature."""
 
     channel: str
-    """The temperature's."""
+    """Name of the temperature channel."""
     slope: float
-    """[rate/K], of a temperature in °C; else a count of it."""
+    """[rate/K] for a temperature in °C, else rate per count of it."""
     standard_uncertainty: float
     p_value: float
 
 
 @dataclass(frozen=True)
 class LevelShift:
-    """One shift of the level."""
+    """One shift of the rate's level."""
 
     at_s: float
-    """Since the launch."""
+    """Time since the launch."""
     height: float
-    """[rate]"""
+    """Height of the shift [rate]."""
     standard_uncertainty: float
 
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One noise process three ways."""
+    """One noise process by the three methods."""
 
     process: str
     graphical: Reading
@@ -86,7 +86,7 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class Curve:
-    """An overlapping Allan deviation with its intervals; lists go with `tau_s`."""
+    """An overlapping Allan deviation with its intervals; all lists run parallel to `tau_s`."""
 
     tau_s: tuple[float, ...]
     deviation: tuple[float, ...]
@@ -107,7 +107,7 @@ class BandCurve:
 
 @dataclass(frozen=True)
 class Stage:
-    """The channel after one step of the analysis: what each step changes is seen from stage to stage."""
+    """The channel after one step of the analysis; successive stages show the effect of each step."""
 
     name: str
     """"as recorded", "trimmed", "self-heating removed", "kept by the wavelet split", "removed by the wavelet split"."""
@@ -143,17 +143,17 @@ class Transient:
     shape: str
     """"one exponential", "two exponentials", "raised cosine" or "ended exponential"."""
     amplitude: float
-    """At the first sample [rate]."""
+    """Amplitude at the first sample [rate]."""
     amplitude_sd: float
     end_s: float
-    """Where it falls below `level` for good."""
+    """Time after which it stays below `level`."""
     end_sd_s: float
     has_ended: bool
-    """Within the record."""
+    """True if it ends within the record."""
     level: float
     """[rate]: a tenth of the noise's Allan deviation at 70 s."""
     p_value: float
-    """How probable so much of a transient is in noise alone."""
+    """Probability that noise alone shows a transient of this strength."""
 
 
 @dataclass(frozen=True)
@@ -165,12 +165,12 @@ class SelfHeating:
     constant: float
     constant_sd: float
     p_value: float
-    """How probable so much of the last term is in noise and the other term alone."""
+    """Probability that noise and the other term alone show a last term of this strength."""
 
 
 @dataclass(frozen=True)
 class Averaging:
-    """Where the quantization line falls below the rest; None where it does nowhere, with the reason."""
+    """Averaging time from which on quantization lies below the rest; None, with the reason, where there is none."""
 
     time_s: float | None
     standard_uncertainty_s: float | None
@@ -179,17 +179,17 @@ class Averaging:
 
 @dataclass(frozen=True)
 class ChannelNoise:
-    """Everything that is found of one channel in one launch."""
+    """All results of one channel in one launch."""
 
     channel: str
     rate_unit: str
     mean: float
-    """Of the rate, over what was analysed."""
+    """Mean rate over the analysed part of the record."""
     used_from_s: float
     """Time since launch from which on the channel was analysed."""
     used_s: float
     findings: tuple[str, ...]
-    """What the inspection of the samples says."""
+    """Sentences of the inspection of the samples."""
     warm_up: Transient | None
     self_heating: SelfHeating | None
     trend: Trend
@@ -198,12 +198,12 @@ class ChannelNoise:
     coefficients: tuple[Coefficient, ...]
     disagreements: tuple[str, ...]
     model: tuple[str, ...]
-    """What the likelihood's model does not describe: spectral lines, frequencies left out."""
+    """Sentences on features that the likelihood's model does not describe: spectral lines, excluded frequencies."""
     averaging: Averaging
     warnings: tuple[str, ...] = ()
-    """Those of `model` that a reader must know; the rest are notes on what one record does not tell apart."""
+    """The warnings in `model`; its other sentences are notes on processes that one record cannot distinguish."""
     bandwidth_hz: float = 0.0
-    """Half of the rate of the samples: a random walk is that of noise so wide, unless a filter's edge is named."""
+    """Half of the sampling rate: the bandwidth to which a random walk refers, unless a filter's edge is named."""
     band_hz: tuple[float, float] = (0.0, 0.0)
     """Lowest and highest frequency that the likelihood uses."""
     lines: tuple[SpectralLine, ...] = ()
@@ -214,18 +214,18 @@ class ChannelNoise:
     shift: LevelShift | None = None
 
     def coefficient(self, process: str) -> Coefficient:
-        """One of the five processes."""
+        """The coefficient of one of the five processes."""
         return self.coefficients[PROCESSES.index(process)]
 
     @property
     def analysed(self) -> Stage:
-        """The stage that the coefficients are of: the last before the wavelet split."""
+        """The stage that the coefficients refer to: the last before the wavelet split."""
         return [s for s in self.stages if "wavelet" not in s.name][-1]
 
 
 @dataclass(frozen=True)
 class LaunchNoise:
-    """One launch: which recording, how long, and its channels."""
+    """Noise of one launch: recording, duration, and the results of its channels."""
 
     recording: str
     label: str

@@ -1,4 +1,4 @@
-"""What may be set in the analysis of a launch at rest; each step can be switched."""
+"""Settings of the analysis of a launch at rest; each step can be switched off."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -8,22 +8,22 @@ WaveletRule = Literal["thesis", "rescaled"]
 
 @dataclass(frozen=True)
 class LaunchSettings:
-    """SI. The defaults are what `procedures.launches` gives; ranges are checked there."""
+    """Settings of a launch analysis, in SI. `procedures.launches` sets the same defaults and checks the ranges."""
 
     cell_s: float = 1.0
-    """Cell whose means the slow part of the analysis works on."""
+    """Length of the cells whose means the slow part of the analysis uses."""
     fast: bool = True
-    """Also use what is faster than a cell, from every sample."""
+    """Also analyse the part faster than a cell, from every sample."""
     trim_gyros: bool = True
     trim_accelerometers: bool = False
     trim_s: float | None = None
-    """Instead of what is detected: trim so long since the launch."""
+    """Time since the launch to trim, in place of the detected end of the warm-up."""
     heating_gyros: bool = False
     heating_accelerometers: bool = True
     wavelet_rule: WaveletRule | None = "rescaled"
-    """None: no split."""
+    """Rule of the wavelet thresholds; None: no split."""
     wavelet_levels: int = 6
     confidence: float = 0.95
     level: float = 0.01
-    """Probability with which a process that is absent is reported present."""
+    """Probability with which an absent process is reported present."""
     points_per_decade: int = 10

@@ -1,4 +1,4 @@
-"""One channel's cell means made fit for noise analysis: warm-up trimmed, self-heating removed; each step on record."""
+"""Preparation of one channel's cell means for noise analysis: warm-up trimmed, self-heating removed, steps logged."""
 
 from dataclasses import dataclass, field
 from math import ceil
@@ -15,12 +15,12 @@ from procedures.core.recording import ACCELEROMETER
 
 TREND_POINTS = 300
 LEAST_LEFT = 0.25
-"""Of the record, so much must remain after trimming."""
+"""Least share of the record that must remain after trimming."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """The series after a step, (n,) [rate], and what the step was."""
+    """The series after a step, (n,) [rate], with the step's name and a note."""
 
     name: str
     cells: Array
@@ -29,12 +29,12 @@ class Step:
 
 @dataclass(frozen=True)
 class CleanSignal:
-    """What the analysis works on, and how it came to be."""
+    """The cleaned series of one channel, and the steps that produced it."""
 
     steps: tuple[Step, ...]
-    """As recorded first; the last is what is analysed."""
+    """The series as recorded comes first; the last one is analysed."""
     first_cell: int
-    """Cells that were trimmed."""
+    """Number of cells that were trimmed."""
     warm_up: Transient | None
     self_heating: SelfHeating | None
     trend: Trend
@@ -42,12 +42,12 @@ class CleanSignal:
 
     @property
     def cells(self) -> Array:
-        """What is analysed, (n,) [rate]."""
+        """The series to analyse, (n,) [rate]."""
         return self.steps[-1].cells
 
 
 def clean_signal(channel: str, cells: Array, cell_s: float, start_s: float, settings: LaunchSettings) -> CleanSignal:
-    """Trim what the settings say, then subtract F(t) − F(t₀) (thesis 3.1.3); `start_s` since the launch."""
+    """Trim the warm-up as set, then subtract F(t) − F(t₀) (thesis 3.1.3); `start_s` since the launch."""
     is_accelerometer = channel in ACCELEROMETER
     steps = [Step("as recorded", cells)]
     findings: list[str] = []
@@ -110,7 +110,7 @@ def _middles(count: int, cell_s: float, start_s: float) -> Array:
 
 
 def _trend(cells: Array, fitted: Array, cell_s: float, start_s: float) -> Trend:
-    """Means of as many cells as leave `TREND_POINTS`; a transient is shown on the level of the record's last half."""
+    """Means over groups of cells, about `TREND_POINTS`; a transient is drawn at the level of the record's last half."""
     size = max(1, len(cells) // TREND_POINTS)
     count = len(cells) // size
     rate = cells[: count * size].reshape(count, size).mean(axis=1)

@@ -1,4 +1,4 @@
-"""What several launches say together of one channel: means, their uncertainty, and the noise to count on."""
+"""Summary of several launches by channel: mean coefficients, their uncertainty, and the noise to plan with."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,39 +13,39 @@ from procedures.core.noise import NoiseCoefficients
 
 @dataclass(frozen=True)
 class MeanCoefficient:
-    """One process over the launches, by the likelihood fit."""
+    """One noise process over all launches, by the likelihood fit."""
 
     process: str
     values: tuple[Reading, ...]
-    """One a launch."""
+    """One reading per launch."""
     mean: float | None
-    """A launch where it was not observed counts as zero; None where no launch shows it."""
+    """Mean over the launches; one that does not show the process counts as zero. None where none shows it."""
     sd: float | None
-    """Standard uncertainty of the mean: the greater of what the fits claim and what the launches scatter."""
+    """Standard uncertainty of the mean: the greater of that from the fits and that from the scatter of the launches."""
 
 
 @dataclass(frozen=True)
 class ChannelSummary:
-    """One channel over all launches."""
+    """Summary of one channel over all launches."""
 
     channel: str
     rate_unit: str
     means: tuple[MeanCoefficient, ...]
     averaging_time_s: float | None
     mean_change_sd: float | None
-    """Sample standard deviation (n − 1) of the mean rate over the launches; None with one."""
+    """Sample standard deviation (n − 1) of the mean rate over the launches; None for a single launch."""
 
     def mean(self, process: str) -> MeanCoefficient:
-        """One of the five processes."""
+        """The mean coefficient of one of the five processes."""
         return self.means[PROCESSES.index(process)]
 
     @property
     def noise(self) -> NoiseCoefficients:
-        """The coefficients to count on in a plan."""
+        """The noise coefficients to plan with."""
         return _coefficients(self.means)
 
     def noise_over(self, known: NoiseCoefficients | None) -> NoiseCoefficients:
-        """The same for a unit's record: what the model does not describe stays as it is known, or is its limit."""
+        """Coefficients for a unit's record; one that the model does not describe keeps its `known` value, or limit."""
         changed: dict[str, float] = {}
         for m in self.means:
             if m.mean is None and not all(reading.described for reading in m.values):
@@ -55,7 +55,7 @@ class ChannelSummary:
 
 
 def summarise(launches: Sequence[LaunchNoise]) -> tuple[ChannelSummary, ...]:
-    """One entry a channel, in the order of the first launch's; a channel must be in every launch."""
+    """Summarise each channel, in the order of the first launch; a channel must be in every launch."""
     found: list[ChannelSummary] = []
     for index, first in enumerate(launches[0].channels):
         channels = [launch.channels[index] for launch in launches]
@@ -80,11 +80,11 @@ def _mean(process: str, channels: Sequence[ChannelNoise]) -> MeanCoefficient:
 
 
 def _averaging_time_s(noise: NoiseCoefficients) -> float | None:
-    """None where quantization rules nowhere, or everywhere."""
+    """The averaging time from the mean coefficients; None where quantization dominates nowhere, or everywhere."""
     return averaging_time(noise).tau_s or None
 
 
 def _coefficients(means: Sequence[MeanCoefficient]) -> NoiseCoefficients:
-    """In the order of `PROCESSES`; zero where a process was not observed."""
+    """The means as coefficients, in the order of `PROCESSES`; zero where a process was not observed."""
     q, n, b, k, r = (m.mean or 0.0 for m in means)
     return NoiseCoefficients(q, n, b, k, r)

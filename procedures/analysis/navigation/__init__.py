@@ -1,1 +1,1 @@
-"""What residual errors of a unit do to navigation: alignment, and the growth of errors of a stationary system."""
+"""Effect of a unit's residual errors on navigation: alignment, and the error growth of a stationary system."""

@@ -30,7 +30,7 @@ class InitialAttitude:
     angles_rad: Array
     """(heading, pitch, roll), shape (3,)."""
     covariance: Array
-    """Of the three, shape (3, 3)."""
+    """Covariance of the three angles, shape (3, 3)."""
     per_force: Array
     """∂(heading, pitch, roll)/∂(specific force) [rad/(m/s²)], shape (3, 3)."""
     per_rate: Array
@@ -38,7 +38,7 @@ class InitialAttitude:
     magnitude_errors: Array
     """|f| − g [m/s²], |ω| − Ω [rad/s], and the upward part of ω minus Ω·sin L [rad/s], shape (3,)."""
     magnitude_sd: Array
-    """Their expected standard deviations, shape (3,)."""
+    """Expected standard deviations of the magnitude errors, shape (3,)."""
 
 
 def rotation_nb(heading_rad: float, pitch_rad: float, roll_rad: float) -> Array:
@@ -47,7 +47,7 @@ def rotation_nb(heading_rad: float, pitch_rad: float, roll_rad: float) -> Array:
 
 
 def require_alignable(latitude_deg: float) -> None:
-    """Refuse a place where no heading can be found: `BadParameter`."""
+    """Refuse a latitude at which no heading can be determined. Raises `BadParameter`."""
     if abs(latitude_deg) > LATITUDE_MAX_DEG:
         raise BadParameter(
             "latitude_deg",
@@ -102,7 +102,7 @@ def azimuth_error(
 
     ``δ = b_aE·tan L/g + (b_gE + R/√T + Δφ/T)/(Ω·cos L)``, with b the instabilities of the east biases, R the angle
     random walk and Δφ the turn of the base meanwhile. The sum of the magnitudes is an upper figure; the second is the
-    root of the sum of their squares, what independent standard uncertainties give.
+    root of the sum of their squares, as for independent standard uncertainties.
     """
     require_alignable(latitude_deg)
     latitude = latitude_deg * units.DEG
@@ -123,7 +123,7 @@ class ThesisPrediction:
     """Azimuth error of one alignment by thesis 1.1: in-run noise alone, no calibration, launch or table in it."""
 
     added_deg: float
-    """The parts' magnitudes added, as printed."""
+    """Sum of the parts' magnitudes, as printed."""
     independent_deg: float
     """Root of the sum of their squares."""
 
@@ -146,7 +146,7 @@ def thesis_prediction(unit: Unit, site: Site, base_turn_arcsec: float, alignment
 
 
 def _angles(force: Array, rate: Array) -> Array:
-    """(heading, pitch, roll) [rad]."""
+    """Heading, pitch and roll of an attitude [rad]."""
     pitch = float(np.arctan2(force[0], np.hypot(force[1], force[2])))
     roll = float(np.arctan2(-force[2], force[1]))
     level = rotation_nb(0.0, pitch, roll) @ rate

@@ -1,8 +1,8 @@
-"""From residual errors of a unit to position, velocity and attitude over hours: covariance by source.
+"""Growth of position, velocity and attitude errors over hours from a unit's residual errors: covariance by source.
 
 The navigator is linear (`error_model`), so its error is a sum over sources: constants, noise, initial alignment. Noise
-enters as the means over even cells of time, whose covariance `station_noise` has: white, flicker and rate random walk
-alike, and what the alignment saw is tied to what navigation sees after it.
+enters as the means over even cells of time, whose covariance `station_noise` gives: white, flicker and rate random walk
+alike, so that the noise of the alignment is correlated with that of the navigation after it.
 """
 
 from collections.abc import Mapping
@@ -20,13 +20,13 @@ from procedures.core.arrays import Array
 from procedures.core.noise import NoiseCoefficients
 
 POINTS = 60
-"""Times at which the growth is told, beside zero."""
+"""Number of times, in addition to zero, at which the growth is reported."""
 CELLS = 4
-"""Cells of noise between two of them. Over a day a cell is 6 min, a fourteenth of the Schuler period: against cells
+"""Cells of noise between two such times. Over a day a cell is 6 min, a fourteenth of the Schuler period: against cells
 four times as short, standard deviations of position differ by 0.3 %, of tilts and velocities by 1.5 % (measured).
 """
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(200)
-"""Over the angle of the circle; against ten times as many nodes the radius differs by 1e-9 at most (measured)."""
+"""Quadrature over the circle's angle; with ten times as many nodes the radius differs by 1e-9 at most (measured)."""
 SLOW = {
     "random walk": "random_walk",
     "bias instability": "bias_instability",
@@ -37,16 +37,16 @@ SLOW = {
 
 @dataclass(frozen=True)
 class Alignment:
-    """How the navigator got its first attitude."""
+    """Source of the navigator's initial attitude."""
 
     duration_s: float | None = None
-    """It aligned itself for so long, with these very sensors; None: the attitude was given."""
+    """Duration of the self-alignment with the same sensors; None: the attitude was given."""
     tilt_sd_rad: float = 0.0
-    """Of a given attitude, about each horizontal axis."""
+    """Standard deviation of a given attitude about each horizontal axis."""
     heading_sd_rad: float = 0.0
     velocity_sd_m_s: float = 0.0
     warm_up_s: float = 0.0
-    """Since launch, before it began."""
+    """Time from the launch to the beginning of the alignment."""
 
 
 @dataclass(frozen=True)
@@ -54,13 +54,13 @@ class Growth:
     """Covariance of the navigator's errors over time."""
 
     time_s: Array
-    """Shape (m,), from zero on."""
+    """Times from zero on, shape (m,)."""
     by_source: Mapping[str, Array]
-    """Each (m, 9, 9), over `error_model.STATES`."""
+    """Covariances by source, each (m, 9, 9), over `error_model.STATES`."""
 
     @property
     def total(self) -> Array:
-        """All sources together, which are independent, shape (m, 9, 9)."""
+        """Sum over the independent sources, shape (m, 9, 9)."""
         return np.sum(list(self.by_source.values()), axis=0)
 
 
@@ -102,7 +102,7 @@ def constant_error(place: Place, alignment: Alignment, inputs: Array, duration_s
 
 
 def radius_containing(probability: float, covariance: Array) -> float:
-    """Radius [m] of the circle about the truth with so much of a Gaussian of zero mean and covariance (2, 2).
+    """Radius [m] of the circle about the truth that contains `probability` of a Gaussian of covariance (2, 2).
 
     ``P(R) = ∫ φ(x/σ₁)/σ₁·erf(√(R² − x²)/(σ₂√2)) dx`` over −R…R in the ellipse's own axes, σ₁ the larger.
     """
@@ -120,7 +120,7 @@ def radius_containing(probability: float, covariance: Array) -> float:
 
 
 def _responses_to_constants(place: Place, grid: Responses, alignment: Alignment) -> Array:
-    """Errors over the grid per constant sensor error, (n + 1, 9, 6): navigation and, where it did, self-alignment."""
+    """Errors over the grid per constant sensor error, (n + 1, 9, 6), from navigation and any self-alignment."""
     answer = grid.of_constant
     return answer if alignment.duration_s is None else answer + grid.transition @ self_alignment(place)
 
@@ -155,14 +155,14 @@ def _noise_growth(
 
 
 class _CellCovariances:
-    """Covariances of the means over the alignment and the cells; those of unit noise are made once."""
+    """Covariances of the means over the alignment and the cells; those of unit noise are computed once."""
 
     def __init__(self, windows: Array) -> None:
         self._windows = windows
         self._unit: dict[tuple[str, tuple[float, float]], Array] = {}
 
     def of(self, noise: NoiseCoefficients, name: str) -> Array:
-        """Of one kind of noise of a channel, shape (n + 1, n + 1) [rate²]; quantization counts in the first window."""
+        """Covariance of one noise process, shape (n + 1, n + 1) [rate²]; quantization counts in the first window."""
         size: float = getattr(noise, name)
         covariance = size**2 * self._of_unit(name, noise.flicker_band_s) if size > 0.0 else self._none()
         if name == "random_walk":
@@ -180,7 +180,7 @@ class _CellCovariances:
 
 
 def _carried(start: Array, of_cell: Array, covariance: Array) -> Array:
-    """Σ over pairs of cells: errors per mean of the alignment, start (n + 1, 9), and per cell, of_cell (n, 9)."""
+    """Sum over pairs of cells: errors per mean of the alignment, start (n + 1, 9), and per cell, of_cell (n, 9)."""
     total = np.zeros((POINTS + 1, 9, 9))
     for m in range(POINTS + 1):
         k = m * CELLS

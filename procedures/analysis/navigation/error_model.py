@@ -21,16 +21,16 @@ and longitude [rad] and height [m]."""
 TILT_NORTH, HEADING, TILT_EAST, V_NORTH, V_UP, V_EAST, LATITUDE, LONGITUDE, HEIGHT = range(9)
 
 EARTH_RADIUS_M = 6_371_000.0
-"""Of the sphere (S 4.1): with g = 9.81 m/s² the Schuler period is 84.4 min. The ellipsoid's radii of curvature differ
-from it by up to 0.6 %, and the answer as much."""
+"""Sphere's radius (S 4.1): with g = 9.81 m/s² the Schuler period is 84.4 min. The ellipsoid's radii of curvature differ
+from it by up to 0.6 %, and the result as much."""
 
 LATITUDE_MAX_DEG = 89.0
-"""Nearer to a pole longitude and heading have no use: the equations divide by cos L."""
+"""Greatest latitude: nearer to a pole longitude and heading degenerate, as the equations divide by cos L."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where the navigator stands, as far as its errors care."""
+    """Place of the navigator, as far as it affects the errors."""
 
     latitude_rad: float
     gravity_m_s2: float
@@ -47,12 +47,12 @@ class Place:
 
     @property
     def schuler_rad_s(self) -> float:
-        """``ω₀ = √(g/R)`` (S 4.10)."""
+        """Schuler frequency ``ω₀ = √(g/R)`` (S 4.10)."""
         return float(np.sqrt(self.gravity_m_s2 / self.radius_m))
 
     @property
     def horizontal_rate_rad_s(self) -> float:
-        """``Ω·cos L``, what a gyrocompass lives on."""
+        """Horizontal Earth rate ``Ω·cos L``, the input of a gyrocompass."""
         return self.earth_rate_rad_s * float(np.cos(self.latitude_rad))
 
     @property
@@ -95,13 +95,13 @@ def dynamics(place: Place) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Responses:
-    """Answers of the navigator on an even grid of n + 1 times from zero on."""
+    """Responses of the navigator on an even grid of n + 1 times from zero on."""
 
     step_s: float
     transition: Array
     """Φ(t): errors at t per initial error, shape (n + 1, 9, 9)."""
     of_cell: Array
-    """Errors after j + 1 steps per input that was there in the first step alone, shape (n, 9, 6)."""
+    """Errors after j + 1 steps per input applied in the first step alone, shape (n, 9, 6)."""
 
     @property
     def of_constant(self) -> Array:
@@ -126,8 +126,8 @@ def self_alignment(place: Place) -> Array:
 
     Levelling puts the measured specific force upright, gyrocompassing the measured rate to the north (S 3.163-3.166):
     ``β₀ = −a_N/g``, ``χ₀ = a_E/g``, ``α₀ = (χ₀·Ω sin φ − e_E)/(Ω cos φ)``: the error of thesis 1.1. Accelerometers
-    that stay as they are leave such a navigator almost at rest: an east one altogether, a north one but for a drift of
-    ``a_N/g·Ω``, since its tilt is a mistake of latitude.
+    with constant errors leave such a navigator almost at rest: an east one entirely, a north one except for a drift of
+    ``a_N/g·Ω``, since its tilt acts as an error of latitude.
     """
     initial = np.zeros((9, 6))
     initial[TILT_EAST, 3] = -1.0 / place.gravity_m_s2

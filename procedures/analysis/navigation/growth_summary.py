@@ -1,4 +1,4 @@
-"""What a person is told of an error growth: curves, shares, one sentence, and what it does not hold for."""
+"""Summary of an error growth for the report: curves, one sentence, and the warnings on its validity."""
 
 from dataclasses import dataclass
 
@@ -60,7 +60,7 @@ def greatest(growth: Growth) -> tuple[float, float]:
 
 
 def sentence(radius_m: float, own_m: float | None, uncalibrated_m: float | None, linear: bool) -> str:
-    """What the calibration buys, in plain words."""
+    """The benefit of the calibration in one sentence."""
     said = f"After one hour parked, the position is within {radius_m:.3g} m of the truth with 95 %"
     if own_m is None:
         return said + "."
@@ -71,7 +71,7 @@ def sentence(radius_m: float, own_m: float | None, uncalibrated_m: float | None,
 
 
 def warnings(gyro: TriadErrors, accelerometer: TriadErrors, has_launch: bool) -> tuple[str, ...]:
-    """What is missing from the figures."""
+    """Warnings on contributions missing from the figures."""
     found = [
         f"the noise of the {name} triad is not known and counts as none"
         for name, errors in (("gyro", gyro), ("accelerometer", accelerometer))

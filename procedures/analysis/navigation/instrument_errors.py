@@ -17,16 +17,16 @@ GIVEN = "given"
 
 @dataclass(frozen=True)
 class TriadErrors:
-    """What one triad's corrected vector may be wrong by, in the unit's axes and SI."""
+    """Errors of one triad's corrected vector, in the unit's axes and SI."""
 
     constant: Mapping[str, Array]
-    """Covariance of errors that last as long as the launch, by source, each (3, 3)."""
+    """Covariance of errors that are constant during a launch, by source, each (3, 3)."""
     noise: tuple[NoiseCoefficients, ...] = ()
-    """Of the channels x, y, z; empty where it is not known."""
+    """Noise of the channels x, y, z; empty where it is not known."""
     of_channels: Array = field(default_factory=lambda: np.eye(3))
     """Error of the corrected vector per error of each channel: K⁻¹, shape (3, 3)."""
     uncalibrated: Array | None = None
-    """What the nominal outputs would be wrong by, ``U − v = b + (K − 1)·v``, shape (3,); None where it is not known."""
+    """Error of the nominal outputs, ``U − v = b + (K − 1)·v``, shape (3,); None where it is not known."""
 
 
 def calibrated_triad(calibration: TriadCalibration, record: TriadRecord | None, vector_b: Array) -> TriadErrors:
@@ -53,7 +53,7 @@ def calibrated_triad(calibration: TriadCalibration, record: TriadRecord | None, 
 def declared_triad(
     bias_sd: float, scale_sd: float, misalignment_sd_rad: float, noise: NoiseCoefficients, vector_b: Array
 ) -> TriadErrors:
-    """Errors of a triad of which only standard uncertainties are declared, alike and independent on all axes.
+    """Errors of a triad from declared standard uncertainties, equal and independent on all axes.
 
     ``var(δv_i) = σ_b² + (σ_s·v_i)² + Σ_{j≠i}(σ_m·v_j)²`` [SI].
     """

@@ -1,8 +1,8 @@
-"""Was a unit moved while it was aligned? A step of its attitude within the recording, by accelerometers and gyros.
+"""Detection of a unit's motion during alignment: a step of its attitude, by accelerometers and gyros.
 
 A step of the attitude turns the horizontal specific force, ``δf = −δθ × f``, for good, and puts its whole angle into
 the gyros at once. Accelerometers show tilt alone; gyros show heading too, where their noise is low enough. Both are
-judged against how the recording scatters elsewhere, so that slow noise and warming up are no knock:
+judged against the scatter of the rest of the recording, so that slow noise and warming up are no knock:
 
 * accelerometers: differences of the means over `SPAN` cells after and before each cell, less their median, over their
   median deviation; white noise of the cells gives the least that deviation may be.
@@ -20,12 +20,12 @@ from procedures.core.imu_model import TriadCalibration, correct
 from procedures.core.recording import TRIADS, Recording
 
 CELLS = 200
-"""Parts of a recording, as far as it has as many samples."""
+"""Number of cells of a recording, if it has as many samples."""
 CELLS_MIN = 60
 SPAN = 10
-"""Cells on each side of a step that its size is measured with."""
+"""Cells on each side of a step from which its size is measured."""
 LIKELY = 7.0
-"""Deviations beyond which a step is one: among some 1,000 looked at by chance once in 10⁹ of normal noise, and rare
+"""Deviations beyond which a step counts: among some 1,000 tested, once in 10⁹ by chance in normal noise, and rare
 enough where slow noise makes deviations uneven."""
 ROUNDING_RAD = 1e-12
 """Least scatter of angles [rad]: samples without any noise still differ by rounding."""
@@ -38,18 +38,18 @@ class AttitudeStep:
     """The greatest step of the attitude in a recording."""
 
     seen: bool
-    """Whether it stands out of the noise."""
+    """True if the step exceeds the noise."""
     size_rad: float
     time_s: float
-    """Since the recording's beginning."""
+    """Time since the recording's beginning."""
     shown_by: str
     """"accelerometers" or "gyros"."""
     visible_rad: float
-    """A step of tilt under this would not have stood out."""
+    """Least step of tilt that would have exceeded the noise."""
 
 
 def attitude_step(recording: Recording, calibrations: dict[str, TriadCalibration]) -> AttitudeStep | None:
-    """The greatest step, seen or not; None of a recording with too few samples to look for one."""
+    """The greatest step, detected or not; None for a recording of too few samples."""
     info = recording.info
     per_cell = max(1, info.count // CELLS)
     if info.count // per_cell < CELLS_MIN:
@@ -65,7 +65,7 @@ def attitude_step(recording: Recording, calibrations: dict[str, TriadCalibration
 
 
 def _tilt_steps(force: Array) -> tuple[float, float, int, float]:
-    """Of forces (n, 3): greatest ratio to the scatter, size of that step [rad], its place, least visible step [rad]."""
+    """Tilt steps in forces (n, 3): greatest ratio to the scatter, its size [rad], place, least visible step [rad]."""
     mean = force.mean(axis=0)
     across = np.linalg.svd(mean[None, :])[2][1:]
     angles = force @ across.T / np.linalg.norm(mean)
@@ -82,7 +82,7 @@ def _tilt_steps(force: Array) -> tuple[float, float, int, float]:
 
 
 def _turns(rate: Array, cell_s: float) -> tuple[float, float, int]:
-    """Of rates (n, 3): greatest ratio to the scatter, that cell's angle beyond the usual [rad], its place."""
+    """Turns in rates (n, 3): greatest ratio to the scatter, that cell's excess angle [rad], its place."""
     off = rate - np.median(rate, axis=0)
     scale = _deviation(off)
     ratios = np.max(np.abs(off) / np.where(scale > 0.0, scale, np.inf), axis=1)
@@ -96,5 +96,5 @@ def _deviation(values: Array) -> Array:
 
 
 def step_degrees(step: AttitudeStep | None) -> float:
-    """Size of a step that was seen [deg], zero where none was."""
+    """Size of a detected step [deg], zero where there is none."""
     return step.size_rad / units.DEG if step is not None and step.seen else 0.0

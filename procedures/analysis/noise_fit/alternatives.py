@@ -1,7 +1,7 @@
-"""Slow noise that could be another process as well: intervals of B and K that hold whichever it is.
+"""Confidence intervals of B and K that hold whichever process causes the slow noise.
 
-One record does not tell a flicker, a rate random walk and a Gauss–Markov process apart where it shows only a little of
-them. The test that finds one of them compares it with nothing, not with the others.
+One record does not distinguish a flicker, a rate random walk and a Gauss–Markov process where they contribute little to
+it. The test that detects one of them compares it with its absence, not with the other processes.
 """
 
 from dataclasses import dataclass, replace
@@ -17,16 +17,16 @@ from procedures.analysis.noise_fit.restricted import Spectrum, State, informatio
 from procedures.analysis.noise_fit.selection import Selection, inverse_information
 
 DOUBT = 4.0
-"""Twice the log likelihood that another process gains, from which on intervals allow for it."""
+"""Twice the gain in log likelihood by another process from which on the intervals allow for it."""
 STRONG_DOUBT = 6.0
-"""The same, from which on it is more than a note."""
+"""The same gain from which on the doubt becomes a warning."""
 SLOW = (BIAS_INSTABILITY, RATE_RANDOM_WALK)
 _EVERY = 3
 
 
 @dataclass(frozen=True)
 class _Fit:
-    """One other model: all processes allowed, and its own."""
+    """The fit of one alternative model, with all five processes and the one it adds."""
 
     model: Extension
     spectrum: Spectrum
@@ -34,7 +34,7 @@ class _Fit:
 
     @property
     def everything(self) -> tuple[int, ...]:
-        """All columns."""
+        """The indices of all columns."""
         return tuple(range(self.spectrum.columns.shape[1]))
 
     def without(self, k: int) -> float:
@@ -45,14 +45,14 @@ class _Fit:
 
 @dataclass(frozen=True)
 class Doubt:
-    """What else the slow noise may be."""
+    """The alternative explanation of the slow noise."""
 
     estimates: dict[int, Estimate]
-    """By process, with intervals that allow for it."""
+    """Estimates by process, with intervals that allow for the alternative."""
     model: Extension | None
-    """The likeliest other model; None: there is no doubt."""
+    """The likeliest alternative model; None where there is no doubt."""
     strong: bool = False
-    """A reader must know: without the other a flicker would be sure, or the other model is clearly likelier."""
+    """The reader must be warned: only the alternative makes the flicker uncertain, or it is clearly likelier."""
 
 
 def allowed_for(
@@ -63,11 +63,12 @@ def allowed_for(
     estimates: dict[int, Estimate],
     losses: tuple[float, float],
 ) -> Doubt:
-    """Widens the intervals of B and K that are present; `own` is the fit of all processes with the selection's ramp.
+    """Widen the intervals of B and K that are present; `own` is the fit of all processes with the selection's ramp.
 
-    `plain` are the bins without what extends the model. `losses` are those of an interval's and of an upper limit's
-    end. A process whose absence costs no more than an interval's end once another is allowed has an interval from
-    zero; the limit of one that was not observed is raised where the other model is as likely.
+    `plain`: the bins without the columns that extend the model. `losses`: twice the loss of log likelihood at the end
+    of an interval and at an upper limit. A process whose absence costs no more than an interval's end once another
+    process is allowed gets an interval from zero; the limit of an unobserved process is raised where the alternative
+    model is as likely.
     """
     extended = joined is not plain
     if not extended and not any(k in selection.present for k in SLOW):
@@ -80,7 +81,7 @@ def allowed_for(
     doubtful = extended or bool(missing) or 2.0 * (top - own.log_likelihood) >= DOUBT
     changed: dict[int, Estimate] = {}
     for k in SLOW:
-        # how fast a flicker ends is part of its level; another process only where there is a doubt
+        # the corner of a flicker is part of its level; another process is considered only in case of doubt
         others = fits if doubtful else [f for f in fits if f.model.corner_s is not None and k == BIAS_INSTABILITY]
         changed[k] = _wider(estimates[k], k, others, top, losses, zero=k in missing)
     sure = (estimates[BIAS_INSTABILITY].lower or 0.0) > 0.0
@@ -89,12 +90,12 @@ def allowed_for(
 
 
 def _can_miss(k: int, fits: list[_Fit], top: float, loss: float) -> bool:
-    """Whether some other model does without the process k at no more than an interval's loss."""
+    """True if some alternative model explains the record without process k, within the loss of an interval's end."""
     return any(2.0 * (top - f.best.log_likelihood) <= loss and 2.0 * (top - f.without(k)) <= loss for f in fits)
 
 
 def _fits(plain: Joined, selection: Selection, own: State) -> list[_Fit]:
-    """The likeliest two models of each kind, the likeliest first."""
+    """Fit the alternative models; return the two likeliest of each kind, the likeliest first."""
     found: list[_Fit] = []
     for model in candidates(plain, _EVERY):
         spectrum = model.applied(plain).used
@@ -103,7 +104,7 @@ def _fits(plain: Joined, selection: Selection, own: State) -> list[_Fit]:
         begin = np.zeros(columns)
         known = min(plain.spectrum.columns.shape[1], columns)
         begin[:known] = own.variances[:known]
-        if model.time_s is not None:  # nothing grows from zero by itself
+        if model.time_s is not None:  # a variance that starts at zero stays there
             begin[-1] = 0.5 * float(np.min(own.power / spectrum.columns[:, -1]))
         found.append(_Fit(model, spectrum, maximum(spectrum, range(columns), start=begin)))
     found.sort(key=lambda f: -f.best.log_likelihood)
@@ -115,7 +116,7 @@ def _fits(plain: Joined, selection: Selection, own: State) -> list[_Fit]:
 def _wider(
     estimate: Estimate, k: int, fits: list[_Fit], top: float, losses: tuple[float, float], *, zero: bool
 ) -> Estimate:
-    """The interval and the limit over all models, by their information: ``v ± √(loss left)·sd``."""
+    """Extend interval and limit over all models, by the Fisher information of each: ``v ± √(loss left)·sd``."""
     present = estimate.value is not None
     ends = [estimate.lower or 0.0], [estimate.upper or 0.0], [estimate.upper_limit]
     for fit in fits:

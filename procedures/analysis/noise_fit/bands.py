@@ -1,4 +1,4 @@
-"""Slow and fast powers in one spectrum: which part of each is fitted, and how well the model describes each octave."""
+"""Slow and fast powers in one spectrum: the parts that are fitted, and the goodness of fit of each octave."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -14,40 +14,40 @@ from procedures.analysis.noise_fit.restricted import State, maximum
 from procedures.core.errors import UnfitRecording
 
 MISFIT_LEVEL = 1e-3
-"""Probability that a fit of all octaves is rejected though the model holds."""
+"""Probability that a fit of all octaves is rejected although the model holds."""
 _FEWEST_BINS = 8
 _FEWEST_OCTAVES = 3
-"""So many must be left to fit."""
+"""Fewest octaves that must remain for the fit."""
 _LONGEST_HOLE = 3
-"""Octaves of a part left out that has fitted ones on both sides."""
+"""Most octaves of an excluded part with fitted octaves on both sides."""
 _ROUNDS = 3
 _UNFOLDED = 4.0
-"""Of a cell's frequency: with a band that ends above, what the cells lack of the noise beyond it is below 2 %."""
+"""Share of the cell frequency; with a band that ends above it, the cells lack less than 2 % of the noise beyond."""
 _SLOW_PART = 0.2
-"""Of a cell's frequency: up to here the slow model is chosen where no whole spectrum fits."""
+"""Share of the cell frequency up to which the slow model is chosen where no whole spectrum fits."""
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """The bins to fit, and what was left out of them."""
+    """The bins to fit, and remarks on the excluded ones."""
 
     joined: Joined
     remarks: tuple[str, ...]
     holes: NDArray[np.bool_]
-    """Bins left out that have fitted ones above them, (b,): what only they show is not described."""
+    """Excluded bins below a fitted one, (b,); a process that only they show is not described."""
     described: bool
-    """Whether what is fitted fits."""
+    """True if the model fits the bins that are fitted."""
     model: Extension | None = None
-    """What the model has beside the five coefficients."""
+    """The extension of the five-coefficient model, if it needs one."""
 
     @property
     def plain(self) -> Joined:
-        """The same bins without what extends the model."""
+        """The same bins without the columns of the extension."""
         return self.joined if self.model is None else self.model.taken_from(self.joined)
 
 
 def agreed(slow: Powers, fast: Powers | None) -> Agreement:
-    """The bins to fit, the model that they need, and sentences on what was left out. Raises `UnfitRecording`."""
+    """Select the bins to fit and the model they need, with remarks on the excluded bins. Raises `UnfitRecording`."""
     ways = _ways(slow, fast)
     found, state = _first_that_fits(ways)
     base = ways[-1].joined.below(_SLOW_PART / slow.period_s) if found is None else found.joined
@@ -67,11 +67,11 @@ class _Way:
 
     joined: Joined
     own: str
-    """What is said of Q where the fast bins have their own."""
+    """Clause of the remark on Q where the fast bins have a Q of their own."""
 
 
 def _ways(slow: Powers, fast: Powers | None) -> tuple[_Way, ...]:
-    """The ways to join them, the one that knows most first."""
+    """The ways to join slow and fast bins, the most informative first."""
     if fast is None:
         return (_Way(joined_at(slow, None, inf), ""),)
     crossover = float(fast.frequency_hz[0])
@@ -90,7 +90,7 @@ def _first_that_fits(ways: tuple[_Way, ...]) -> tuple[_Way | None, State | None]
 
 
 def _best(joined: Joined) -> State:
-    """All processes allowed, and a ramp."""
+    """Fit all processes and a ramp."""
     return maximum(joined.used, range(joined.spectrum.columns.shape[1]))
 
 
@@ -105,8 +105,8 @@ def misfit(joined: Joined, best: State | None = None) -> float:
 
 
 def _cut(ways: tuple[_Way, ...], unfolded_hz: float) -> Agreement:
-    """Less what does not fit. Cell means fold what is faster into their band, and miss it where a filter took it away:
-    where the band ends low, only what they know without it is used, and the fast bins above."""
+    """Exclude the bins that do not fit. Cell means alias faster noise into their band, and lack it where a filter took
+    it away: where the band ends low, only their bins below that end are used, and the fast bins above."""
     part = _parted(ways[-1].joined, ways[-1].own)
     top = float(part.joined.frequency_hz[part.joined.fitted][-1])
     first = ways[0].joined
@@ -118,7 +118,7 @@ def _cut(ways: tuple[_Way, ...], unfolded_hz: float) -> Agreement:
 
 
 def _parted(joined: Joined, own: str) -> Agreement:
-    """Leaves out the fewest octaves in a row that it takes until the others fit; again, if need be, thrice at most."""
+    """Exclude the shortest run of octaves that lets the others fit; repeat if necessary, three times at most."""
     runs: list[range] = []
     part, described = joined, False
     for _ in range(_ROUNDS):
@@ -135,7 +135,7 @@ def _parted(joined: Joined, own: str) -> Agreement:
         part, described = part.without(best), least <= 1.0
         if described:
             break
-    for run in runs:  # what is not seen of a misfit's foot is more than its interval allows
+    for run in runs:  # the undetected flank of a misfit exceeds what the intervals allow for
         wider = part.without(range(max(0, run.start - 1), run.stop + 1))
         if len(np.unique(wider.group[wider.fitted])) >= _FEWEST_OCTAVES:
             part = wider
@@ -143,7 +143,7 @@ def _parted(joined: Joined, own: str) -> Agreement:
 
 
 def _runs(joined: Joined) -> Iterator[range]:
-    """Octaves in a row that may be left out, the shortest first; of as many, those at the upper end first."""
+    """Runs of octaves that may be excluded, the shortest first; among equal lengths, those at the upper end first."""
     octaves = np.unique(joined.group[joined.fitted])
     slow = set(joined.group[joined.fitted & ~joined.is_fast].tolist())
     count = len(octaves)
@@ -156,7 +156,7 @@ def _runs(joined: Joined) -> Iterator[range]:
 
 
 def _told(part: Joined, own: str, *, described: bool) -> Agreement:
-    """The remarks on what is left out."""
+    """Add the remarks on the excluded bins."""
     frequency, fitted = part.frequency_hz, part.fitted
     top = float(frequency[fitted][-1])
     remarks: list[str] = []

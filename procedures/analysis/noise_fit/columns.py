@@ -1,4 +1,4 @@
-"""What a process of unit coefficient puts into each mode of a spectrum: exact expectations, no approximation by f.
+"""Expected power of a process of unit coefficient in each mode of a spectrum: exact, no approximation by f.
 
 The rate y of a channel is averaged over cells of Δ: ``y_k = (θ_{k+1} − θ_k)/Δ``. With R the rate's autocovariance and
 F'' = R, the cell means' is ``γ(l) = (F((l+1)Δ) − 2F(lΔ) + F((l−1)Δ))/Δ²``. Where a variance does not exist (flicker,
@@ -26,11 +26,11 @@ FlickerBand = tuple[float, float]
 QUANTIZATION, RANDOM_WALK, BIAS_INSTABILITY, RATE_RANDOM_WALK = range(4)
 """Order of the columns; each belongs to the square of its coefficient."""
 _EXPANDED = 64
-"""From this lag on the second difference of l² ln l is expanded: the direct one loses digits with l²."""
+"""Lag from which on the second difference of l² ln l is expanded; the direct one loses digits with l²."""
 
 
 def covariances(count: int, cell_s: float, band_s: FlickerBand) -> Array:
-    """γ(l) of cell means at lags l = 0…count−1 for unit Q², N², B², K², (4, count) [per unit of each].
+    """Autocovariance γ(l) of cell means at lags l = 0…count−1 for unit Q², N², B², K², (4, count) [per unit of each].
 
     `band_s` are the shortest and longest relaxation time of the flicker; 0 and infinity are allowed.
     Raises `BadParameter`.
@@ -66,7 +66,7 @@ def _flicker(lag: Array, shortest: float, longest: float) -> Array:
 
 
 def _second_difference_of_square_log(lag: Array) -> Array:
-    """``(l+1)² ln|l+1| − 2l² ln|l| + (l−1)² ln|l−1|``."""
+    """Second difference ``(l+1)² ln|l+1| − 2l² ln|l| + (l−1)² ln|l−1|``."""
 
     def square_log(x: Array) -> Array:
         return x**2 * np.log(np.where(x == 0.0, 1.0, np.abs(x)))
@@ -102,7 +102,7 @@ def free_ended_quantization(count: int, cell_s: float) -> Array:
 
 
 def sine_edged_taper(count: int, edge: int) -> Array:
-    """Weights (count,) that rise as a sine over `edge` and fall so again; squares of overlapped neighbours add to 1."""
+    """Weights (count,) that rise as a sine over `edge` and fall likewise; squares of overlapped neighbours add to 1."""
     rise = np.sin(0.5 * pi * (np.arange(edge) + 0.5) / edge)
     return np.concatenate([rise, np.ones(count - 2 * edge), rise[::-1]])
 
@@ -127,6 +127,6 @@ def tapered_powers(gamma: Array, taper: Array) -> Array:
 
 
 def allan_columns(tau_s: Array) -> Array:
-    """σ²(τ) for unit Q², N², B², K², R²; (k, 5): ``3/τ², 1/τ, 2 ln 2/π, τ/3, τ²/2`` (IEEE Std 952 Annex C)."""
+    """Allan variance for unit Q², N², B², K², R²; (k, 5): ``3/τ², 1/τ, 2 ln 2/π, τ/3, τ²/2`` (IEEE Std 952 Annex C)."""
     flat = np.full(len(tau_s), 2.0 * log(2.0) / pi)
     return np.stack([3.0 / tau_s**2, 1.0 / tau_s, flat, tau_s / 3.0, 0.5 * tau_s**2], axis=1)

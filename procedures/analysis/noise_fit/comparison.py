@@ -1,4 +1,4 @@
-"""Where the three ways to noise coefficients disagree, in sentences. Numbers are relative: no unit is needed."""
+"""Disagreements of the three methods for noise coefficients, as sentences. Numbers are relative, without unit."""
 
 from math import hypot
 
@@ -12,7 +12,8 @@ APART = 2.576
 def compare(read_off: ReadOff, least_squares: NoiseFit, likelihood: NoiseFit) -> tuple[str, ...]:
     """A sentence for each process where the read-off or the least squares disagree with the likelihood.
 
-    The three use the same samples, so their difference is less uncertain than taken here: what is told is apart.
+    All three use the same samples, so the uncertainty of their difference is overestimated here: a disagreement that is
+    reported is real.
     """
     found: list[str] = []
     for process in PROCESSES:
@@ -27,7 +28,7 @@ def compare(read_off: ReadOff, least_squares: NoiseFit, likelihood: NoiseFit) ->
 
 
 def _sentence(process: str, method: str, found: tuple[float, float] | None, reference: Estimate) -> list[str]:
-    """One or none."""
+    """Describe a disagreement in one sentence; an empty list where there is none."""
     head = f"{process[0].upper()}{process[1:]}: {method}"
     if found is None:
         if reference.value is None:

@@ -1,4 +1,4 @@
-"""What a fit says of the noise of one channel. SI: *rate* as in `core.noise`."""
+"""Results of a noise fit of one channel. SI units; *rate* as in `core.noise`."""
 
 from dataclasses import dataclass
 
@@ -11,26 +11,26 @@ PROCESSES = ("quantization", "random_walk", "bias_instability", "rate_random_wal
 
 @dataclass(frozen=True)
 class Estimate:
-    """One coefficient. Where the process was not observed, value, uncertainty and interval are None."""
+    """The estimate of one coefficient; value, uncertainty and interval are None where the process was not observed."""
 
     value: float | None
     """Q [rate·s], N [rate·√s], B [rate], K [rate/√s] or |R| [rate/s]."""
     standard_uncertainty: float | None
-    """Where only the processes observed are there."""
+    """Standard uncertainty, given that only the observed processes are present."""
     lower: float | None
     upper: float | None
-    """Interval at the fit's confidence, whatever other processes there are."""
+    """Interval at the fit's confidence, whichever other processes are present."""
     upper_limit: float
     """The coefficient is below this with a probability of 95 % (one-sided), observed or not; infinite: no limit."""
     p_value: float
-    """Probability that a record without this process looks as much as if it had it."""
+    """Probability of evidence at least this strong in a record without this process."""
 
     described: bool = True
-    """False: the noise model does not describe the part of the spectrum that this coefficient is read of."""
+    """False: the noise model does not describe the part of the spectrum that determines this coefficient."""
 
     @property
     def present(self) -> bool:
-        """Whether the process was observed."""
+        """True if the process was observed."""
         return self.value is not None
 
 
@@ -39,7 +39,7 @@ class Followed:
     """A regressor of the slow part that the rate follows."""
 
     index: int
-    """Among those given, from 0."""
+    """Index among the given regressors, from 0."""
     slope: float
     """Rate per unit of the regressor."""
     standard_uncertainty: float
@@ -53,9 +53,9 @@ class GaussMarkov:
     time_s: float
     """Correlation time τ [s]."""
     time_sd_s: float | None
-    """Standard uncertainty; None where the record tells no more than the order of magnitude."""
+    """Standard uncertainty; None where the record determines no more than the order of magnitude."""
     driving: float
-    """q [rate/√s]."""
+    """Driving noise q [rate/√s]."""
     driving_sd: float | None
 
     @property
@@ -66,7 +66,7 @@ class GaussMarkov:
 
 @dataclass(frozen=True)
 class Octave:
-    """How well the model describes the power between two frequencies."""
+    """Goodness of fit of the model between two frequencies."""
 
     low_hz: float
     high_hz: float
@@ -74,7 +74,7 @@ class Octave:
     dof: int
     p_value: float
     is_fast: bool
-    """From the full-rate samples, not from the cell means."""
+    """True: from the full-rate samples; False: from the cell means."""
     fitted: bool
     """False: left out of the fit."""
 
@@ -95,21 +95,21 @@ class NoiseFit:
     correlated: tuple[str, ...]
     """The processes observed, in the order of `correlation`."""
     correlation: Array
-    """Between the errors of their coefficients, (p, p)."""
+    """Correlation of the errors of their coefficients, (p, p)."""
     octaves: tuple[Octave, ...]
     """Goodness of fit from low to high frequency; empty where the method has none."""
     lines: tuple[SpectralLine, ...]
-    """Cut out before the fit."""
+    """Spectral lines that were cut out before the fit."""
     band_hz: tuple[float, float]
     """Lowest and highest frequency used."""
     remarks: tuple[str, ...]
-    """What a reader must know, a sentence each."""
+    """Warnings to the reader, a sentence each."""
     notes: tuple[str, ...] = ()
-    """On processes that one record does not tell apart: the intervals allow for it."""
+    """Notes on processes that one record does not distinguish; the intervals allow for it."""
     followed: tuple[Followed, ...] = ()
-    """The regressors beside a ramp that were kept."""
+    """The regressors, other than a ramp, that were kept."""
     gauss_markov: GaussMarkov | None = None
-    """Beside the five processes."""
+    """The Gauss–Markov process added to the five processes, if any."""
     flicker_corner_s: float | None = None
     """Shortest relaxation time of the flicker, where it is another than that of `core.noise`."""
 

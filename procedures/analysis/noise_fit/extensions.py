@@ -1,4 +1,4 @@
-"""Slow noise that the five coefficients do not describe: a Gauss–Markov process, and a flicker that ends elsewhere.
+"""Slow noise that the five coefficients do not describe: a Gauss–Markov process, or a flicker with another corner.
 
 A Gauss–Markov process of correlation time τ and driving noise q has the two-sided density ``q²τ²/(1 + (2πfτ)²)``,
 variance σ² = q²τ/2 (IEEE Std 952 Annex C). Means over cells of Δ, a = e^(−Δ/τ), have the covariance
@@ -6,8 +6,8 @@ variance σ² = q²τ/2 (IEEE Std 952 Annex C). Means over cells of Δ, a = e^(�
 ``γ(0) + 2σ²(τ/Δ)²(1 − a)²(cos ω − a)/(1 − 2a cos ω + a²)``.
 
 The flicker of `core.noise` is a bank of such processes, evenly in ln τ, B²/π of variance each e-fold: a longer shortest
-time takes the fastest of them away. Which extension a record needs is asked by score tests first (C. R. Rao, Proc.
-Camb. Phil. Soc. 44 (1948) 50), which cost one fit; then by likelihood.
+time removes the fastest of them. The extension that a record needs is sought by score tests first (C. R. Rao, Proc.
+Camb. Phil. Soc. 44 (1948) 50), which cost one fit; then by likelihood ratios.
 """
 
 from dataclasses import dataclass, replace
@@ -22,27 +22,27 @@ from procedures.analysis.noise_fit.restricted import State, information, maximum
 from procedures.core.arrays import Array
 
 SHORTEST_S, CELLS = 2.0, 2.0
-"""Least correlation time, in seconds and in cells: what is shorter is a filter's edge."""
+"""Least correlation time, in seconds and in cells; a shorter one is the edge of a filter."""
 SHORT_CORNERS_S = (0.05, 0.1, 0.2, 1.0)
-"""Shortest relaxation times of a flicker that are tried beside those of a Gauss–Markov process."""
+"""Shortest relaxation times of a flicker that are tried in addition to the times of a Gauss–Markov process."""
 _CORNER_OF_LONGEST = 0.3
 LONGEST = 0.1
-"""Greatest correlation time, of the record: what is longer is no other than a random walk."""
+"""Greatest correlation time as a share of the record; a longer one looks like a random walk."""
 SCORE = 2.7
-"""Standard deviations of a score from which on the extension is fitted."""
+"""Score, in standard deviations, from which on the extension is fitted."""
 GAIN_OF_TIME, GAIN_OF_CORNER = 16.0, 11.0
-"""Twice the log likelihood that an extension must gain: χ² of two and of one degree at 5e-4, of several times tried."""
+"""Required gain in twice the log likelihood: χ² of two and of one degree at 5e-4, for several times tried."""
 _RATIO = 2.0**0.5
-"""Between two times that are tried."""
+"""Ratio of two successive trial times."""
 _PER_E_FOLD = 4
 _EVERY = 2
-"""Of the times, so many are looked at first."""
+"""The first search tries every n-th time."""
 _FIRST_CORNER_S = FLICKER_BAND_S[0]
 
 
 @dataclass(frozen=True)
 class Extension:
-    """One change of the model: a Gauss–Markov process beside the others, or a flicker of another shortest time."""
+    """One extension of the model: an additional Gauss–Markov process, or a flicker of another shortest time."""
 
     time_s: float | None = None
     """Correlation time of the process."""
@@ -61,13 +61,13 @@ class Extension:
         return replace(joined, spectrum=replace(s, columns=columns), added=1)
 
     def scaled(self, factor: float) -> "Extension":
-        """With its time longer by a factor."""
+        """The same extension with its time multiplied by `factor`."""
         if self.time_s is not None:
             return Extension(time_s=factor * self.time_s)
         return Extension(corner_s=factor * (self.corner_s or 0.0))
 
     def taken_from(self, joined: Joined) -> Joined:
-        """The bins with the columns they had before."""
+        """The bins with their columns before the extension."""
         s = joined.spectrum
         columns = s.columns[:, : s.columns.shape[1] - joined.added].copy()
         columns[:, BIAS_INSTABILITY] = joined.flicker
@@ -75,9 +75,10 @@ class Extension:
 
 
 def gauss_markov(joined: Joined, time_s: float) -> Array:
-    """Expected power (b,) of unit variance.
+    """Expected power (b,) of a Gauss–Markov process of unit variance.
 
-    A process that lasts as long as a segment leaks as a random walk does, whose exact column tells how much.
+    A process whose correlation time reaches a segment's length leaks like a random walk; the leakage is taken from the
+    exact column of the latter.
     """
     period, omega = joined.period_s, 2.0 * pi * joined.frequency_hz * joined.period_s
     ratio, cosine = time_s / period, np.cos(omega)
@@ -94,7 +95,7 @@ def gauss_markov(joined: Joined, time_s: float) -> Array:
 
 
 def flicker_from(joined: Joined, corner_s: float) -> Array:
-    """Expected power (b,) of unit B² with another shortest relaxation time than the columns were made with."""
+    """Expected power (b,) of a flicker of unit B² with the shortest relaxation time `corner_s`."""
     count = max(2, round(_PER_E_FOLD * abs(log(corner_s / _FIRST_CORNER_S))) + 1)
     times = np.geomspace(_FIRST_CORNER_S, corner_s, count)
     weights = np.full(count, log(corner_s / _FIRST_CORNER_S) / (count - 1))
@@ -105,7 +106,7 @@ def flicker_from(joined: Joined, corner_s: float) -> Array:
 
 
 def extension(joined: Joined, at: State) -> Extension | None:
-    """What the record needs beside the five coefficients; `at` is their fit, all allowed, with a ramp."""
+    """The extension that the record needs, or None; `at` is the fit of all five processes, with a ramp."""
     best, most = None, 0.0
     for one in candidates(joined, _EVERY):
         if _score(joined, at, one) > SCORE:
@@ -123,7 +124,7 @@ def extension(joined: Joined, at: State) -> Extension | None:
 
 
 def candidates(joined: Joined, every: int = 1) -> list[Extension]:
-    """Every extension that is tried, or every so many of the longer times."""
+    """The extensions to try; with `every` > 1, only each `every`-th of the trial times."""
     shortest = max(SHORTEST_S, CELLS * float(np.max(joined.period_s)))
     longest = LONGEST * 0.5 / float(joined.frequency_hz[0])
     if longest <= shortest:
@@ -135,7 +136,7 @@ def candidates(joined: Joined, every: int = 1) -> list[Extension]:
 
 
 def _score(joined: Joined, at: State, one: Extension) -> float:
-    """The score of the extension's power over its standard deviation, the fitted variances allowed for."""
+    """Score of the extension's power over its standard deviation, corrected for the fitted variances."""
     used = joined.fitted
     if one.time_s is not None:
         column = gauss_markov(joined, one.time_s)[used]
@@ -157,6 +158,6 @@ def _score(joined: Joined, at: State, one: Extension) -> float:
 
 
 def _gain(joined: Joined, at: State, one: Extension) -> float:
-    """Twice the log likelihood that the extension gains."""
+    """Twice the gain in log likelihood by the extension."""
     extended = one.applied(joined).used
     return 2.0 * (maximum(extended, range(extended.columns.shape[1])).log_likelihood - at.log_likelihood)

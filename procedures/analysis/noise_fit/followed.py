@@ -1,9 +1,9 @@
-"""What the rate follows beside a ramp: regressors of the slow part, each kept where the noise does not explain it.
+"""Regressors of the slow rate other than a ramp, each kept where the noise does not explain its effect.
 
-A drift that a temperature beside the channel explains is neither a random walk of the rate nor a ramp; nor is a shift
-of the level. A regressor is kept by either of two tests. With all noise processes allowed, its slope has Student's
-distribution with Satterthwaite's degrees of freedom (see `selection`): a random walk that merely looks like it does not
-pass. And without rate random walk and ramp, it must explain the record better than these two do without it.
+A drift that a recorded temperature explains is neither a rate random walk nor a ramp; nor is a shift of the level. A
+regressor is kept if it passes either of two tests. With all noise processes allowed, its slope has Student's
+distribution with Satterthwaite's degrees of freedom (see `selection`): a random walk that merely resembles it does not
+pass. Without rate random walk and ramp, it must explain the record better than these two do without the regressor.
 """
 
 from collections.abc import Sequence
@@ -26,18 +26,18 @@ _FIRST = len(ENDS) + 1
 
 @dataclass(frozen=True)
 class Candidate:
-    """What a regressor must show to be kept."""
+    """Conditions under which a regressor is kept."""
 
     level: float
     """Probability of the test of its slope."""
     gain: float
-    """Twice the log likelihood that it gains over drifting noise."""
+    """Required gain in twice the log likelihood over drifting noise."""
 
 
 def followed(joined: Joined, candidates: Sequence[Candidate]) -> tuple[Joined, tuple[Followed, ...]]:
-    """The bins with the regressors that matter, and what they do.
+    """The bins with the regressors that are kept, and the fitted slopes of these.
 
-    The least significant is left out first, until all that are left pass.
+    The least significant regressor is removed first, until all that remain pass.
     """
     kept = list(range(len(candidates)))
     while kept:
@@ -58,14 +58,14 @@ def _passes(i: int, kept: list[int], slopes: list[Slope], instead: dict[int, flo
 
 
 def _slopes(joined: Joined, kept: list[int]) -> list[Slope]:
-    """With all processes allowed, and no ramp: what explains a drift is preferred to one without a cause."""
+    """Slopes with all processes allowed and no ramp: a drift with a known cause is preferred to a ramp."""
     reduced = joined.with_regressors([*ENDS, *(_FIRST + i for i in kept)])
     best = maximum(reduced.used, range(reduced.spectrum.columns.shape[1]))
     return [slope_of(reduced.used, best, len(ENDS) + k) for k in range(len(kept))]
 
 
 def _instead(joined: Joined, kept: list[int]) -> dict[int, float]:
-    """Twice the log likelihood that each gains, without random walk and ramp of the rate, over these without it."""
+    """Twice the gain in log likelihood of each, without rate random walk and ramp, over these two without it."""
     still = [k for k in range(joined.spectrum.columns.shape[1]) if k != RATE_RANDOM_WALK]
     own = _plain(joined, [*ENDS, *(_FIRST + i for i in kept)], still)
     return {i: 2.0 * (own - _drifting(joined, [j for j in kept if j != i])) for i in kept}
@@ -83,9 +83,9 @@ def _plain(joined: Joined, regressors: list[int], free: list[int]) -> float:
 
 
 def likeliest_shift(cells: Array) -> int | None:
-    """The cell before which the level of (n,) most likely shifts; None where there are too few cells to tell.
+    """The cell before which the level of (n,) most likely shifts; None where there are too few cells.
 
-    The difference of means before and after stands out most from such differences elsewhere, for some width.
+    There the difference of the means before and after is greatest, relative to those elsewhere, for some width.
     """
     n = len(cells)
     sums = np.concatenate([[0.0], np.cumsum(cells - np.mean(cells))])

@@ -1,4 +1,4 @@
-"""A Gauss–Markov process that was found: correlation time and driving noise with their uncertainties."""
+"""Estimate of a detected Gauss–Markov process: correlation time and driving noise with their uncertainties."""
 
 from math import log, sqrt
 
@@ -14,7 +14,7 @@ _RATIO = 2.0**0.5
 
 
 def gauss_markov(plain: Joined, model: Extension, free: tuple[int, ...]) -> GaussMarkov | None:
-    """Of the likelihood over ln τ, a parabola through three times about the best; `free` are the fit's variances.
+    """Fit a parabola in ln τ to the log likelihood at three times about the best; `free` are the fit's variances.
 
     ``ln τ ± 1/√(−d²L/d(ln τ)²)``; the driving noise q = √(2σ²/τ) has the uncertainty of σ² at one τ and that which
     comes with τ. None where the model has no such process.
@@ -41,7 +41,7 @@ def gauss_markov(plain: Joined, model: Extension, free: tuple[int, ...]) -> Gaus
 
 
 def _at(plain: Joined, time_s: float, free: tuple[int, ...]) -> tuple[State, float]:
-    """The fit with this correlation time, and the relative uncertainty of its variance."""
+    """Fit with a given correlation time, and the relative uncertainty of its variance."""
     spectrum = Extension(time_s=time_s).applied(plain).used
     used = [k for k in free if k < spectrum.columns.shape[1] - 1]
     used.append(spectrum.columns.shape[1] - 1)

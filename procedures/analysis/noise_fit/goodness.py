@@ -1,4 +1,4 @@
-"""How well expected powers describe observed ones: normal deviates bin by bin, and two tests of a group of bins."""
+"""Goodness of fit of expected powers to observed ones: normal deviates of bins, and two tests of a group of bins."""
 
 from math import erfc, sqrt
 
@@ -13,7 +13,7 @@ _LEAST_SHARE = 1e-12
 
 
 def deviates(spectrum: Spectrum, variances: Array, amplitudes: Array) -> Array:
-    """Normal deviates (b,): a bin's power over its expectation is χ²_ν/ν, whose quantile is given as z."""
+    """Normal deviates of the bins, (b,): power over expectation is χ²_ν/ν, whose quantile is converted to z."""
     s = spectrum
     explained = 2.0 * s.products @ amplitudes - np.einsum("i,bij,j->b", amplitudes, s.gram, amplitudes)
     expected = s.columns @ variances
@@ -29,7 +29,7 @@ def judged(z: Array) -> tuple[float, int, float]:
     """χ² = Σz² of a group, its degrees of freedom, and a p-value.
 
     The p-value is twice the lesser of that of χ² and that of the sum, ``Σz/√n`` normal: a slope of the spectrum that
-    the model lacks moves all bins of an octave by a little, which χ² hardly sees.
+    the model lacks shifts all bins of an octave slightly, to which χ² is insensitive.
     """
     chi_square, count = float(np.sum(z**2)), len(z)
     shift = abs(float(np.sum(z))) / sqrt(count)

@@ -1,4 +1,4 @@
-"""Slow and fast powers in one spectrum, octave by octave: what is fitted of it, and how well the model describes it."""
+"""Slow and fast powers in one spectrum, octave by octave: the fitted bins, and the goodness of fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -31,23 +31,23 @@ class Joined:
     flicker: Array
     """Expected power for unit B², (b,), before an extension of the model changes it."""
     period_s: Array
-    """Of the samples that each bin's modes were made of, (b,)."""
+    """Sampling period of the data behind each bin, (b,)."""
     added: int = 0
     """Columns at the end that an extension of the model added."""
 
     @property
     def used(self) -> Spectrum:
-        """The fitted bins."""
+        """The spectrum of the fitted bins alone."""
         return only_where(self.fitted, self.spectrum)
 
     @property
     def group(self) -> NDArray[np.int64]:
-        """Number of each bin's octave from 0, slow and fast apart, (b,)."""
+        """Number of each bin's octave from 0, separately for slow and fast bins, (b,)."""
         key = np.floor(np.log2(self.frequency_hz)) * 2 + self.is_fast
         return np.unique(key, return_inverse=True)[1].astype(np.int64)
 
     def without(self, groups: range) -> "Joined":
-        """The same, some octaves not fitted, and an edge of the white noise allowed for."""
+        """The same bins with some octaves excluded from the fit, allowing for an edge of the white noise."""
         group = self.group
         return replace(self, fitted=self.fitted & ~((group >= groups.start) & (group < groups.stop)))._edged()
 
@@ -56,14 +56,14 @@ class Joined:
         return replace(self, spectrum=self.spectrum.only(keep))
 
     def below(self, highest_hz: float) -> "Joined":
-        """The same, fitted up to a frequency only."""
+        """The same bins, fitted below a frequency only."""
         return replace(self, fitted=self.fitted & (self.frequency_hz < highest_hz))._edged()
 
     def _edged(self) -> "Joined":
         """White noise that falls or rises towards the highest fitted frequency f₁, in its own and a fifth column.
 
         ``N²·(1 − x²) + q·x²``, x = f/f₁, q ≥ 0: the first term of any filter's edge, and of any reading noise. A band
-        that merely ends where a misfit is seen would take the unseen part of the edge for less white noise.
+        that merely ends at a visible misfit would take the invisible part of the edge for less white noise.
         """
         s, white = self.spectrum, self.white
         x2 = np.minimum(1.0, (self.frequency_hz / float(np.max(self.frequency_hz[self.fitted]))) ** 2)
@@ -73,7 +73,7 @@ class Joined:
         return replace(self, spectrum=replace(s, columns=columns))
 
     def octaves(self, variances: Array, amplitudes: Array, ramp: bool) -> tuple[Octave, ...]:
-        """Goodness of the bins in each octave, slow and fast apart, and fitted and left out apart."""
+        """Goodness of fit of each octave, separately for slow and fast, and for fitted and excluded bins."""
         s = self.spectrum if ramp else self.spectrum.without_ramp
         z = deviates(s, variances, amplitudes)
         key = self.group * 2 + ~self.fitted
@@ -115,7 +115,7 @@ def joined_at(slow: Powers, fast: Powers | None, crossover_hz: float) -> Joined:
 
 
 def _clear(slow: Powers, fast: Powers) -> NDArray[np.bool_]:
-    """Fast bins that hold nothing of a line of the slow part, which is still in the samples that they are made of."""
+    """Mask of the fast bins that are free of the slow part's lines, which the full-rate samples still contain."""
     clear = np.ones(len(fast.frequency_hz), dtype=bool)
     beside = _BESIDE * float(fast.frequency_hz[1] - fast.frequency_hz[0]) if len(clear) > 1 else 0.0
     for line in slow.lines:

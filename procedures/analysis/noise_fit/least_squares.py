@@ -29,7 +29,7 @@ _LIMIT = float(ndtri(0.95))
 
 
 def fit_allan(deviation: Deviation, *, from_s: float = 0.0, level: float = 0.01, confidence: float = 0.95) -> NoiseFit:
-    """Q, N, B, K, R of a rate's Allan deviation, overlapping or not, from the averaging time `from_s` on.
+    """Estimate Q, N, B, K, R from a rate's Allan deviation, overlapping or not, from the averaging time `from_s` on.
 
     A process is absent where its square is zero, or not significant at `level` (one-sided, normal); the least
     significant is left out first. Intervals are those of the squares. The slope's sign is not in an Allan variance:
@@ -77,7 +77,7 @@ class _Fit:
         self._variance, self._edf, self._columns = variance, edf, columns
 
     def solve(self, present: tuple[int, ...]) -> Array:
-        """v, (5,), zero where not present."""
+        """Solve for the squares v, (5,), zero for absent processes."""
         model, v = self._variance, np.zeros(len(PROCESSES))
         for _ in range(_ITERATIONS):
             weight = np.sqrt(0.5 * self._edf) / model
@@ -91,7 +91,7 @@ class _Fit:
         return v
 
     def covariance(self, present: tuple[int, ...], v: Array, correlation: Array) -> Array:
-        """Of the present elements of v, (p, p); the sandwich at the model that v makes."""
+        """Covariance of the present elements of v, (p, p): the sandwich estimator at the model of v."""
         weight = np.sqrt(0.5 * self._edf) / (self._columns @ v)
         columns = self._columns[:, present] * weight[:, None]
         inverse = scaled_pinv(columns)
@@ -99,12 +99,12 @@ class _Fit:
 
 
 def _correlation(m: Array, rate_hz: float, count: int, v: Array) -> Array:
-    """Of the σ² at cluster sizes m, (k, k), for the spectrum of the squares v (5,), the ramp's left out."""
+    """Correlation of the σ² at cluster sizes m, (k, k), for the spectrum of the squares v (5,) without the ramp."""
     decades = np.log10(0.5 * count)
     f = rate_hz * np.geomspace(0.25 / count, 0.5, int(_PER_DECADE * decades))
     sine = np.sin(pi * f / rate_hz)
     spectrum = 4.0 * rate_hz * sine**2 * v[0] + v[1] + v[2] / (2.0 * pi * f) + v[3] / (2.0 * pi * f) ** 2
-    if not np.any(spectrum > 0.0):  # a bare ramp: what noise there is, is called white
+    if not np.any(spectrum > 0.0):  # a bare ramp: any remaining noise counts as white
         spectrum = np.ones_like(f)
     root = spectrum * np.sqrt(f)  # df = f d ln f
     filters = np.sin(pi * f * m[:, None] / rate_hz) ** 4 * (root / sine**2)
@@ -113,7 +113,7 @@ def _correlation(m: Array, rate_hz: float, count: int, v: Array) -> Array:
 
 
 def _significant(fit: _Fit, correlation: Array, z: float) -> tuple[tuple[int, ...], Array, Array]:
-    """The processes that stand z of their standard uncertainties above zero, v (5,), and the covariance of theirs."""
+    """The processes that exceed zero by z standard uncertainties, v (5,), and the covariance of theirs."""
     present = tuple(range(len(PROCESSES)))
     while True:
         v = fit.solve(present)
@@ -132,7 +132,7 @@ def _present(v: float, sd: float, z: float) -> Estimate:
 
 
 def _absent(v: float, sd: float) -> Estimate:
-    """By the fit with all processes."""
+    """Estimate of an absent process, by the fit with all processes."""
     return Estimate(None, None, None, None, sqrt(v + _LIMIT * sd), _p_value(v / sd))
 
 

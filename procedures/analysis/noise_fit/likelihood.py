@@ -1,8 +1,8 @@
 """Noise coefficients by maximum likelihood of the spectrum (Whittle), with the processes selected and the fit judged.
 
 P. Whittle, Ark. Mat. 2 (1953) 423: modes of a stationary record are asymptotically independent and normal, so their
-powers hold all that the record tells; the coefficients reach the Cramér-Rao bound. What is exact here and what is
-approximate stands in `powers`; the maximum in `restricted`, the presence of a process in `selection`.
+powers hold all information of the record; the coefficients reach the Cramér-Rao bound. `powers` states what is exact
+and what is approximate; `restricted` finds the maximum, `selection` decides which processes are present.
 """
 
 from collections.abc import Sequence
@@ -27,11 +27,11 @@ from procedures.core.errors import BadParameter
 
 METHOD = "likelihood"
 _SAME_MODES = 3.0
-"""Modes of a segment between two frequencies below which a line that both parts show is told once."""
+"""Distance, in modes of a segment, below which a line seen in both parts is reported once."""
 _TOLD = 0.25
-"""Of a cell's frequency: lines above it are those of the fast part, or folded from there."""
+"""Share of the cell frequency; lines above it belong to the fast part, or are aliases of it."""
 CHOSEN_BAND = 1.4
-"""Variance of an estimate from a band that its own record chose, over that from one which was given (Monte Carlo)."""
+"""Variance of an estimate from a band chosen by its own record, relative to that from a given band (Monte Carlo)."""
 LIMIT = 0.95
 """Probability of an upper limit."""
 
@@ -45,15 +45,15 @@ def fit_noise(
     candidates: Sequence[Candidate] = (),
     coarse: bool = False,
 ) -> NoiseFit:
-    """Q, N, B, K, R of one channel from its slow and, where there are any, its fast powers.
+    """Estimate Q, N, B, K, R of one channel from its slow powers and, where given, its fast powers.
 
-    `level` is the probability at which each absent process is reported present; `confidence` that of the intervals;
-    `coarse`: the noise is less than a count, and the error of reading no white noise.
-    `candidates` say when each of the slow powers' other regressors is kept.
+    `level`: the probability of reporting an absent process as present; `confidence`: that of the intervals; `coarse`:
+    the noise is less than a count, so that the reading error is no white noise.
+    `candidates`: the conditions under which each further regressor of the slow powers is kept.
     The fast powers are used from their first frequency up, the slow ones below. Where they disagree with the
     model (chi-square per octave, see `bands`), the reading noise at the full rate is not white: the slow
-    powers are then used whole, the fast ones above them with a quantization of their own, less as many of their
-    highest octaves as it takes until the rest fits. Q is then that of readings one cell apart, as the Allan deviation
+    powers are then used whole, the fast ones above them with a quantization of their own, without as many of their
+    highest octaves as necessary for the rest to fit. Q is then that of readings one cell apart, as the Allan deviation
     of the cell means shows it.
     Raises `BadParameter` and `UnfitRecording`.
     """
@@ -90,10 +90,10 @@ def fit_noise(
 
 
 def _estimates(agreement: Agreement, selection: Selection, confidence: float) -> tuple[tuple[Estimate, ...], Doubt]:
-    """Of Q, N, B, K, R. Values are those of the processes present; intervals allow the others as well.
+    """Estimates of Q, N, B, K, R: values for the processes present, intervals that allow for the others as well.
 
-    A process not observed is not proven absent: an interval that took it for zero would be too narrow. An absent
-    process's limit allows the ramp, too.
+    A process not observed is not proven absent: an interval that assumed it zero would be too narrow. The upper limit
+    of an absent process allows for the ramp, too.
     """
     spectrum = agreement.joined.used
     slack = 1.0 if np.all(agreement.joined.fitted) else CHOSEN_BAND
@@ -119,7 +119,7 @@ def _estimates(agreement: Agreement, selection: Selection, confidence: float) ->
 
 
 def _one_sided() -> float:
-    """Loss of twice the log likelihood at an upper limit: a one-sided interval is half of a two-sided one."""
+    """Twice the loss of log likelihood at an upper limit: a one-sided interval is half of a two-sided one."""
     return float(chdtri(1, 2.0 * (1.0 - LIMIT)))
 
 
@@ -129,7 +129,7 @@ def _present(
     """A process with variance v: ``coefficient = √v``, its uncertainty ``sd(v)/(2√v)``, its interval by profile.
 
     The profiles, each with sd(v): that of the processes present, then that of all. The interval is from the lowest to
-    the highest end: alone the first is blind to what was not observed, alone the second is low where all that it
+    the highest end: the first alone ignores what was not observed, the second alone is low where all that it
     allows is absent, since variances cannot be negative (N alone: upper limits held in 76 % instead of 95 %).
     """
     first, sd = profiles[0]
@@ -142,7 +142,7 @@ def _present(
 
 
 def _of_ramp(selection: Selection, confidence: float) -> Estimate:
-    """|R| with Student's interval."""
+    """The ramp |R| with Student's interval."""
     slope = selection.slope
     value, sd = abs(slope.slope), slope.standard_uncertainty
     limit = value + sd * slope.factor(LIMIT)
@@ -153,7 +153,7 @@ def _of_ramp(selection: Selection, confidence: float) -> Estimate:
 
 
 def _standard_uncertainties(spectrum: Spectrum, at: State, free: tuple[int, ...]) -> dict[int, float]:
-    """Of the free variances, from the Fisher information."""
+    """Standard uncertainties of the free variances, from the Fisher information."""
     covariance = _covariance(spectrum, at, free)
     return {k: sqrt(float(covariance[i, i])) for i, k in enumerate(free)}
 
@@ -163,7 +163,7 @@ def _covariance(spectrum: Spectrum, at: State, free: tuple[int, ...]) -> Array:
 
 
 def _correlation(selection: Selection, left: tuple[int, ...]) -> tuple[tuple[str, ...], Array]:
-    """Of the processes observed, less those not described; slope and variances are independent in the information."""
+    """Names and correlation of the observed processes that are described; slope and variances are uncorrelated."""
     count = len(selection.present)
     covariance = _covariance(selection.spectrum, selection.best, selection.free)[:count, :count]
     sd = np.sqrt(np.diag(covariance))
@@ -193,7 +193,7 @@ def _doubts(doubt: Doubt) -> tuple[str, ...]:
 
 
 def _lines(slow: Powers, fast: Powers | None) -> tuple[SpectralLine, ...]:
-    """Those of the slow part up to where the fast modes tell lines apart, which know them unfolded."""
+    """Spectral lines of the fast part, and of the slow part below it; fast modes resolve lines without aliasing."""
     if fast is None:
         return slow.lines
     cells_hz = 1.0 / slow.period_s

@@ -1,4 +1,4 @@
-"""Spectral lines: modes of a mean power spectrum that stand out of their neighbourhood. Knows no noise model."""
+"""Detection of spectral lines: modes of a mean power spectrum above their neighbourhood, without any noise model."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -15,9 +15,9 @@ LEVEL = 1e-6
 _HALF_WINDOW = 100
 _FEWEST_MODES = 32
 _FIRST = 8
-"""Below this mode of a segment the taper's main lobe meets the mean that was taken away."""
+"""First mode of a segment whose main lobe of the taper does not overlap the subtracted mean."""
 _GUARD = 2
-"""Modes beside a line that are cut out with it: the taper's main lobe."""
+"""Modes on each side of a line that are cut out with it: the main lobe of the taper."""
 _EFFICIENCY = 0.6
 """Degrees of freedom of a median over those of a mean."""
 
@@ -27,16 +27,16 @@ class SpectralLine:
     """One line that was cut out before the fit."""
 
     frequency_hz: float
-    """Of its strongest mode."""
+    """Frequency of the strongest mode of the line."""
     amplitude: float
-    """Of the sine of the same power [rate]."""
+    """Amplitude of a sine of the same power [rate]."""
 
 
 def levels_around(power: Array, dof: float, first: int = 0) -> tuple[Array, Array]:
     """Level of the noise about each mode, as of a χ²_dof of unit scale, and from how many modes, (m,) each.
 
     The median of as many modes as lie within ±100, at low modes within a factor of two: on a slope its middle value.
-    Below the mode `first` it is not wanted.
+    Below the mode `first` it is not computed.
     """
     count = len(power)
     half = np.minimum(np.arange(count) // 2, _HALF_WINDOW)
@@ -51,21 +51,21 @@ def levels_around(power: Array, dof: float, first: int = 0) -> tuple[Array, Arra
 
 
 def standing_out(dof: float, count: Array, level: float) -> Array:
-    """What a mode's power over the level about it passes with this probability, (m,), in units of one χ²_dof's scale.
+    """Threshold (m,) that a mode's power over the level about it exceeds with this probability, in scales of χ²_dof.
 
-    The level is itself of `count` modes: an F ratio of dof and dof·count degrees of freedom.
+    The level is itself the mean of `count` modes: an F ratio of dof and dof·count degrees of freedom.
     """
-    some, where = np.unique(count, return_inverse=True)  # the quantile is slow, and most modes have one count
+    some, where = np.unique(count, return_inverse=True)  # the quantile is slow, and most modes share one count
     return (dof * np.asarray(fdtri(dof, np.maximum(1.0, dof * some), 1.0 - level)))[where]
 
 
 def find_lines(
     power: Array, dof: float, segment: int, rate_hz: float
 ) -> tuple[NDArray[np.bool_], tuple[SpectralLine, ...]]:
-    """Which modes belong to lines, (m,), and the lines, of mean powers (m,) of modes 0…m−1 of `segment` samples.
+    """The mask of line modes, (m,), and the lines, in mean powers (m,) of modes 0…m−1 of `segment` samples.
 
-    A mode stands out where its power over the level about it passes what noise passes with probability `LEVEL` in the
-    whole record. A sine of amplitude a puts a²L/4 into its modes, L samples a segment.
+    A mode belongs to a line where its power over the level about it exceeds the value that noise exceeds with
+    probability `LEVEL` in the whole record. A sine of amplitude a puts a²L/4 into its modes, L samples a segment.
     """
     out = np.zeros(len(power), dtype=bool)
     if len(power) <= _FEWEST_MODES:

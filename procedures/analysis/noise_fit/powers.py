@@ -3,7 +3,7 @@
 Slow: the orthonormal cosine transform (DCT-II) of all cell means. Its modes of white noise, of a random walk and, its
 first and last reading left free, of quantization are independent; those of a flicker nearly so (correlations of a few
 per cent between the lowest). A ramp is a mean of the modes, not a power: bins keep the products that its least squares
-need. Fast: tapered segments, overlapped so that every sample counts once. Cell means of a second fold the reading
+need. Fast: tapered segments, overlapped so that every sample counts once. Cell means of a second alias the reading
 noise of all frequencies into their band; the fast modes separate it from the slower processes by its f².
 """
 
@@ -26,19 +26,19 @@ from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.noise import NoiseCoefficients
 
 FLICKER_BAND_S = NoiseCoefficients().flicker_band_s
-"""The flicker of `core.noise`, as long as nobody says otherwise."""
+"""Default flicker band, that of `core.noise`."""
 SINGLE_MODES = 50
-"""The lowest modes of the whole record stand alone."""
+"""Lowest modes of the whole record that form a bin each."""
 BINS = 300
 """Bins over the others, evenly in the logarithm of frequency."""
 CROSSOVER_HZ = 0.03
-"""From here on the full-rate segments are used, where there are any."""
+"""Frequency from which on the full-rate segments are used, if any."""
 _MODES_AT_CROSSOVER = 4
 _CUT, _ROUNDS = 1e-5, 6
-"""Probability of a power that is cut down before the noise about a line is fitted, and how often."""
+"""Probability of a power that is clipped before the noise about a line is fitted, and the number of rounds."""
 VARIANCES = range(4)
 _EDGE = 8
-"""The taper rises over one in so many samples of a segment."""
+"""The taper rises over this fraction, 1/8, of a segment."""
 
 
 @dataclass(frozen=True)
@@ -58,9 +58,9 @@ class Powers:
     gram: Array
     """Sums of products of those regressors, (b, r, r)."""
     period_s: float
-    """Of the samples the modes were made of."""
+    """Sampling period of the data behind the modes."""
     lines: tuple[SpectralLine, ...] = ()
-    """Cut out of the bins."""
+    """Spectral lines that were cut out of the bins."""
 
 
 def slow_powers(
@@ -68,7 +68,7 @@ def slow_powers(
 ) -> Powers:
     """The whole record's spectrum from its cell means, (n,) [rate], less its lines.
 
-    `regressors` (r, n) are what the rate may follow beside a ramp (a temperature, a shift of the level), any units.
+    `regressors` (r, n): quantities that the rate may follow (a temperature, a shift of the level), in any units.
     Raises `UnfitRecording` and `BadParameter`.
     """
     _check_rate("cell_s", cell_s)
@@ -107,7 +107,7 @@ def slow_powers(
 
 
 def _less(y: Array, rows: Array) -> Array:
-    """A series (n,) less what rows (r, n) explain of it by least squares, and less its mean."""
+    """A series (n,) without its mean and its least-squares fit by rows (r, n)."""
     centred = np.concatenate([rows - np.mean(rows, axis=1, keepdims=True), np.ones((1, len(y)))])
     size = np.sqrt(np.sum(centred**2, axis=1, keepdims=True))
     centred /= np.where(size > 0.0, size, 1.0)
@@ -115,9 +115,9 @@ def _less(y: Array, rows: Array) -> Array:
 
 
 def _expected_powers(coefficients: Array, expected: Array) -> Array:
-    """What Q, N, B and K that describe most of the modes (n−1,) put into each; a line is cut down to what noise shows.
+    """Expected power (n−1,) of Q, N, B and K as fitted to most of the modes; lines are clipped to the level of noise.
 
-    `expected` (4, n−1) are their powers for unit coefficients.
+    `expected` (4, n−1): the powers for unit coefficients.
     """
     bins = _Bins.over(np.arange(1, expected.shape[1] + 1), SINGLE_MODES, BINS)
     none = np.zeros((len(bins.count), 1))
@@ -143,7 +143,7 @@ class FastPowers:
     """Mean spectrum of a channel's segments at its full rate, from blocks; memory of a few segments.
 
     A segment is the power of two of samples that has at least four modes below `crossover_hz`. Its edges, an eighth
-    each, are tapered by a quarter of a sine and shared with its neighbours; what is left at the end of the record is
+    each, are tapered by a quarter of a sine and shared with its neighbours; an incomplete last segment is
     not used. Samples are rates. Raises `UnfitRecording` (NaN) and `BadParameter`.
     """
 
@@ -171,7 +171,7 @@ class FastPowers:
         """Segments taken so far; `finish` needs one."""
 
     def add(self, block: Array | NDArray[np.int32]) -> None:
-        """The next samples of the channel, (n,) [rate]."""
+        """Add the next samples of the channel, (n,) [rate]."""
         y = _checked(block, self._count)
         self._count += len(y)
         done = 0
@@ -184,7 +184,7 @@ class FastPowers:
                 self._take()
 
     def _take(self) -> None:
-        np.multiply(self._weights, self._segment, out=self._tapered)  # not np.dot: BLAS would wake its threads
+        np.multiply(self._weights, self._segment, out=self._tapered)  # not np.dot: BLAS would start its threads
         np.subtract(self._segment, np.sum(self._tapered), out=self._tapered)
         self._tapered *= self._taper
         np.fft.rfft(self._tapered, out=self._modes)
@@ -196,7 +196,7 @@ class FastPowers:
         self._segment[: self._edge] = self._segment[-self._edge :].copy()
 
     def finish(self) -> Powers:
-        """The spectrum from the crossover up, less its lines. Raises `UnfitRecording` where no segment was whole."""
+        """The spectrum from the crossover up, without its lines. Raises `UnfitRecording` where no segment was whole."""
         if self.segments == 0:
             raise UnfitRecording(f"{self._count} samples are less than one segment of {self._length}")
         length, hop = self._length, self._length - self._edge
@@ -235,7 +235,7 @@ class _Bins:
 
     @classmethod
     def over(cls, modes: NDArray[np.int64], single: int, bins: int) -> "_Bins":
-        """Of ascending mode numbers (m,): the first `single` alone, the rest in at most `bins` even ratios."""
+        """Bins of ascending mode numbers (m,): the first `single` alone, the rest in at most `bins` even ratios."""
         single = min(single, len(modes) - 1)
         edges = np.geomspace(modes[single], modes[-1] + 1, bins + 1)
         starts = np.concatenate([np.arange(single), np.searchsorted(modes, edges[:-1])])
@@ -257,7 +257,7 @@ def _check_rate(field: str, value: float) -> None:
 
 
 def _checked(values: Array | NDArray[np.int32], before: int) -> Array:
-    """As floats, (n,). Raises where a sample is no measurement."""
+    """The values as floats, (n,). Raises `BadParameter` and `UnfitRecording`."""
     if values.ndim != 1:
         raise BadParameter("samples", values.shape, "one channel, (n,)")
     y = np.asarray(values, dtype=np.float64)

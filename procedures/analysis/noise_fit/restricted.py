@@ -4,7 +4,7 @@ Modes c of bin b: ``c ~ N(x'β, S_b)``, ``S = A·v``, v ≥ 0 the variances (squ
 free amplitudes. With M = ΣG_b/S_b, G the bins' Gram matrices, β = M⁻¹Σ(x'c)_b/S_b, E_b = Σ(c − x'β)², the restricted
 log likelihood is ``−½(Σν ln S + ln det M + ΣE/S)`` (Patterson and Thompson, Biometrika 58 (1971) 545). Its gradient
 vanishes where v is the least squares solution of ``E_b/ν'_b = (A v)_b`` with weights ``ν'_b/(2S_b²)``, ν' = ν less the
-leverage of β: Fisher scoring, each step a non-negative least squares. Knows no processes.
+leverage of β: Fisher scoring, each step a non-negative least squares. Independent of the processes.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ _SMOOTHED = 9
 """Bins over which the first guess of S is taken."""
 _WIDENINGS = 60
 _LEAST_SHARE, _MOVED = 1e-6, 0.1
-"""A start that explains less than this share of a bin's power is moved inwards, by so much of a fit of each alone."""
+"""A start that explains less than this share of a bin's power is moved inwards, by this part of each single fit."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,11 @@ class Spectrum:
 
     @property
     def without_ramp(self) -> "Spectrum":
-        """With all regressors but the first, which is the ramp."""
+        """The same bins with all regressors but the first, the ramp."""
         return self.only(range(1, self.products.shape[1]))
 
     def only(self, regressors: Sequence[int]) -> "Spectrum":
-        """With some of the regressors."""
+        """The same bins with some of the regressors."""
         keep = list(regressors)
         gram = self.gram[:, keep][:, :, keep]
         return Spectrum(self.squares, self.dof, self.columns, self.products[:, keep], gram)
@@ -50,28 +50,28 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class State:
-    """All that follows from one v."""
+    """Quantities that follow from one vector v of variances."""
 
     variances: Array
-    """v, (p,)."""
+    """Variances v, (p,)."""
     power: Array
-    """S, (b,)."""
+    """Expected power S, (b,)."""
     residual: Array
-    """E/ν', (b,)."""
+    """Residual power E/ν', (b,)."""
     dof: Array
-    """ν', (b,)."""
+    """Residual degrees of freedom ν', (b,)."""
     amplitudes: Array
-    """β, (r,)."""
+    """Regressors' amplitudes β, (r,)."""
     amplitude_covariance: Array
-    """M⁻¹, (r, r)."""
+    """Covariance M⁻¹ of the amplitudes, (r, r)."""
     log_likelihood: float
-    """Restricted; comparable between fits with the same regressors."""
+    """Restricted log likelihood; comparable between fits with the same regressors."""
     plain_log_likelihood: float
-    """Without ln det M; comparable between any."""
+    """Log likelihood without ln det M; comparable between any fits."""
 
 
 def state(spectrum: Spectrum, variances: Array) -> State:
-    """The state at v."""
+    """Compute the state at variances v."""
     s = spectrum
     power = s.columns @ variances
     if not np.all(power > 0.0):
@@ -89,7 +89,7 @@ def state(spectrum: Spectrum, variances: Array) -> State:
 
 
 def _impossible(spectrum: Spectrum, variances: Array) -> State:
-    """Where the model has no power at all, and the record has."""
+    """State of a model without power in some bin where the record has power."""
     amplitudes = spectrum.products.shape[1]
     nothing = np.zeros_like(spectrum.dof)
     flat, covariance = np.zeros(amplitudes), np.zeros((amplitudes, amplitudes))
@@ -135,9 +135,9 @@ def maximum(
 
 
 def _inside(spectrum: Spectrum, free: list[int], guess: Array) -> Array:
-    """The guess, moved off the edge where it leaves a bin without power: no step leads away from there.
+    """The guess, moved off the boundary if it leaves a bin without power: no step leads away from there.
 
-    A least squares guess takes for zero whatever does not add to the greatest bins (a low-pass, a lone quantization).
+    Least squares set to zero whatever does not contribute to the greatest bins (a low-pass, a lone quantization).
     """
     power = spectrum.columns @ guess
     if np.all(power > _LEAST_SHARE * _smooth(spectrum)):
@@ -166,7 +166,7 @@ def _step(spectrum: Spectrum, free: list[int], fixed: Array, target: Array, dof:
 
 
 def _climb(spectrum: Spectrum, best: State, target: Array) -> State:
-    """From `best` towards `target`, as far as the likelihood grows."""
+    """Step from `best` towards `target` as far as the likelihood grows."""
     part = 1.0
     while part > 1e-4:
         tried = state(spectrum, best.variances + part * (target - best.variances))
@@ -178,7 +178,7 @@ def _climb(spectrum: Spectrum, best: State, target: Array) -> State:
 
 @dataclass
 class Profile:
-    """Twice the log likelihood lost where variance k is held, the other `free` ones at their best."""
+    """Twice the loss of log likelihood where variance k is held fixed and the other `free` ones are fitted."""
 
     spectrum: Spectrum
     free: tuple[int, ...]
@@ -186,12 +186,12 @@ class Profile:
     best: State
 
     def loss(self, variance: float) -> float:
-        """At one value of the variance k."""
+        """Twice the loss of log likelihood at one value of variance k."""
         held = maximum(self.spectrum, self.free, (self.k, variance), self.best.variances)
         return 2.0 * (self.best.log_likelihood - held.log_likelihood)
 
     def crossing(self, loss: float, *, upwards: bool, scale: float) -> float:
-        """The variance where so much is lost, above or below the best one; below, 0 where less is lost at 0.
+        """The variance whose loss equals `loss`, above or below the best one; below it, 0 if the loss at 0 is less.
 
         `scale` is the variance's standard uncertainty, the first step of the search. Infinite where nothing is lost.
         """
@@ -209,6 +209,6 @@ class Profile:
 
 
 def only_where(mask: NDArray[np.bool_], spectrum: Spectrum) -> Spectrum:
-    """Some of the bins."""
+    """Select some of the bins."""
     s = spectrum
     return Spectrum(s.squares[mask], s.dof[mask], s.columns[mask], s.products[mask], s.gram[mask])

@@ -1,14 +1,14 @@
-"""Which processes a spectrum shows. Likelihood ratios on the boundary, and a t test of the ramp.
+"""Selection of the processes that a spectrum shows: likelihood ratios on the boundary, and a t test of the ramp.
 
 A variance at its bound 0: twice the log likelihood ratio is 0 or χ²₁ with probability one half each (Self and Liang,
-J. Am. Stat. Assoc. 82 (1987) 605), so ``p = ½·P(χ²₁ > T)``. Rule: of Q, N and B, leave out the least significant as
-long as its p is above the level; then take in any whose p has come below. The ramp is a mean: its slope over its
+J. Am. Stat. Assoc. 82 (1987) 605), so ``p = ½·P(χ²₁ > T)``. Rule: of Q, N and B, remove the least significant while
+its p is above the level; then add any whose p has fallen below it. The ramp is a mean: its slope over its
 standard uncertainty has Student's distribution with Satterthwaite's degrees of freedom, ``2s⁴/Var(s²)``, since the
-uncertainty itself hangs on how well the slow powers are known (Kenward and Roger, Biometrics 53 (1997) 983).
+uncertainty itself depends on how well the slow powers are known (Kenward and Roger, Biometrics 53 (1997) 983).
 
 Flicker, rate random walk and ramp explain the same slow motion. A drift is claimed only where the flicker, allowed,
 does not explain it. Ramp and walk are each tested with the other allowed too; where neither is then needed, but one
-of them is, the likelier one is taken and said to be ambiguous.
+of them is, the likelier one is taken and reported as ambiguous.
 """
 
 from collections.abc import Iterable
@@ -25,13 +25,13 @@ from procedures.core.arrays import Array
 RAMP, ENDS = 0, (1, 2)
 """Regressors: the ramp; the first and the last reading, which are always free."""
 VARIANCES = range(4)
-"""Q², N², B², K²; a column after them is not tested, and always in."""
+"""Columns of Q², N², B², K²; a column after them is untested and always included."""
 _OTHERS = (QUANTIZATION, RANDOM_WALK, BIAS_INSTABILITY)
 
 
 @dataclass(frozen=True)
 class Slope:
-    """The ramp's slope as a fit sees it."""
+    """The ramp's slope in a fit, with its uncertainty."""
 
     slope: float
     standard_uncertainty: float
@@ -40,11 +40,11 @@ class Slope:
 
     @property
     def p_value(self) -> float:
-        """Two-sided, of no slope."""
+        """Two-sided p-value of the hypothesis of no slope."""
         return 2.0 * float(stdtr(self.dof, -abs(self.slope) / self.standard_uncertainty))
 
     def factor(self, probability: float) -> float:
-        """Student's quantile."""
+        """Student's quantile at `probability`, with these degrees of freedom."""
         return float(stdtrit(self.dof, probability))
 
 
@@ -53,23 +53,23 @@ class Selection:
     """The processes found, and the fit with them alone."""
 
     present: tuple[int, ...]
-    """Of `VARIANCES`, ascending."""
+    """Indices in `VARIANCES`, ascending."""
     ramp: bool
     spectrum: Spectrum
-    """With the regressors of the fit."""
+    """The spectrum with the regressors of the fit."""
     best: State
     free: tuple[int, ...]
     """Variances of the fit: those present and the untested."""
     p_values: tuple[float, ...]
-    """Of Q, N, B, K, R."""
+    """The p-values of Q, N, B, K, R."""
     slope: Slope
-    """In the fit if it has a ramp, else with all processes allowed."""
+    """Slope from the fit if it has a ramp, else from the fit of all processes."""
     ambiguous: bool
-    """A drift is there, but K and R are not told apart."""
+    """A drift is present, but K and R cannot be distinguished."""
 
 
 def select(spectrum: Spectrum, level: float) -> Selection:
-    """The processes of a spectrum whose regressors are ramp, first and last reading, and others that always stay."""
+    """Select the processes of a spectrum; its regressors are ramp, first and last reading, and others always kept."""
     untested = tuple(range(len(VARIANCES), spectrum.columns.shape[1]))
     sloped, flat = _Fits(spectrum, untested), _Fits(spectrum.without_ramp, untested)
     everything = slope_of(spectrum, sloped.best(VARIANCES))
@@ -89,7 +89,7 @@ def select(spectrum: Spectrum, level: float) -> Selection:
 
 @dataclass
 class _Fits:
-    """Fits of one spectrum, each made once; what is not tested is always in."""
+    """Cached fits of one spectrum; the untested variances are always free."""
 
     spectrum: Spectrum
     untested: tuple[int, ...]
@@ -105,14 +105,14 @@ class _Fits:
         return self._found[key]
 
     def p_value(self, present: Iterable[int], k: int) -> float:
-        """Of variance k beside the other present ones."""
+        """The p-value of variance k, given the other present ones."""
         others = [i for i in present if i != k]
         ratio = 2.0 * (self.best((*others, k)).log_likelihood - self.best(others).log_likelihood)
         return 0.5 * erfc(sqrt(0.5 * ratio)) if ratio > 0.0 else 1.0
 
 
 def slope_of(spectrum: Spectrum, at: State, index: int = RAMP) -> Slope:
-    """One regressor, the ramp if not said otherwise, at a state that has it; with Satterthwaite's degrees."""
+    """Slope of one regressor (default: the ramp) at a fitted state, with Satterthwaite's degrees of freedom."""
     s, inverse = spectrum, at.amplitude_covariance
     variance = float(inverse[index, index])
     by_variance = np.einsum("bk,bij->kij", s.columns / at.power[:, None] ** 2, s.gram)
@@ -129,7 +129,7 @@ def inverse_information(matrix: Array) -> Array:
 
 
 def _drift(sloped: _Fits, flat: _Fits, walk: bool, level: float) -> tuple[bool, bool, bool]:
-    """(ramp, rate random walk, ambiguous), where the ramp is not needed beside all others; `walk`: the walk is."""
+    """(ramp, rate random walk, ambiguous), where all others make the ramp needless; `walk`: the walk is needed."""
     without_walk = sloped.best(_OTHERS)
     with_slope = slope_of(sloped.spectrum, without_walk).p_value < level
     if not (with_slope or walk):
@@ -141,7 +141,7 @@ def _drift(sloped: _Fits, flat: _Fits, walk: bool, level: float) -> tuple[bool, 
 
 
 def _chosen(fits: _Fits, fixed: tuple[int, ...], level: float) -> tuple[int, ...]:
-    """Backward elimination of Q, N, B, then forward inclusion, beside those fixed."""
+    """Backward elimination of Q, N, B, then forward inclusion, with the `fixed` ones always in."""
     present = list(_OTHERS)
     while len(present) + len(fixed) + len(fits.untested) > 1 and present:
         p_values = [fits.p_value((*present, *fixed), k) for k in present]

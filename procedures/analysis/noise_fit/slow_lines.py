@@ -1,8 +1,8 @@
-"""Lines in the slow part of a record: found in the spectrum of all cell means, and taken out by least squares.
+"""Lines in the slow part of a record: detected in the spectrum of all cell means, and removed by least squares.
 
 A line of few cycles leaks into every mode of the whole record, so leaving modes out is not enough: the strongest one
-that stands out of its neighbourhood is fitted, then the next in what is left, all of them anew with each. What the fit
-takes of the noise lies in the modes beside the line, which are left out.
+that stands out of its neighbourhood is fitted, then the next in the residuals, and all lines are refitted each time.
+The noise that the fit absorbs lies in the modes adjacent to the line, which are left out.
 """
 
 from dataclasses import dataclass
@@ -20,33 +20,33 @@ LEVEL = 1e-4
 MOST_LINES = 20
 _FEWEST_CELLS = 64
 _FIRST = 3
-"""Cycles in the record; what has less is a drift."""
+"""Fewest cycles in the record; anything with fewer is a drift."""
 _BESIDE = 3
-"""Modes of half a cycle in the record, on each side of a line, that are left out with it."""
+"""Modes (half a cycle in the record each) on each side of a line that are left out with it."""
 _MANY = 100
-"""Cycles from which on a mode has enough neighbours to tell its level."""
+"""Cycles from which on a mode has enough neighbours to estimate its level."""
 _FINE = 65
 _EFFICIENCY = 0.35
-"""Of a median of neighbouring, overlapping modes, against a mean of independent ones."""
+"""Efficiency of a median of neighbouring, overlapping modes, relative to a mean of independent ones."""
 
 
 @dataclass(frozen=True)
 class WithoutLines:
-    """A record less its lines."""
+    """A record without its spectral lines."""
 
     cells: Array
-    """(n,) [rate]"""
+    """Cell means without the lines, (n,) [rate]."""
     lines: tuple[SpectralLine, ...]
-    """By frequency."""
+    """The lines, sorted by frequency."""
     beside: NDArray[np.bool_]
-    """Modes 1…n−1 of the cosine transform that lie beside a line, (n−1,)."""
+    """Modes 1…n−1 of the cosine transform that are adjacent to a line, (n−1,)."""
 
 
 def without_lines(cells: Array, cell_s: float, expected: Array) -> WithoutLines:
-    """Takes lines of at least three cycles out of cell means (n,).
+    """Subtract spectral lines of at least three cycles from cell means (n,).
 
-    `expected` (n−1,) is what the noise puts into modes 1…n−1 of the cosine transform. Of many cycles, the level about
-    a mode counts where it is higher: noise of a filter's edge is no line.
+    `expected` (n−1,) is the expected noise power in modes 1…n−1 of the cosine transform. At many cycles, the level
+    about a mode counts where it is higher: noise at a filter's edge is no line.
     """
     n = len(cells)
     found: list[float] = []
@@ -74,13 +74,13 @@ def _frequency(line: SpectralLine) -> float:
 
 
 def _detrended(y: Array) -> Array:
-    """Less its mean and slope."""
+    """The record without its mean and slope."""
     t = np.arange(len(y)) - 0.5 * (len(y) - 1)
     return y - np.mean(y) - t * (float(np.dot(t, y)) / float(np.dot(t, t)))
 
 
 def _strongest(y: Array, taper: Array, expected: Array) -> float | None:
-    """Cycles in the record of the mode that stands out most; None where none does."""
+    """Cycles in the record of the most prominent mode; None where none is significant."""
     power = np.abs(np.fft.rfft(y * taper)) ** 2
     power = power[:-1]
     around, _ = levels_around(power, 2.0, _MANY)
@@ -90,7 +90,7 @@ def _strongest(y: Array, taper: Array, expected: Array) -> float | None:
     limit = float(standing_out(2.0, np.array([_EFFICIENCY * _MANY]), LEVEL / len(power))[0])
     ratio = np.zeros(len(power))
     ratio[_FIRST:] = power[_FIRST:] / np.maximum(level[_FIRST:], np.finfo(float).tiny) / limit
-    ratio[level <= 1e-24 * float(np.max(power))] = 0.0  # a noiseless record: rounding has no lines
+    ratio[level <= 1e-24 * float(np.max(power))] = 0.0  # a noiseless record: rounding is no line
     first = int(np.argmax(ratio))
     if ratio[first] <= 1.0:
         return None
@@ -104,7 +104,7 @@ def _strongest(y: Array, taper: Array, expected: Array) -> float | None:
 
 
 def _fitted(cells: Array, cycles: list[float]) -> tuple[Array, Array]:
-    """Cells less the lines, and the lines' amplitudes; mean and slope are fitted beside them, and stay."""
+    """Cells without the lines, and the lines' amplitudes; mean and slope are fitted too, and stay in the cells."""
     n = len(cells)
     t = (np.arange(n) - 0.5 * (n - 1)) / n
     phase = 2.0 * pi * np.outer(cycles, t)

@@ -1,6 +1,6 @@
-"""Coefficients of a part of the spectrum that the noise model does not describe: no value, but a limit that holds.
+"""Upper limits of coefficients in a part of the spectrum that the noise model does not describe.
 
-Powers of independent processes add: whatever else is in an octave, its power is at least what one process puts there.
+Powers of independent processes add: whatever else is in an octave, its power is at least that of any one process.
 So ``v ≤ Σ squares/(χ²_ν(p/G)·mean column)`` in each of G octaves, p the probability that the limit fails.
 """
 
@@ -20,13 +20,13 @@ from procedures.core.arrays import Array
 FAILS = 0.05
 """Probability that a limit fails."""
 SHARE = 0.5
-"""Of what a spectrum tells of a coefficient, from which on it is not described if that share was left out."""
+"""Share of the information on a coefficient whose exclusion leaves the coefficient undescribed."""
 _RAMP_OCTAVES = 2
 _SIGMAS = 2.0
 
 
 def undescribed(agreement: Agreement, *, coarse: bool) -> tuple[int, ...]:
-    """Which of `PROCESSES`, by number, the fit does not describe; `coarse`: the noise is less than a count."""
+    """Indices in `PROCESSES` that the fit does not describe; `coarse`: the noise is less than a count."""
     if not agreement.described:
         return tuple(range(len(PROCESSES)))
     found = {QUANTIZATION, RANDOM_WALK} if coarse else set[int]()
@@ -45,7 +45,7 @@ def undescribed(agreement: Agreement, *, coarse: bool) -> tuple[int, ...]:
 
 
 def limited(agreement: Agreement, estimates: tuple[Estimate, ...], numbers: tuple[int, ...]) -> tuple[Estimate, ...]:
-    """The estimates, those of some numbers without value and with the limit of the octaves' power."""
+    """The estimates; those in `numbers` have no value, and the limit that the octaves' power sets."""
     return tuple(
         replace(
             e,
@@ -63,7 +63,7 @@ def limited(agreement: Agreement, estimates: tuple[Estimate, ...], numbers: tupl
 
 
 def _limit(plain: Joined, number: int) -> float:
-    """Of one coefficient, from all octaves up to the highest that is fitted."""
+    """Upper limit of one coefficient, from all octaves up to the highest that is fitted."""
     if number not in VARIANCES:
         return _ramp_limit(plain)
     s, group = plain.spectrum, plain.group
@@ -80,7 +80,7 @@ def _limit(plain: Joined, number: int) -> float:
 
 
 def _ramp_limit(plain: Joined) -> float:
-    """The slope of the lowest octaves, and twice what their power leaves unknown of it."""
+    """Upper limit of the ramp: the slope in the lowest octaves plus twice its standard uncertainty from their power."""
     s = plain.spectrum
     low = plain.group < _RAMP_OCTAVES
     size = float(np.sum(s.gram[low, RAMP, RAMP]))
@@ -89,5 +89,5 @@ def _ramp_limit(plain: Joined) -> float:
 
 
 def _column(plain: Joined, k: int) -> Array:
-    """Expected power (b,) of one process, the white one without a filter's edge."""
+    """Expected power (b,) of one process; that of white noise without the filter's edge."""
     return plain.white if k == RANDOM_WALK else plain.spectrum.columns[:, k]

@@ -1,1 +1,1 @@
-"""A constant bias estimated measurement by measurement: how sure of it we are by now, when a dwell is long enough."""
+"""Recursive estimate of a constant bias: its uncertainty after each measurement, and the dwell that is needed."""

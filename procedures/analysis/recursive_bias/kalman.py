@@ -3,8 +3,8 @@
 The state is the bias, ``x(k+1) = x(k)``; a measurement is ``z(k) = x + v(k)``. Under white noise of variance R this is
 S 5.180-5.183 with Φ = H = 1, Q = 0: ``K = P/(P + R)``, ``P ← (1 − K)·P``, ``x̂ ← x̂ + K·(z − x̂)``. Under noise of any
 covariance C = L·Lᵀ the innovations of the noise are white: ``y = L⁻¹z = L⁻¹1·x + ν`` with unit variance, and since L is
-triangular, y(k) needs the measurements up to k alone. Filtering y is the filter with the whole of C in it; no state has
-to be added for it.
+triangular, y(k) needs the measurements up to k alone. Filtering y thus accounts for the whole of C, without additional
+states.
 """
 
 import numpy as np
@@ -15,10 +15,10 @@ from procedures.core.errors import BadParameter
 
 
 class RecursiveBias:
-    """Best linear estimate of a constant from measurements that come one after the other.
+    """Best linear estimate of a constant from successive measurements.
 
     `covariance` (n, n) of the noise of all measurements that may come; n·R on the diagonal alone is S's filter.
-    `prior_variance` None knows nothing beforehand: then the first measurement is the first estimate.
+    `prior_variance` None: no prior knowledge; the first measurement is then the first estimate.
     """
 
     def __init__(self, covariance: Array, prior_mean: float = 0.0, prior_variance: float | None = None) -> None:
@@ -33,7 +33,7 @@ class RecursiveBias:
         self._normalised: list[float] = []
         self._prior = prior
         self.count = 0
-        """Measurements so far."""
+        """Number of measurements so far."""
         self.estimate = prior_mean
 
     @property
@@ -43,7 +43,7 @@ class RecursiveBias:
 
     @property
     def gains(self) -> Array:
-        """K(k) on what a measurement adds to the ones before it, shape (n,): S 5.181 where the noise is white.
+        """Gains K(k) on the innovation of each measurement, shape (n,): S 5.181 where the noise is white.
 
         ``x̂(k) = x̂(k−1) + K(k)·(z(k) − ẑ(k))``, with ẑ(k) the measurement expected from all before it.
         """
@@ -51,7 +51,7 @@ class RecursiveBias:
 
     @property
     def sd(self) -> float:
-        """Standard uncertainty by now; infinite before anything is known."""
+        """Current standard uncertainty of the bias; infinite before anything is known."""
         if self.count:
             return float(1.0 / np.sqrt(self._information[self.count - 1]))
         return float(1.0 / np.sqrt(self._prior)) if self._prior > 0.0 else float("inf")
@@ -65,7 +65,7 @@ class RecursiveBias:
         return np.array(self._normalised)
 
     def update(self, measurement: float) -> float:
-        """Take the next measurement; returns the new estimate."""
+        """Process the next measurement and return the new estimate."""
         k = self.count
         if k == len(self._lower):
             raise BadParameter("measurements", k + 1, f"at most the {k} whose noise was declared")
@@ -81,11 +81,11 @@ class RecursiveBias:
         return self.estimate
 
     def enough_at(self, target_sd: float) -> int | None:
-        """Number of measurements that will be enough, known before the first; None where all n are too few."""
+        """Number of measurements that suffices, known before the first; None where all n are too few."""
         reached = np.flatnonzero(self.variances <= target_sd**2)
         return int(reached[0]) + 1 if reached.size else None
 
 
 def white_covariance(variance: float, count: int) -> Array:
-    """R on the diagonal, shape (n, n): S's white noise."""
+    """White-noise covariance of S: R on the diagonal, shape (n, n)."""
     return variance * np.eye(count)

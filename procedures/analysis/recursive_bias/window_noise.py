@@ -1,7 +1,7 @@
-"""Means of a channel over windows that follow one another, and the covariance of their noise.
+"""Means of a channel over successive windows, and the covariance of their noise.
 
-The noise of such means is not white. Quantization ties neighbours: both share the reading at their common edge, with
-opposite signs. Flicker and rate random walk tie all of them.
+The noise of such means is not white. Quantization correlates neighbours: both share the reading at their common edge,
+with opposite signs. Flicker and rate random walk correlate all of them.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import Recording
 
 WINDOWS_MAX = 300
-"""Windows a recording is cut into at the most: their covariance is a full matrix."""
+"""Most windows of a recording: their covariance is a full matrix."""
 WINDOWS_MIN = 20
 BATCHES = 10
 
@@ -41,10 +41,10 @@ class WindowMeans:
 
 
 def window_means(recording: Recording, names: tuple[str, ...], window_s: float) -> WindowMeans:
-    """Block by block; the window is lengthened so that there are at most `WINDOWS_MAX`, what is left over is cut off.
+    """Mean rates over windows, block by block; windows are lengthened to be at most `WINDOWS_MAX`, the rest is dropped.
 
-    Raises `MissingChannel`, and `UnfitRecording` where there are fewer than `WINDOWS_MIN` windows or samples that are
-    not numbers or not as many as announced.
+    Raises `MissingChannel`, and `UnfitRecording` where there are fewer than `WINDOWS_MIN` windows, samples that are not
+    numbers, or another number of samples than announced.
     """
     info = recording.info
     size = max(1, round(window_s * info.rate_hz), -(-info.count // WINDOWS_MAX))
@@ -64,9 +64,9 @@ def window_means(recording: Recording, names: tuple[str, ...], window_s: float) 
 def contiguous_covariance(noise: NoiseCoefficients, windows: Array) -> Array:
     """Covariance (n, n) [rate²] of the means over windows (n, 2), from a channel's coefficients.
 
-    `station_noise` has all but the quantization of neighbours: a reading of the integrated output errs by Q, a mean
+    `station_noise` gives all but the quantization of neighbours: a reading of the integrated output errs by Q, a mean
     over T by the difference of two readings, so ``2Q²/T²`` on the diagonal and, where two windows touch, ``−Q²/T²``
-    beside it.
+    next to it.
     """
     covariance = mean_covariance(noise, windows)
     lengths = windows[:, 1] - windows[:, 0]
@@ -78,10 +78,10 @@ def contiguous_covariance(noise: NoiseCoefficients, windows: Array) -> Array:
 
 
 def observed_covariance(means: Array) -> Array:
-    """Covariance (n, n) from the means (n,) themselves, for a channel whose noise nobody knows.
+    """Covariance (n, n) from the means (n,) themselves, for a channel of unknown noise.
 
     Variance and covariance of neighbours, nothing farther (a moving average of order one): white noise and
-    quantization. Its correlation lies within ±1/2 by nature, and an estimate outside is taken as that end.
+    quantization. Its correlation lies within ±1/2 by definition, and an estimate outside is clipped to that range.
     """
     centred = means - means.mean()
     variance = float(centred @ centred) / (len(means) - 1)
@@ -95,13 +95,13 @@ def observed_covariance(means: Array) -> Array:
 
 
 def spectral_covariance(means: Array, length_s: float) -> Array:
-    """Covariance (n, n) from what the spectrum of the means (n,) over windows of `length_s` says of their noise.
+    """Covariance (n, n) from the noise fitted to the spectrum of the means (n,) over windows of `length_s`.
 
     Quantization, random walk and flicker of `fit_noise`; each coefficient counts with its standard uncertainty added,
-    for the bias leans on a random walk that quantization nearly hides. One not observed at all counts with half of its
-    upper limit, where the random walk is concerned: nothing else keeps the uncertainty from falling for ever. A rate
-    random walk or a ramp is left out: with them there is no constant bias, and `slow_noise_p` says so. Where the
-    spectrum cannot be fitted it is `observed_covariance`. Raises `UnfitRecording` of a constant channel.
+    since the bias depends on a random walk that quantization nearly hides. An unobserved random walk counts with half
+    of its upper limit: nothing else keeps the uncertainty from falling without bound. A rate random walk or a ramp is
+    left out: with them there is no constant bias, and `slow_noise_p` reveals it. Where the spectrum cannot be fitted
+    the result is `observed_covariance`. Raises `UnfitRecording` for a constant channel.
     """
     observed = observed_covariance(means)
     try:
@@ -119,12 +119,12 @@ def spectral_covariance(means: Array, length_s: float) -> Array:
 
 
 def _with_uncertainty(estimate: Estimate) -> float:
-    """Value and standard uncertainty; zero where the process was not observed."""
+    """Sum of value and standard uncertainty; zero where the process was not observed."""
     return 0.0 if estimate.value is None else estimate.value + (estimate.standard_uncertainty or 0.0)
 
 
 def slow_noise_p(means: Array, covariance: Array) -> float:
-    """Chance that `BATCHES` equal parts of the means (n,) scatter as they do, if their noise has this covariance.
+    """Probability that `BATCHES` equal parts of the means (n,) scatter this much under the given covariance.
 
     ``χ² = rᵀV⁻¹r`` of the parts about their weighted mean, V their covariance, with one degree of freedom fewer than
     parts; noise slower than declared makes it large.
@@ -149,19 +149,19 @@ def predicted_sd(noise: NoiseCoefficients, dwell_s: float, start_s: float, prior
 def dwell_needed(
     noise: NoiseCoefficients, target_sd: float, start_s: float, prior_variance: float | None, shortest_s: float
 ) -> float | None:
-    """Shortest dwell [s], not under `shortest_s`, that makes a bias as sure as asked; None where none does."""
+    """Shortest dwell [s], `shortest_s` at least, for the required uncertainty of a bias; None where none suffices."""
     return dwell_for(lambda dwell: predicted_sd(noise, dwell, start_s, prior_variance), target_sd, shortest_s)
 
 
 def known_noise(noise: NoiseCoefficients | None) -> NoiseCoefficients | None:
-    """The coefficients where at least one of those that fall on short times is there, else None."""
+    """The coefficients if at least one of the short-time processes is present, else None."""
     if noise is None or not (noise.quantization > 0.0 or noise.random_walk > 0.0 or noise.bias_instability > 0.0):
         return None
     return noise
 
 
 def channel_names(recording: Recording, wanted: tuple[str, ...] | None, all_of: tuple[str, ...]) -> tuple[str, ...]:
-    """The channels asked for, else those of `all_of` that the recording has. Raises `MissingChannel`."""
+    """The requested channels, else those of `all_of` that the recording has. Raises `MissingChannel`."""
     present = tuple(c.name for c in recording.info.channels)
     names = wanted or tuple(name for name in all_of if name in present)
     if not names:

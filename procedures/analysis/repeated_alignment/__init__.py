@@ -1,1 +1,1 @@
-"""Initial alignment over and over at known attitudes: the errors to expect, and the errors found."""
+"""Repeated initial alignment at known attitudes: expected errors and observed errors."""

@@ -1,4 +1,4 @@
-"""The errors to expect of repeated alignments: their full covariance, by source.
+"""Expected errors of repeated alignments: their full covariance, by source.
 
 To first order the error of (heading, pitch, roll) at alignment i is ``J_i·δ(f, ω)_i``, with J_i the derivative of the
 attitude at the place (`navigation.alignment`), and the vectors' errors are those of a calibrated unit in its launches.
@@ -41,7 +41,7 @@ class Alignments:
     windows: Array
     """[start, stop] of each since its own launch [s], shape (n, 2)."""
     launches: tuple[int, ...]
-    """Which launch each belongs to, (n,)."""
+    """Launch of each alignment, (n,)."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class ExpectedErrors:
 
     by_source: Mapping[str, Array]
     noise_known: bool
-    """False: the noise of some triad is not known, and its part is not in."""
+    """False: the noise of some triad is unknown, and its part is missing."""
 
     def of_angle(self, angle: int) -> Array:
         """All sources together for one of `ANGLES` by index, shape (n, n)."""
@@ -65,7 +65,7 @@ class ExpectedErrors:
 def planned_alignments(
     unit: Unit, site: Site, table: TableUncertainty, stations: Sequence[Station], axes: Sequence[tuple[float, float]]
 ) -> Alignments:
-    """Alignments from stations that all carry angles; one that is switched off before begins a launch.
+    """Alignments from stations that all have angles; switching off before a station begins a new launch.
 
     `axes` are (rate, acceleration) of the table's axes, for the time that moves take.
     """
@@ -93,7 +93,7 @@ def reference_attitudes(angles: Sequence[TableAngles], site: Site) -> Array:
 
 
 def calibration_in_use(unit: Unit, triad: str) -> TriadCalibration:
-    """The unit's current calibration of a triad, which is aligned with. Raises `DomainError` without one."""
+    """The unit's current calibration of a triad, used for the alignment. Raises `DomainError` without one."""
     return unit.required_calibration(triad, "align with")
 
 
@@ -159,7 +159,7 @@ def _noise(plan: Alignments, triad: str) -> Array | None:
     blocks: dict[bytes, Array | None] = {}
     for launch in np.unique(launches):
         own = np.flatnonzero(launches == launch)
-        spans = np.round(plan.windows[own], 6)  # launches that are alike but for rounding share their block
+        spans = np.round(plan.windows[own], 6)  # launches that are equal except for rounding share their block
         if spans.tobytes() not in blocks:
             blocks[spans.tobytes()] = triad_covariance(plan.unit.triad(triad), spans)
         block = blocks[spans.tobytes()]
@@ -179,11 +179,11 @@ def _launch_to_launch(plan: Alignments, triad: str, outputs: Array) -> Array:
 
 
 def _spread(per_channel: Array, covariance: Array) -> Array:
-    """From channels (3, n, n) to angles (3n, 3n)."""
+    """Propagate a covariance from channels (3, n, n) to angles (3n, 3n)."""
     n = len(per_channel)
     return np.einsum("iac,cij,jbc->iajb", per_channel, covariance, per_channel).reshape(3 * n, 3 * n)
 
 
 def rms_deg(covariance: Array) -> float:
-    """Root of the mean variance [deg]."""
+    """Root of the mean variance of a covariance [deg]."""
     return float(np.sqrt(np.mean(np.diagonal(covariance)))) / units.DEG

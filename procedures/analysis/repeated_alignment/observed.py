@@ -1,4 +1,4 @@
-"""The errors found in repeated alignments, and whether they are as expected."""
+"""Observed errors of repeated alignments, and their agreement with the expected ones."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -32,39 +32,39 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Alignment:
-    """One alignment: (heading, pitch, roll) found and their errors against the table's, with what was expected."""
+    """One alignment: observed (heading, pitch, roll), their errors against the table's, and the expected errors."""
 
     label: str
     launch: int
-    """Number of its launch among the recordings', from 1."""
+    """Number of its launch within the recordings, from 1."""
     duration_s: float
     attitude_deg: Triple
     error_deg: Triple
     expected_sd_deg: Triple
-    """Without the noise where that is not known."""
+    """Expected standard deviations; without the noise where that is not known."""
 
 
 @dataclass(frozen=True)
 class AngleErrors:
-    """One angle over all alignments: what was found beside what the unit's record and calibration predict."""
+    """Errors of one angle over all alignments: observed, and predicted by the unit's record and calibration."""
 
     angle: str
     mean_error_deg: float
     mean_error_expected_sd_deg: float
     spread_deg: float | None
-    """Sample standard deviation over the alignments; None of a single one."""
+    """Sample standard deviation over the alignments; None for a single one."""
     expected_spread_deg: float | None
     expected_sd_deg: float
-    """Of a single alignment (root mean square over them)."""
+    """Expected standard deviation of a single alignment (root mean square over all)."""
     expected_by_source_deg: Mapping[str, float]
     chi_square: float | None
     """``eᵀC⁻¹e`` over all alignments; None where the noise is not known."""
     p_value: float | None
-    """Chance of one at least as large."""
+    """Probability of a chi-square at least as large."""
 
 
 def recorded_alignments(recordings: Sequence[Recording], unit: Unit, site: Site, table: TableUncertainty) -> Alignments:
-    """When and where the recordings were made. Raises `UnfitRecording` where one has no table angles."""
+    """Times and attitudes of the recordings. Raises `UnfitRecording` where one has no table angles."""
     infos = [r.info for r in recordings]
     angles = tuple(i.station.angles for i in infos if i.station is not None and i.station.angles is not None)
     if not infos or len(angles) < len(infos):
@@ -103,7 +103,7 @@ def alignment_errors(found: Array, plan: Alignments) -> Array:
 def told_alignments(
     recordings: Sequence[Recording], plan: Alignments, found: Array, errors: Array, expected: ExpectedErrors
 ) -> tuple[Alignment, ...]:
-    """Alignment by alignment, in the units people read."""
+    """Convert the results to display units, alignment by alignment."""
     sds = np.column_stack([np.sqrt(np.diagonal(expected.of_angle(a))) for a in range(3)])
     told: list[Alignment] = []
     for i, recording in enumerate(recordings):

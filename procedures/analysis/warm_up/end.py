@@ -1,8 +1,8 @@
 """The end of the warm-up: the transient's last moment above a stated share of the noise.
 
-Thesis 4.1.2 sees a transient of 600 s in a moving average; paper A fits a sum of exponentials and cuts 11 700 s; the
-standards say to cut the warm-up off, not where it ends. Here it ends where the fitted curve falls below `FRACTION` of
-the noise's own Allan deviation at the averaging time, and stays there.
+Thesis 4.1.2 finds a transient of 600 s in a moving average; paper A fits a sum of exponentials and cuts 11 700 s; the
+standards require the warm-up to be cut off, without defining its end. Here it ends where the fitted curve falls below
+`FRACTION` of the noise's own Allan deviation at the averaging time, and stays there.
 """
 
 from collections.abc import Sequence
@@ -38,34 +38,34 @@ _NAMES: dict[Shape, str] = {
     ended_exponential: "ended exponential",
 }
 _BENDS: dict[Shape, float] = {exponential: 4.0, raised_cosine: 0.0, straight: 0.0}
-"""Where an ended exponential is sought: so many time constants long."""
+"""Starting value of an ended exponential's length, in time constants, by the curve it starts from."""
 _CLEARLY = 2.0
-"""Twice the log likelihood by which a curve that stops must beat exponentials, which never do."""
+"""Twice the log likelihood by which a curve that ends must exceed exponentials, which never end."""
 
 
 @dataclass(frozen=True)
 class WarmUp:
-    """A transient that was found. Times are since power-up."""
+    """A detected warm-up transient. Times are since power-up."""
 
     shape: str
     """"one exponential", "two exponentials", "raised cosine", "straight" or "ended exponential"."""
     amplitude: float
-    """At the record's beginning [rate]."""
+    """Amplitude at the record's beginning [rate]."""
     amplitude_sd: float
     end_s: float
-    """Where it falls below `level` for good; later than the record where `has_ended` is false."""
+    """Time after which it stays below `level`; later than the record where `has_ended` is false."""
     end_sd_s: float
-    """Standard uncertainty by the fitted curve's; the shape and the level are taken as they are."""
+    """Standard uncertainty propagated from the fitted curve; the shape and the level count as exact."""
     has_ended: bool
-    """Within the record."""
+    """True if it ends within the record."""
     first_cell: int
     """The first cell that begins after the end; the number of cells where `has_ended` is false."""
     level: float
-    """[rate]"""
+    """Level that defines the end [rate]."""
     p_value: float
-    """How often noise alone would look as much like a transient."""
+    """Probability that noise alone resembles a transient as much."""
     noise: NoiseCoefficients
-    """Of the record beside the transient."""
+    """Noise of the record without the transient."""
     start_s: float
     fit: Fit
 
@@ -130,7 +130,7 @@ def find_warm_up(
 
 
 def _transient(series: CosineSeries, significance: float) -> Fit:
-    """The likeliest curve, by Akaike's criterion, where there is a transient at all."""
+    """The likeliest curve by Akaike's criterion, or none where no transient is significant."""
     none = no_transient(series)
     stopping = (Family.over(series, shape, 2.0 * SHORTEST, 1.0) for shape in (raised_cosine, straight))
     families = (exponentials(series), *stopping)
@@ -148,12 +148,12 @@ def _transient(series: CosineSeries, significance: float) -> Fit:
 
 
 def _criterion(fit: Fit) -> float:
-    """``−2 ln L + 2p``; a curve that stops must be clearly likelier than an exponential, which never does."""
+    """``−2 ln L + 2p``; a curve that ends must be clearly likelier than an exponential, which never ends."""
     return fit.noise.deviance + 2.0 * len(fit.parameters) + (0.0 if fit.shapes[0] is exponential else _CLEARLY)
 
 
 def _ended(series: CosineSeries, ones: Sequence[Fit]) -> list[Fit]:
-    """The ended exponential, begun at the two likeliest curves of one time."""
+    """Fits of the ended exponential, started from the two likeliest curves of one time."""
     found: list[Fit] = []
     for one in ones[:2]:
         bend = _BENDS[one.shapes[0]]
@@ -165,7 +165,7 @@ def _ended(series: CosineSeries, ones: Sequence[Fit]) -> list[Fit]:
 
 
 def _end(fit: Fit, level: float, length: float) -> tuple[float, float]:
-    """Last crossing of the level [s] from the first cell's beginning, and its standard uncertainty [s].
+    """Time of the last crossing of the level [s] from the first cell's beginning, and its standard uncertainty [s].
 
     ``u² = gᵀCg`` with ``g = −(∂s/∂θ)/(∂s/∂t)``, the curve's s at the crossing. Sought up to ten records' lengths.
     """

@@ -1,7 +1,7 @@
-"""Is there a transient in coloured noise, and which curve is it? Least squares under fitted noise.
+"""Detection and choice of a transient curve in coloured noise: least squares under fitted noise.
 
-The test is a likelihood ratio: what there is already against one shape more, the noise fitted anew each time. The new
-shape's time exists under one hypothesis only, so the ratio's greatest value over it is not a chi-square's. With γ the
+The test is a likelihood ratio of one additional shape to the present model, with the noise refitted each time. The new
+shape's time exists under one hypothesis only, so the ratio's maximum over it is not chi-square distributed. With γ the
 whitened curve of unit length, which runs along an arc of length L, ``P(max > c²) ≈ (L/π)·e^(−c²/2) + P(χ²₁ > c²)``:
 Hotelling's tube (Am. J. Math. 61, 1939; Davies, Biometrika 74, 1987, eq. 3.4).
 """
@@ -18,9 +18,9 @@ from procedures.analysis.warm_up.shapes import Shape, cell_means, exponential, v
 from procedures.core.arrays import Array
 
 PER_E_FOLD = 6
-"""Grid points of a time constant."""
+"""Grid points per factor e of a time constant."""
 SHORTEST, LONGEST = 2.0, 0.5
-"""Time constants sought: from so many cells to so much of the record; a longer one is a trend."""
+"""Range of time constants: from `SHORTEST` cells to `LONGEST` of the record; a longer one is a trend."""
 _ROUNDS, _SETTLED = 3, 0.1
 _STEP, _WORST = 1e-5, 1e11
 
@@ -33,16 +33,16 @@ class Fit:
     own: tuple[Array, ...]
     """Parameters of each shape, see `shapes`."""
     amplitudes: Array
-    """At the first cell's beginning, (shapes,) [rate]."""
+    """Amplitudes at the first cell's beginning, (shapes,) [rate]."""
     covariance: Array
-    """Of all parameters, shape by shape [amplitude, own…], (p, p)."""
+    """Covariance of all parameters, shape by shape [amplitude, own…], (p, p)."""
     noise: FittedNoise
     p_value: float
-    """Of the last shape: how often noise with the others alone would look as much like it."""
+    """Probability that noise and the other shapes alone resemble the last shape as much."""
 
     @property
     def parameters(self) -> Array:
-        """All, in the order of `covariance`, (p,)."""
+        """All parameters in the order of `covariance`, (p,)."""
         return np.concatenate([[a, *own] for a, own in zip(self.amplitudes, self.own, strict=True)] or [np.empty(0)])
 
     def at(self, x: Array) -> Array:
@@ -50,7 +50,7 @@ class Fit:
         return curve(self.shapes, self.parameters, x)
 
     def cells(self, edges_s: Array) -> Array:
-        """Its means between neighbouring edges (n+1,) [s] from the first cell's beginning, (n,) [rate]."""
+        """Means of the transient between neighbouring edges (n+1,) [s] from the first cell's beginning, (n,) [rate]."""
         return means(self.shapes, self.parameters, edges_s)
 
 
@@ -77,17 +77,17 @@ def _split(shapes: tuple[Shape, ...], parameters: Array) -> tuple[Array, tuple[A
 
 @dataclass(frozen=True)
 class Family:
-    """A shape over a grid of its own parameter."""
+    """One shape over a grid of its parameter."""
 
     shape: Shape
     grid: Array
-    """(m,) [ln s]"""
+    """Grid of the parameter, (m,) [ln s]."""
     columns: Array
-    """Cosine coefficients of the shape at each, (n−1, m)."""
+    """Cosine coefficients of the shape at each grid point, (n−1, m)."""
 
     @classmethod
     def over(cls, series: CosineSeries, shape: Shape, shortest: float, longest: float) -> "Family":
-        """From `shortest` cells to `longest` records, `PER_E_FOLD` a factor e."""
+        """Build the grid from `shortest` cells to `longest` records, with `PER_E_FOLD` points per factor e."""
         low, high = np.log(shortest * series.cell_s), np.log(longest * series.edges_s[-1])
         grid = np.linspace(low, high, max(2, round(PER_E_FOLD * (high - low))))
         curves = [cell_means(shape, series.edges_s, g[None]) for g in grid]
@@ -95,17 +95,17 @@ class Family:
 
 
 def exponentials(series: CosineSeries) -> Family:
-    """The family of time constants that are sought."""
+    """The exponentials over the range of time constants."""
     return Family.over(series, exponential, SHORTEST, LONGEST)
 
 
 def no_transient(series: CosineSeries) -> Fit:
-    """Noise alone."""
+    """The fit of noise alone, without any shape."""
     return Fit((), (), np.empty(0), np.empty((0, 0)), fit_noise(series.coefficients, series.unit_variances), 1.0)
 
 
 def fit_exponentials(series: CosineSeries, significance: float) -> Fit:
-    """None, one or two exponentials: as long as the next is significant, or both at once."""
+    """Fit none, one or two exponentials: each is added if significant, or both at once."""
     family, none = exponentials(series), no_transient(series)
     ones = candidates(series, none, (family,), significance)
     if not ones:
@@ -114,7 +114,7 @@ def fit_exponentials(series: CosineSeries, significance: float) -> Fit:
 
 
 def pair(series: CosineSeries, none: Fit, family: Family, significance: float) -> Fit | None:
-    """Two of a family at once, which alone would not be seen: a transient that turns back. None: not significant.
+    """Two of a family at once that are not detectable singly: a transient that turns back. None: not significant.
 
     The p-value is Bonferroni's over the grid's pairs, each ratio a chi-square's with two degrees of freedom.
     """
@@ -128,20 +128,20 @@ def pair(series: CosineSeries, none: Fit, family: Family, significance: float) -
 
 
 def noise_left(series: CosineSeries, transient: Array) -> FittedNoise:
-    """Noise of what a transient, cell means (n,), leaves."""
+    """Fit the noise of the residuals of a transient, cell means (n,)."""
     return fit_noise(series.coefficients - cosines(transient), series.unit_variances)
 
 
 def candidates(series: CosineSeries, fit: Fit, families: tuple[Family, ...], significance: float) -> tuple[Fit, ...]:
-    """Of each family the likeliest fit with one shape more, where that is significant; the likeliest first.
+    """The likeliest fit of each family with one more shape, where that is significant; the likeliest first.
 
-    Beside a shape only another of the same can stand.
+    All shapes of a fit belong to one family.
     """
     found: list[Fit] = []
     for family in families:
         start, noise = _from_grid(series, family, len(fit.shapes) + 1, fit.noise)
         arcs = sum(_arc_length(series, fit, noise, f) for f in families)
-        # what the refinement may add to the grid's likelihood ratio is far below one
+        # the refinement adds far less than one to the grid's likelihood ratio
         if _tube(fit.noise.deviance - noise.deviance + 1.0, arcs) > significance:
             continue
         larger = refine(series, noise, (family.shape,) * (len(fit.shapes) + 1), start)
@@ -157,7 +157,7 @@ def _tube(ratio: float, arcs: float) -> float:
 
 
 def _from_grid(series: CosineSeries, family: Family, number: int, noise: FittedNoise) -> tuple[Array, FittedNoise]:
-    """The grid's best curve under the noise, the noise beside that curve, and so on until they settle."""
+    """Alternate between the grid's best curve under the noise and the noise of its residuals until both settle."""
     start = np.empty(0)
     for _ in range(_ROUNDS):
         start, before = _best_start(series, noise, family, number), noise.deviance
@@ -185,10 +185,10 @@ def _best_start(series: CosineSeries, noise: FittedNoise, family: Family, number
 
 
 def refine(series: CosineSeries, noise: FittedNoise, shapes: tuple[Shape, ...], start: Array) -> Fit | None:
-    """Levenberg-Marquardt from a start, under given noise; its result's noise is that of the residuals.
+    """Refine a start by Levenberg-Marquardt under given noise; the result's noise is that of the residuals.
 
     The amplitudes, linear, are eliminated at each step (variable projection; Golub, Pereyra, SIAM J. Numer. Anal. 10,
-    1973). None where the curve's parameters cannot be told from one another.
+    1973). None where the curve's parameters cannot be separated from one another.
     """
     weights, observed = noise.weights, noise.weights * series.coefficients
     sizes = [len(o) for o in _split(shapes, start)[1]]
@@ -210,7 +210,7 @@ def refine(series: CosineSeries, noise: FittedNoise, shapes: tuple[Shape, ...], 
             solution = least_squares(
                 residuals, first, method="lm", max_nfev=30 * len(first), xtol=1e-4, ftol=1e-6, diff_step=[_STEP]
             )
-        except (np.linalg.LinAlgError, ValueError):  # it ran away, to a curve that is flat or none
+        except (np.linalg.LinAlgError, ValueError):  # it diverged, to a curve that is flat or vanishes
             return None
         own = np.asarray(solution.x, dtype=np.float64)
         white = columns(own)

@@ -2,9 +2,9 @@
 
 ``F(t) = p₁·e^(p₂(t − t₀)) + p₃·e^(p₄(t − t₀)) + p₅`` (thesis 3.3) with t₀ the record's beginning, so p₁ and p₃ are
 amplitudes there; for a record from power-up on it is the thesis's own. Found by Levenberg-Marquardt, as there, but with
-two differences: the squares are weighted by the noise's spectrum, fitted beside the curve (`coloured_noise`), since
-flicker would else pass for heat and the uncertainties would be of white noise; and an exponential is only taken where
-noise, or noise and one exponential, does not explain the record (`warm_up.fit`): two equal ones are one.
+two differences: the squares are weighted by the noise's spectrum, fitted with the curve (`coloured_noise`), since
+flicker would otherwise pass for heat and the uncertainties hold for white noise only; and an exponential is accepted
+only where noise, or noise and one exponential, does not explain the record (`warm_up.fit`): two equal ones are one.
 """
 
 from dataclasses import dataclass
@@ -23,25 +23,25 @@ SIGNIFICANCE = 1e-3
 
 @dataclass(frozen=True)
 class SelfHeating:
-    """A fitted curve F. Arrays are tuples in the thesis's order, so that all of it is plain data."""
+    """A fitted self-heating curve F as plain data; arrays are tuples in the thesis's order."""
 
     exponentials: int
-    """0, 1 or 2; with fewer the amplitudes that are not there are zero, and so are their rates."""
+    """Number of exponentials, 0 to 2; amplitudes and rates of absent ones are zero."""
     parameters: tuple[float, float, float, float, float]
     """p₁ [rate], p₂ [1/s], p₃ [rate], p₄ [1/s], p₅ [rate]; the slower exponential first, p₂ and p₄ negative."""
     covariance: tuple[tuple[float, ...], ...]
-    """(5, 5); zero for what is not there. p₅ holds the noise's own slow wander since power-up (`core.noise`)."""
+    """(5, 5), zero for absent terms. p₅ includes the slow drift of the noise since power-up (`core.noise`)."""
     start_s: float
     """t₀ since power-up [s]."""
     duration_s: float
     p_value: float
-    """Of the last exponential: how often noise and the other would look as much like it; 1 where there is none."""
+    """Probability that noise and the other exponential resemble the last one as much; 1 where there is none."""
     noise: NoiseCoefficients
-    """Of the record without the curve, by maximum likelihood."""
+    """Noise of the record without the curve, by maximum likelihood."""
 
     @property
     def standard_uncertainties(self) -> Array:
-        """Of the five parameters, (5,)."""
+        """Standard uncertainties of the five parameters, (5,)."""
         return np.sqrt(np.diagonal(np.array(self.covariance)))
 
     def curve(self, t_s: Array) -> Array:
@@ -51,7 +51,7 @@ class SelfHeating:
         return p1 * np.exp(p2 * x) + p3 * np.exp(p4 * x) + p5
 
     def removed(self, cells: Array, cell_s: float) -> Array:
-        """The cells it was fitted to, (n,), without F(t) − F(t₀) (thesis 3.4), each F its cell's mean."""
+        """The fitted cells, (n,), minus F(t) − F(t₀) (thesis 3.4), each F the mean over its cell."""
         edges = np.arange(len(cells) + 1) * cell_s
         heating = np.zeros(len(cells))
         for p, rate in (self.parameters[0:2], self.parameters[2:4]):
@@ -63,9 +63,9 @@ class SelfHeating:
 def fit_self_heating(
     cells: Array, cell_s: float, start_s: float = 0.0, *, significance: float = SIGNIFICANCE
 ) -> SelfHeating:
-    """The curve in means (n,) [rate] over cells of `cell_s` [s], the first beginning `start_s` [s] after power-up.
+    """Fit the curve to means (n,) [rate] over cells of `cell_s` [s], the first beginning `start_s` [s] after power-up.
 
-    An exponential is taken where the p-value of its likelihood ratio is below `significance`. Raises `BadParameter` and
+    An exponential is accepted if the p-value of its likelihood ratio is below `significance`. Raises `BadParameter` and
     `UnfitRecording`. Series of more than 2048 cells are averaged to no more than that; time constants below two of
     those cells, or far above half the record, are not found.
     """

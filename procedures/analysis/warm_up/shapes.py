@@ -1,4 +1,4 @@
-"""Curves a transient may have, as means over cells. Time x is counted from the first cell's beginning.
+"""Possible curves of a transient, as means over cells. Time x is counted from the first cell's beginning.
 
 Every shape is 1 at x = 0 and given by its integral from 0, so a cell's mean is exact however long the cell is:
 
@@ -21,20 +21,20 @@ _STRAIGHT = 1e-2
 
 
 def exponential(x: Array, parameters: Array) -> Array:
-    """Parameters [ln τ], integral [s]."""
+    """Integral of an exponential [s]; parameters [ln τ]."""
     tau = np.exp(parameters[0])
     return -tau * np.expm1(-x / tau)
 
 
 def raised_cosine(x: Array, parameters: Array) -> Array:
-    """Parameters [ln T], integral [s]."""
+    """Integral of a raised cosine [s]; parameters [ln T]."""
     end = np.exp(parameters[0])
     u = np.minimum(x / end, 1.0)
     return 0.5 * end * (u + np.sin(np.pi * u) / np.pi)
 
 
 def straight(x: Array, parameters: Array) -> Array:
-    """Parameters [ln T], integral [s]."""
+    """Integral of a straight decline [s]; parameters [ln T]."""
     end = np.exp(parameters[0])
     u = np.minimum(x / end, 1.0)
     return end * u * (1.0 - 0.5 * u)
