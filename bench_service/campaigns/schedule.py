@@ -88,8 +88,11 @@ def starts_after(cron: str, time_zone: str, moment: datetime) -> Iterator[dateti
 
 
 def _at_fixed_times(cron: str) -> bool:
-    """Return whether an expression means times on the wall clock, not every so many minutes or hours."""
-    return not any(part.startswith("*") for part in cron.split()[:2])
+    """Return whether an expression means hours on the wall clock, not every hour or every so many hours.
+
+    "*/30 3 * * *" does: its minutes repeat, yet only within an hour that a clock change may leave out or double.
+    """
+    return not cron.split()[1].startswith("*")
 
 
 def _moment_shown(local: datetime, zone: ZoneInfo) -> datetime | None:

@@ -83,3 +83,16 @@ def test_a_service_that_comes_back_in_the_second_of_two_equal_hours_starts_once(
     database.dispose()
     assert [run.planned_at for run in runs] == [first]
     assert next_at == datetime(2026, 10, 26, 1, 30, tzinfo=UTC)
+
+
+@pytest.mark.parametrize("minutes", ["*/30", "0,30"])
+def test_minutes_that_repeat_within_an_hour_follow_the_wall_clock_too(minutes: str) -> None:
+    """Kyiv leaves out 03:00 to 04:00 on 29 March 2026 and has it twice on 25 October: one night, one series."""
+    zone = ZoneInfo("Europe/Kyiv")
+    spring = starts_after(f"{minutes} 3 * * *", zone.key, datetime(2026, 3, 28, 12, tzinfo=UTC))
+    made_up, after = (next(spring).astimezone(zone) for _ in range(2))
+    assert (made_up.date(), made_up.hour, made_up.minute) == (date(2026, 3, 29), 4, 0)
+    assert (after.date(), after.hour, after.minute) == (date(2026, 3, 30), 3, 0)
+    autumn = starts_after(f"{minutes} 3 * * *", zone.key, datetime(2026, 10, 24, 12, tzinfo=UTC))
+    nights = [next(autumn).astimezone(zone) for _ in range(3)]
+    assert [(n.day, n.hour, n.minute, n.fold) for n in nights] == [(25, 3, 0, 0), (25, 3, 30, 0), (26, 3, 0, 0)]
