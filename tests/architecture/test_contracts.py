@@ -19,6 +19,7 @@ SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob
 FILE_LINES = 300
 FUNCTION_LINES = 60
 FOLDER_MODULES = 25
+HEADLESS = ("What ", "Who ", "Whoever ", "Of ")
 BANNED_NAMES = {"utils", "helpers", "common", "base", "manager", "misc", "types"}
 
 
@@ -57,6 +58,18 @@ def _imported(path: Path) -> Iterator[str]:
             yield node.module or ""
         elif isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
+
+
+def test_no_docstring_begins_with_a_relative_clause() -> None:
+    """A summary names its noun or its verb: "Return the job …" and "The job that …", not "What runs" or "Of a job"."""
+    opened = [
+        f"{path.relative_to(ROOT)}: {summary}"
+        for path in SOURCES
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+        and (summary := (ast.get_docstring(node) or "").split("\n")[0]).startswith(HEADLESS)
+    ]
+    assert opened == []
 
 
 def test_no_function_is_longer_than_a_page() -> None:
