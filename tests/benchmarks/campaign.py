@@ -1,7 +1,7 @@
 """``python -m tests.benchmarks.campaign``: the campaign that ships, whole and unattended, on the simulated bench.
 
 4 × 6 h static at 100 Hz, thermal runs where the procedure is there, 3 calibrations, their scatter, verification: at
-most 3 minutes from the command to JUnit XML and a verdict (issue 5).
+most 3 minutes from the command to JUnit XML and a verdict.
 """
 
 import os

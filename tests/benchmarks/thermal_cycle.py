@@ -1,7 +1,7 @@
 """``python -m tests.benchmarks.thermal_cycle``: a whole thermal cycle through REST on an empty database.
 
 Three runs of 12 h × 100 Hz × 13 channels with x, y and z up, 3 h off before each: simulated, stored, analysed, judged
-(budget of issue 4: 60 s of wall time; design.md: 500 MB).
+(budgets: 60 s of wall time, 500 MB).
 """
 
 import sys
