@@ -101,11 +101,6 @@ def wavelet_split(
     return WaveletSplit(kept, cells - kept, tuple(done), wavelet, rule, edge)
 
 
-def shortest_s(levels: int, cell_s: float, wavelet: str = "sym8") -> float:
-    """The shortest series [s] that can be split into `levels` levels: ``2^levels·(filter − 1)`` cells (PyWavelets)."""
-    return (_filter_length(wavelet) - 1) * 2**levels * cell_s
-
-
 def most_levels(cells: int, wavelet: str = "sym8") -> int:
     """Greatest number of levels into which a series of `cells` cells can be split; 0: it is too short for any."""
     return int(pywt.dwt_max_level(cells, _filter_length(wavelet)))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from procedures.analysis.wavelet_split import Rule, heursure, shortest_s, wavelet_split
+from procedures.analysis.wavelet_split import Rule, heursure, most_levels, wavelet_split
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
 from tests.validation.conditioning_noise import SYNTHETIC, noise_cells
@@ -121,7 +121,9 @@ def test_what_cannot_be_split_is_refused() -> None:
 
 @pytest.mark.parametrize("levels", [1, 4, 6])
 def test_the_shortest_series_is_the_shortest_that_can_be_split(levels: int) -> None:
-    cells = np.sin(np.arange(shortest_s(levels, 2.0) / 2.0))
+    """``2^levels·(filter − 1)`` cells, by PyWavelets' own rule; sym8 has a filter of 16."""
+    cells = np.sin(np.arange(15 * 2**levels))
+    assert (most_levels(len(cells)), most_levels(len(cells) - 1)) == (levels, levels - 1)
     wavelet_split(cells, 2.0, rule="rescaled", levels=levels)
     with pytest.raises(BadParameter, match="levels"):
         wavelet_split(cells[:-1], 2.0, rule="rescaled", levels=levels)

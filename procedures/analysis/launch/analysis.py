@@ -13,8 +13,8 @@ from procedures.analysis.allan.statistic import Sizes, decade_sizes
 from procedures.analysis.cells import Cells, CellStream, cell_samples, channel_rows
 from procedures.analysis.fitness.findings import FitnessSettings
 from procedures.analysis.fitness.watched import Inspection, Watched
-from procedures.analysis.launch.beside import Beside, Resolution, smooth_temperatures, temperature_names
 from procedures.analysis.launch.channel import channel_noise
+from procedures.analysis.launch.context import ChannelContext, Resolution, smooth_temperatures, temperature_names
 from procedures.analysis.launch.results import LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.signal import CleanSignal, clean_signal
@@ -67,7 +67,7 @@ def analyse_launch(recording: Recording, label: str, settings: LaunchSettings) -
 
 def _first_pass(
     recording: Recording, names: Sequence[str], settings: LaunchSettings
-) -> tuple[Cells, dict[str, Beside]]:
+) -> tuple[Cells, dict[str, ChannelContext]]:
     """Gather cell means, also of temperatures, and the context of each channel. Raises `UnfitRecording`."""
     info = recording.info
     temperatures = temperature_names(info)
@@ -92,7 +92,7 @@ def _first_pass(
         )
     coarse, warm = resolution.finish(), smooth_temperatures(cells, temperatures)
     sentences = {f.channel: tuple(finding.sentence for finding in f.findings) for f in found}
-    return cells, {name: Beside(sentences.get(name, ()), coarse.get(name, ""), warm) for name in names}
+    return cells, {name: ChannelContext(sentences.get(name, ()), coarse.get(name, ""), warm) for name in names}
 
 
 @dataclass

@@ -11,7 +11,7 @@ from procedures.analysis.allan.read_off import Line, ReadOff, read_off
 from procedures.analysis.allan.statistic import ALLAN, OVERLAPPING_ALLAN, Sizes, decade_sizes
 from procedures.analysis.averaging_time import averaging_time
 from procedures.analysis.cells import Cells
-from procedures.analysis.launch.beside import Beside
+from procedures.analysis.launch.context import ChannelContext
 from procedures.analysis.launch.model import found_noise
 from procedures.analysis.launch.results import (
     PROCESSES,
@@ -49,7 +49,7 @@ def channel_noise(
     signal: CleanSignal,
     fast: Deviation | None,
     powers: Powers | None,
-    beside: Beside,
+    context: ChannelContext,
     settings: LaunchSettings,
 ) -> ChannelNoise:
     """Analyse one channel completely; `fast` and `powers` come from every sample, None where the fast part is off."""
@@ -59,7 +59,7 @@ def channel_noise(
     graphical = read_off(whole)
     # from one cell on: at shorter times the residual dither behind the notch filter exceeds the model
     least_squares = fit_allan(whole, from_s=cell_s, level=settings.level, confidence=settings.confidence)
-    found = found_noise(signal, cells, powers, beside, settings)
+    found = found_noise(signal, cells, powers, context, settings)
     likelihood, warnings = found.fit, found.warnings(rate_unit)
     last = Stage(signal.steps[-1].name, _curve(whole), _values(graphical), signal.steps[-1].note)
     stages = [*_stages(signal.steps[:-1], cell_s, settings), last, *_split(series, cell_s, rate_unit, settings)]
@@ -69,7 +69,7 @@ def channel_noise(
         mean=float(np.mean(signal.steps[0].cells[signal.first_cell :])),
         used_from_s=cells.since_launch_s + signal.first_cell * cell_s,
         used_s=len(series) * cell_s,
-        findings=(*beside.findings, *signal.findings),
+        findings=(*context.findings, *signal.findings),
         warm_up=signal.warm_up,
         self_heating=signal.self_heating,
         trend=signal.trend,

@@ -6,7 +6,7 @@ from math import log
 import numpy as np
 
 from procedures.analysis.cells import Cells
-from procedures.analysis.launch.beside import Beside, most_followed
+from procedures.analysis.launch.context import ChannelContext, most_followed
 from procedures.analysis.launch.results import CorrelatedProcess, LevelShift, TemperatureSlope
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.signal import CleanSignal
@@ -80,11 +80,11 @@ class FoundNoise:
 
 
 def found_noise(
-    signal: CleanSignal, cells: Cells, powers: Powers | None, beside: Beside, settings: LaunchSettings
+    signal: CleanSignal, cells: Cells, powers: Powers | None, context: ChannelContext, settings: LaunchSettings
 ) -> FoundNoise:
     """Fit the noise of a channel's clean cells, with the likeliest temperature and shift of the level as regressors."""
     series, cell_s = signal.cells, cells.cell_s
-    temperatures = {name: row[signal.first_cell :] for name, row in beside.temperatures.items()}
+    temperatures = {name: row[signal.first_cell :] for name, row in context.temperatures.items()}
     followed = most_followed(series, {n: row for n, row in temperatures.items() if np.ptp(row) > 0.0})
     rest = series
     rows: list[Array] = []
@@ -104,7 +104,7 @@ def found_noise(
         level=settings.level,
         confidence=settings.confidence,
         candidates=candidates,
-        coarse=bool(beside.coarse),
+        coarse=bool(context.coarse),
     )
     temperature, shift = None, None
     for f in fit.followed:
@@ -113,4 +113,4 @@ def found_noise(
         elif at is not None:
             begin = cells.since_launch_s + (signal.first_cell + at) * cell_s
             shift = LevelShift(begin, f.slope, f.standard_uncertainty)
-    return FoundNoise(fit, beside.coarse, temperature, shift)
+    return FoundNoise(fit, context.coarse, temperature, shift)

@@ -24,7 +24,7 @@ _GROUPS = 256
 
 
 @dataclass(frozen=True)
-class Beside:
+class ChannelContext:
     """Findings, resolution and temperatures of one channel."""
 
     findings: tuple[str, ...] = ()
