@@ -6,7 +6,7 @@ VALIDATIONS := calibration allan noise foreign_noise inspection conditioning who
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test bench chaos format check validate lock clean
+.PHONY: help run test browser bench chaos format check validate lock clean
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -25,6 +25,13 @@ run: $(VENV)/.ready  ## calibrate and verify the simulated unit, then keep servi
 test: $(VENV)/.ready  ## the whole test suite
 	@$(BIN)/python -m pytest -n 2 --dist worksteal
 
+$(VENV)/.browser: .ci/browser.lock $(VENV)/.ready
+	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --require-hashes -r .ci/browser.lock
+	@touch $@
+
+browser: $(VENV)/.browser  ## the pages in a real Chromium, installed first where it is missing
+	@$(BIN)/python -m tests.browser.chromium && $(BIN)/python -m pytest tests/browser --browser
+
 chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books; press stop while something is in its way
 	@kept=0; $(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both || kept=1; $(BIN)/python -m tests.chaos.stop_matrix --runs 5 || kept=1; exit $$kept
 
@@ -42,6 +49,7 @@ bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 
 lock: $(VENV)/.ready  ## compile requirements.lock anew
 	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev pyproject.toml -o requirements.lock
+	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev --extra browser -c requirements.lock pyproject.toml -o .ci/browser.lock
 
 clean:  ## remove the environment and the demo's data
 	rm -rf $(VENV) .bench

@@ -14,6 +14,8 @@ from bench_service.api import audit, health, metrics, procedures, recordings, re
 from bench_service.api.benches import routes as benches
 from bench_service.api.campaigns import routes as campaigns
 from bench_service.api.campaigns import schedules
+from bench_service.api.feed import news
+from bench_service.api.feed import routes as feed
 from bench_service.api.http import bodies, door, errors, headers, request_id
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs import routes as jobs
@@ -39,9 +41,10 @@ from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.worker import Worker
-from bench_service.pages import campaign_pages, docs, figures, images, static_files
+from bench_service.pages import campaign_pages, docs, figures, images, languages, static_files, stop_pages
 from bench_service.pages import routes as pages
 from bench_service.pages.drawing_process import open_drawing
+from bench_service.pages.errors import ErrorPages
 from bench_service.persistence import BenchLease, acquire_lease, engine_database, lease_holder, open_stores
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
@@ -70,6 +73,7 @@ ROUTERS = (
     audit,
     health,
     metrics,
+    feed,
 )
 
 
@@ -189,17 +193,19 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
     )
     app.state.service = service
     app.state.hub = EventHub(service.stores.jobs, service.live, event_stream.FRAMES)
+    app.state.news = news.NewsDesk(service)
     app.state.max_import_bytes = max_import_bytes
     app.state.import_threads = CapacityLimiter(IMPORT_THREADS)
     for module in ROUTERS:
         app.include_router(module.router)
-    for page in (static_files, docs, images, pages, campaign_pages):
+    for page in (static_files, languages, docs, images, stop_pages, pages, campaign_pages):
         app.include_router(page.router)
     app.add_middleware(bodies.Bounded)
     errors.install(app)
     app.add_middleware(door.Doorkeeper, door=rules)
     metrics.install(app, service)
     app.add_middleware(audit.Audited, trail=service.stores.audit)
+    app.add_middleware(ErrorPages)
     app.add_middleware(headers.SecurityHeaders)
     app.add_middleware(request_id.RequestId)
     service.traces.instrument(app)

@@ -25,7 +25,8 @@ from bench_service.wall_clock import now
 router = APIRouter(prefix="/api/v1/benches", tags=["benches"])
 
 
-def _view(service: BenchService, bench_id: str) -> BenchView:
+def view_of(service: BenchService, bench_id: str) -> BenchView:
+    """Build the view of a bench: what it is, what it does, how safe it is. Raises `NotFound`."""
     description = service.benches.description(bench_id)
     running = service.jobs.driving_job(bench_id)
     live = service.live.of_bench(bench_id)
@@ -50,13 +51,13 @@ def _view(service: BenchService, bench_id: str) -> BenchView:
 @router.get("", responses=problems())
 def list_benches(service: Service) -> list[BenchView]:
     """List every bench that a worker of this database has registered."""
-    return [_view(service, bench_id) for bench_id in service.benches.ids()]
+    return [view_of(service, bench_id) for bench_id in service.benches.ids()]
 
 
 @router.get("/{bench_id}", responses=problems(404))
 def read_bench(bench_id: str, service: Service) -> BenchView:
     """Read one bench: live state, limits, declared accuracy, and the job that drives it."""
-    return _view(service, bench_id)
+    return view_of(service, bench_id)
 
 
 @router.get("/{bench_id}/queue", responses=problems(404))
@@ -117,4 +118,4 @@ def release(bench_id: str, service: Service, client: ClientName) -> BenchView:
     The bench must be known to be safe. The jobs that wait in its queue go on.
     """
     service.stops.release_only(bench_id, client, "")
-    return _view(service, bench_id)
+    return view_of(service, bench_id)

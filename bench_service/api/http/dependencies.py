@@ -4,6 +4,7 @@ import re
 from typing import Annotated
 
 from fastapi import Depends, Header, Query, Request
+from pydantic import AfterValidator, Field
 
 from bench_service.jobs.events.hub import EventHub
 from bench_service.service import BenchService
@@ -32,8 +33,28 @@ IdempotencyKey = Annotated[
 ]
 REQUESTED_BY = "X-Requested-By"
 WHO_LENGTH = 200
+By = Annotated[
+    str,
+    Field(
+        min_length=1,
+        max_length=WHO_LENGTH,
+        pattern=NO_CONTROL_CHARACTERS.pattern,
+        description=f"Who does it; without it, `{REQUESTED_BY}` counts",
+    ),
+]
+
+
+def as_utf8(text: str | None) -> str | None:
+    """Read a header as the UTF-8 that browsers send; one that is none stays as it came (ISO 8859-1)."""
+    try:
+        return None if text is None else text.encode("latin-1").decode("utf-8")
+    except (UnicodeEncodeError, UnicodeDecodeError):
+        return text
+
+
 RequestedBy = Annotated[
     str | None,
+    AfterValidator(as_utf8),
     Header(
         alias=REQUESTED_BY,
         min_length=1,

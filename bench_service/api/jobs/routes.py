@@ -6,15 +6,18 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import JSONResponse, StreamingResponse
 
-from bench_service.api.http.dependencies import After, Hub, IdempotencyKey, Limit, RequestedBy, Service
+from bench_service.api.http.dependencies import After, ClientName, Hub, IdempotencyKey, Limit, RequestedBy, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs.schemas import (
+    CancelRequest,
+    EventView,
     ForeignJob,
     JobChange,
     JobPage,
     JobSubmission,
     JobView,
+    NoteRequest,
     PromptAnswer,
     Reanalysis,
     Truth,
@@ -36,6 +39,7 @@ OF_A_JOB = (
     "change_job",
     "cancel",
     "answer",
+    "add_note",
     "pause",
     "resume",
     "events",
@@ -108,13 +112,17 @@ def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
         200: {"model": ForeignJob, "description": "Noted; the job is not understood here"},
     },
 )
-def cancel(job_id: str, service: Service) -> JobView | JSONResponse:
+def cancel(
+    job_id: str, service: Service, client: ClientName, body: CancelRequest | None = None
+) -> JobView | JSONResponse:
     """Cancel a job: a queued one at once, a running one as soon as its bench is safe. Its recordings are kept.
 
+    An event of the kind `note` has who cancelled it and why.
     A job that this version does not understand is cancelled too; the answer then holds only its state.
     """
     try:
-        return _view(service, service.jobs.cancel(job_id))
+        asked = body or CancelRequest.model_validate({})
+        return _view(service, service.jobs.cancel(job_id, asked.by or client, asked.reason))
     except NotUnderstood as error:
         _, state = service.stores.jobs.last_event(job_id)
         return JSONResponse(ForeignJob(id=job_id, state=state, waiting=str(error)).model_dump(mode="json"), 200)
@@ -130,7 +138,16 @@ def pause(job_id: str, service: Service) -> JobView:
 def answer(job_id: str, body: PromptAnswer, service: Service, requested_by: RequestedBy = None) -> JobView:
     """Confirm that the person at the bench did what the job's prompt asks (`prompt`), or decline it."""
     said = Answer(body.done, body.remark, requested_by or "")
-    return _view(service, service.stores.prompts.answer(job_id, said, now()))
+    return _view(service, service.stores.prompts.answer(job_id, body.prompt, said, now()))
+
+
+@router.post("/{job_id}/notes", status_code=201, responses=problems(404, 409, 413, 507))
+def add_note(job_id: str, body: NoteRequest, service: Service, client: ClientName) -> EventView:
+    """Add a person's remark to a job: an event of the kind `note`, with its author."""
+    said = {"text": body.text, "by": body.by or client}
+    service.stores.jobs.note(job_id, "note", now(), said)
+    last, _ = service.stores.jobs.last_event(job_id)
+    return EventView.of(service.stores.jobs.events(job_id, last - 1)[0])
 
 
 @router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409, 507))
