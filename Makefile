@@ -23,7 +23,7 @@ run: $(VENV)/.ready  ## calibrate and verify the simulated unit, then keep servi
 	@$(BIN)/bench demo --port $(PORT) $(if $(ONCE),--once)
 
 test: $(VENV)/.ready  ## the whole test suite
-	@$(BIN)/python -m pytest -n 2 --dist worksteal
+	@$(BIN)/python -m pytest -n 2 --dist worksteal --durations=40 --durations-min=1
 
 $(VENV)/.browser: .ci/browser.lock $(VENV)/.ready
 	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --require-hashes -r .ci/browser.lock

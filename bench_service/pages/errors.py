@@ -1,5 +1,6 @@
 """Errors as pages: a person who opens an address gets a sentence and a way on, a program its problem document."""
 
+import gzip
 import json
 from collections.abc import MutableMapping
 from typing import Any
@@ -50,10 +51,12 @@ def _is_problem(message: Message) -> bool:
 
 
 async def _show(scope: Scope, start: MutableMapping[str, Any], body: bytes, send: Send) -> None:
-    problem = json.loads(body)
+    packed = Headers(raw=start["headers"]).get("content-encoding") == "gzip"
+    problem = json.loads(gzip.decompress(body) if packed else body)
     page = templates.TemplateResponse(Request(scope), "error.html", {"problem": problem}, status_code=start["status"])
     headers = MutableHeaders(raw=list(start["headers"]))
     headers["content-type"] = "text/html; charset=utf-8"
+    del headers["content-encoding"]
     headers["content-length"] = str(len(page.body))
     await send({"type": "http.response.start", "status": start["status"], "headers": headers.raw})
     await send({"type": "http.response.body", "body": bytes(page.body)})
