@@ -42,7 +42,16 @@ from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.worker import Worker
-from bench_service.pages import campaign_pages, docs, figures, images, languages, static_files, stop_pages
+from bench_service.pages import (
+    campaign_pages,
+    console_pages,
+    docs,
+    figures,
+    images,
+    languages,
+    static_files,
+    stop_pages,
+)
 from bench_service.pages import routes as pages
 from bench_service.pages.drawing_process import open_drawing
 from bench_service.pages.errors import ErrorPages
@@ -199,7 +208,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
     app.state.import_threads = CapacityLimiter(IMPORT_THREADS)
     for module in ROUTERS:
         app.include_router(module.router)
-    for page in (static_files, languages, docs, images, stop_pages, pages, campaign_pages):
+    for page in (static_files, languages, docs, images, stop_pages, console_pages, pages, campaign_pages):
         app.include_router(page.router)
     transfer.install(app)
     app.add_middleware(bodies.Bounded)

@@ -2,13 +2,16 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Query
 from pydantic import BaseModel, Field
 
 from bench_service.api.http.dependencies import Service
 from bench_service.api.http.errors import problems
 from bench_service.api.http.fields import NAME, Request
 from bench_service.mapping import copied
+from bench_service.model.errors import NotMounted
+from bench_service.service import BenchService
+from procedures.core.errors import DomainError
 from procedures.core.recording import Station
 from procedures.procedure import Method, Outcome, Parameters, PredictedUncertainty, Procedure
 
@@ -49,6 +52,15 @@ class Preview(BaseModel):
     violations: list[str]
 
 
+class PlanView(BaseModel):
+    """A procedure's plan with default parameters, in brief."""
+
+    procedure: str
+    duration_s: float | None = Field(description="Bench time; null: there is no plan")
+    stations: int | None
+    refusal: str | None = Field(description="Why it cannot be done on this unit and bench")
+
+
 def _view(entry: Procedure[Parameters, Outcome] | Method[Parameters, Outcome]) -> ProcedureView:
     return copied(
         ProcedureView,
@@ -62,6 +74,25 @@ def _view(entry: Procedure[Parameters, Outcome] | Method[Parameters, Outcome]) -
 def list_procedures(service: Service) -> list[ProcedureView]:
     """List every procedure, with the JSON Schemas of its parameters and its result."""
     return [_view(procedure) for procedure in service.catalogue.procedures.values()]
+
+
+@router.get("/plans", responses=problems(404))
+def list_plans(
+    service: Service,
+    unit: Annotated[str, Query(min_length=1, max_length=100)],
+    bench: Annotated[str | None, Query(max_length=100)] = None,
+) -> list[PlanView]:
+    """List what each procedure would take on a unit with its default parameters, or why it cannot be done."""
+    return [_brief(service, name, unit, bench) for name in service.catalogue.procedures]
+
+
+def _brief(service: BenchService, name: str, unit: str, bench: str | None) -> PlanView:
+    try:
+        plan = service.planner.plan(name, unit, {}, bench)
+    except (DomainError, NotMounted) as error:
+        return PlanView(procedure=name, duration_s=None, stations=None, refusal=str(error))
+    refusal = plan.violations[0] if plan.violations else None
+    return PlanView(procedure=name, duration_s=plan.prediction.duration_s, stations=len(plan.stations), refusal=refusal)
 
 
 @router.get("/procedures/{name}", responses=problems(404))

@@ -113,7 +113,7 @@ def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
     status_code=202,
     response_model=JobView,
     responses={
-        **problems(404, 409, 507),
+        **problems(404, 409, 413, 507),
         200: {"model": ForeignJob, "description": "Noted; the job is not understood here"},
     },
 )

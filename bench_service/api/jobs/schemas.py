@@ -27,6 +27,7 @@ class JobSubmission(PreviewRequest):
     seed: int | None = Field(None, ge=0, lt=2**48, description="Of a simulated bench: same seed, same bytes")
     retries: int = Field(0, ge=0, le=5, description="How often a fault of the bench is answered by trying again")
     reservation: str | None = Field(None, max_length=100, description="The reservation under which it runs")
+    not_before: AwareDatetime | None = Field(None, description="Earliest start; until then it waits in the queue")
     deadline_at: AwareDatetime | None = Field(None, description="No station begins later; the job then fails")
 
 
