@@ -42,6 +42,9 @@ from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.worker import Worker
+from bench_service.notifications.notifier import Notifier
+from bench_service.notifications.outbox import Outbox
+from bench_service.notifications.targets import read_targets
 from bench_service.pages import (
     campaign_pages,
     console_pages,
@@ -60,7 +63,7 @@ from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.database import as_storage_error
 from bench_service.persistence.evidence.analysis_run import open_run
-from bench_service.service import BenchService
+from bench_service.service import LEAST_FREE_BYTES, BenchService
 from bench_service.settings import Settings
 from bench_service.telemetry.code_version import code_version
 from bench_service.telemetry.tracing import traces_to
@@ -128,6 +131,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         guard.begin()
         closing.callback(guard.end)
         closing.callback(files.keep_books(stores).end)
+        if settings.notify is not None:
+            closing.callback(_notifier(settings, stores, database.free_bytes).end)
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
@@ -147,6 +152,16 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     closing.callback(service.stop)
     service.register()
     return service
+
+
+def _notifier(settings: Settings, stores: Stores, free_bytes: Callable[[], int | None]) -> Notifier:
+    """The notifier of this process's bench, at work. Raises `Misconfigured`."""
+    assert settings.notify is not None
+    targets = read_targets(settings.notify)
+    outboxes = [Outbox(settings.devices_in() / "messages", target, targets.pages) for target in targets.target]
+    notifier = Notifier(settings.bench_id, stores, outboxes, free_bytes, LEAST_FREE_BYTES)
+    notifier.begin()
+    return notifier
 
 
 def _devices(settings: Settings, bench_id: str) -> BenchDevices:

@@ -24,6 +24,7 @@ settings.load_profile("repeatable")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--browser", action="store_true", help="run the pages in Chromium, too (make browser)")
+    parser.addoption("--pictures", metavar="FOLDER", help="keep a picture of each page in each dress there")
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:

@@ -49,6 +49,7 @@ function choose(procedure, parameters = null) {
   if (parameters) form.load(parameters);
   fill(at("form"), h("h2", {}, t(procedure.title)), form.element);
   at("plan").hidden = false;
+  at("start").scrollIntoView({ block: "start" });
   at("verify-too").hidden = procedure.name !== "calibration_12_orientations";
   for (const field of form.fields) field.mark();
   preview();
