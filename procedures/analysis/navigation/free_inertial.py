@@ -70,7 +70,7 @@ def free_inertial(place: Place, attitude_nb: Array, rates_b: Array, forces_b: Ar
         longitude += mean[2] * step_s / (place.radius_m * np.cos(latitude))
         rows[k + 1] = (latitude - place.latitude_rad, longitude, v[0], v[2])
     return Track(
-        np.arange(len(rows)) * step_s,
+        np.arange(len(rows), dtype=np.float64) * step_s,
         rows[:, 0] * place.radius_m,
         rows[:, 1] * place.radius_m * float(np.cos(place.latitude_rad)),
         rows[:, 2],
