@@ -13,9 +13,9 @@ import uvicorn
 
 from bench_service.api.http.door import Door, may_listen
 from bench_service.app import create_app, open_service
-from bench_service.cli.connections import AT_ONCE, BoundedConnections, lengthen_queue, raise_descriptors
-from bench_service.cli.logs import set_up
-from bench_service.cli.private_files import protect
+from bench_service.cli.processes.connections import AT_ONCE, BoundedConnections, lengthen_queue, raise_descriptors
+from bench_service.cli.processes.logs import set_up
+from bench_service.cli.processes.private_files import protect
 from bench_service.cli.refusal import Refused
 from bench_service.service import BenchService
 from bench_service.settings import Settings
