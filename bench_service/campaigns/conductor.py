@@ -265,7 +265,7 @@ class Conductor:
     def _calibrations_of(self, run: CampaignRun, step: Step) -> tuple[str, ...]:
         """Calibrations that the steps' results gave, in the order of the steps."""
         results = [s.result_id for name in step.calibrations_of for s in run.steps if s.name == name and s.result_id]
-        return self._stores.results.calibrations_of(results)
+        return tuple(c.id for c in self._stores.calibrations.of_results(results))
 
     def _abandoned(self, run: CampaignRun, changed: CampaignRun) -> None:
         """Cancel a job that was submitted in vain: another process changed the run first."""
