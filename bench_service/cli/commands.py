@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from bench_service.cli import bench_commands, campaign_commands
+from bench_service.cli import bench_commands, calibration_commands, campaign_commands
 from bench_service.cli.client import RESULT, call, check, connect, segment
 from bench_service.cli.files import check_folder, text_of, whole_file
 from bench_service.cli.options import AsJson, Server, announce, console, errors, parameter, wide
@@ -30,6 +30,8 @@ app = typer.Typer(
 )
 app.add_typer(campaign_commands.campaigns, name="campaign")
 app.add_typer(campaign_commands.schedules, name="schedule")
+app.add_typer(calibration_commands.calibration, name="calibration")
+app.command("calibrations")(calibration_commands.list_calibrations)
 
 
 def run_command_line(settings: Settings, arguments: list[str] | None = None) -> int:

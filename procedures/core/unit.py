@@ -115,7 +115,7 @@ class Unit:
         calibration = self.calibration(triad)
         if calibration is None:
             raise DomainError(
-                f"unit {self.serial} has no calibration of its {triad} triad to {purpose}: calibrate it first, or "
-                "choose one of its history or enter known coefficients; a failed one becomes current only when it is chosen"
+                f"unit {self.serial} has no calibration of its {triad} triad to {purpose}: calibrate it first, "
+                "choose one of its history or enter known coefficients; one that failed counts only where it is chosen"
             )
         return calibration
