@@ -74,7 +74,10 @@ class SqlResultStore:
                 session.add_all([*quantity_rows(result, taken), *lineage_rows(result), *correction_lineage(result)])
                 add_calibrations(session, result, calibrations, by_rule)
                 add_corrections(session, result, corrections, by_rule)
-                return result
+                if not calibrations:
+                    return result
+                session.flush()
+                return _results(session, [_found(session, result.id)])[0]  # as it is read again, to the last bit
 
         return again_after_conflict(once)
 
