@@ -14,6 +14,7 @@ from bench_service.background import BackgroundTasks
 from bench_service.campaigns import transitions
 from bench_service.campaigns.campaign import Step
 from bench_service.campaigns.judgement import judge
+from bench_service.campaigns.lineage import failed_calibrations
 from bench_service.campaigns.run import CampaignRun, StepState
 from bench_service.campaigns.run_log import tell
 from bench_service.campaigns.stores import Stores
@@ -32,7 +33,7 @@ from bench_service.model.records import BenchStop, StoredResult, reasons_of
 from bench_service.model.request import CAMPAIGN_RUN, JobRequest
 from bench_service.telemetry.log_context import about
 from bench_service.wall_clock import now
-from procedures.core.errors import DomainError
+from procedures.core.errors import DomainError, NoCalibration
 
 BUSY_S = 0.2
 """Interval between two looks while a run is open [s]."""
@@ -153,6 +154,8 @@ class Conductor:
         except (NotDriving, BenchBusy) as error:  # not the step's fault
             return transitions.waiting(run, str(error))
         except (DomainError, ServiceError) as error:
+            if isinstance(error, NoCalibration) and (why := failed_calibrations(run, index, self._stores)):
+                return transitions.left_out(run, index, f"left out: {why}; {error}", at)
             kind = type(error).__name__
             return transitions.failed(run, index, StepState.FAILED, f"{kind}: {error}", at, kind in HOPELESS)
         except Exception as error:  # a defect: the run must still end

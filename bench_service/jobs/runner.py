@@ -25,7 +25,7 @@ from bench_service.model.records import BenchStop, Idempotency, StoredResult
 from bench_service.wall_clock import now
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, Stopped
-from procedures.core.errors import DomainError
+from procedures.core.errors import DomainError, NoCalibration
 from procedures.core.limits import Verdict
 from procedures.procedure import Outcome
 
@@ -255,10 +255,10 @@ class JobRunner:
             return False
 
     def _require_usable_calibrations(self, job: Job) -> None:
-        """Refuse a job whose unit's calibration was rejected or expired while it waited. Raises `DomainError`."""
+        """Refuse a job whose unit's calibration was rejected or expired while it waited. Raises `NoCalibration`."""
         triads = self._planner.catalogue.procedure(job.procedure).uses_calibration
         if refusal := withheld_calibration(job, triads):
-            raise DomainError(refusal)
+            raise NoCalibration(refusal)
 
     def _session_of(self, job: Job) -> BenchSession:
         if self._session is not None and self._session.job.id == job.id:

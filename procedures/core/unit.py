@@ -6,7 +6,7 @@ import numpy as np
 
 from procedures.core.arrays import Array
 from procedures.core.converter import ConverterTriad
-from procedures.core.errors import DomainError
+from procedures.core.errors import NoCalibration
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import TRIADS, Channel
@@ -73,10 +73,10 @@ class Unit:
     converter_id: str | None = None
 
     def calibration(self, triad: str) -> TriadCalibration | None:
-        """The current calibration of a triad, or None. Raises `DomainError` for one that is rejected or expired."""
+        """The current calibration of a triad, or None. Raises `NoCalibration` for one that is rejected or expired."""
         for withheld in self.withheld:
             if withheld.triad == triad:
-                raise DomainError(f"unit {self.serial}: {withheld.why}")
+                raise NoCalibration(f"unit {self.serial}: {withheld.why}")
         return next((c for c in self.calibrations if c.triad == triad), None)
 
     def calibration_id(self, triad: str) -> str | None:
@@ -111,10 +111,10 @@ class Unit:
         return None if calibration is None or calibration.output_unit == "count" else calibration.matrix_array
 
     def required_calibration(self, triad: str, purpose: str) -> TriadCalibration:
-        """The current calibration of a triad for a purpose ("verify"). Raises `DomainError` with the remedy."""
+        """The current calibration of a triad for a purpose ("verify"). Raises `NoCalibration` with the remedy."""
         calibration = self.calibration(triad)
         if calibration is None:
-            raise DomainError(
+            raise NoCalibration(
                 f"unit {self.serial} has no calibration of its {triad} triad to {purpose}: calibrate it first, "
                 "choose one of its history or enter known coefficients; one that failed counts only where it is chosen"
             )

@@ -23,9 +23,9 @@ from procedures.core.limits import Verdict
 from procedures.core.site import Site
 from procedures.core.unit import Unit
 from procedures.procedure import Context
+from tests.kit.calibrations import document_of, triad
 from tests.storage.conftest import NOW
 from tests.storage.migrating import migrated
-from tests.storage.test_calibrations import document_of, triad
 
 BOTH = (triad("gyro", 1), triad("accelerometer", 2))
 AGAIN = (triad("gyro", 3), triad("accelerometer", 4))

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 import sqlalchemy as sa
-from pydantic_core import to_jsonable_python
 
 from bench_service.campaigns.stores import Stores
 from bench_service.model.calibrations import Act, Approval, Decider, StoredCalibration
@@ -21,20 +20,12 @@ from bench_service.persistence import Database
 from bench_service.persistence.tables.columns import Table
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import DomainError
-from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, triad_calibration
 from procedures.core.limits import Verdict
 from procedures.core.unit import Unit
+from tests.kit.calibrations import document_of, triad
 
 NewResult = Callable[..., StoredResult]
 BO = Decider("Bo", "seen")
-
-
-def triad(name: str, seed: int = 1) -> TriadCalibration:
-    """Coefficients with a full covariance, so that a lost correlation is seen."""
-    rng = np.random.Generator(np.random.PCG64(seed))
-    unit = {"gyro": "rad/s", "accelerometer": "m/s^2"}[name]
-    root = rng.normal(size=(12, 12)) * 1e-6
-    return triad_calibration(name, unit, unit, rng.normal(size=12), root @ root.T)
 
 
 def current(stores: Stores, unit: str = "U-1") -> dict[str, str]:
@@ -201,23 +192,6 @@ def test_of_many_calibrations_made_at_once_one_a_triad_is_current(stores: Stores
     history = stores.calibrations.list("U-1").items
     assert len(history) == 16
     assert sorted(c.triad for c in history if c.current) == ["accelerometer", "gyro"]
-
-
-def document_of(calibration: TriadCalibration) -> dict[str, Any]:
-    """A result's document as the twelve orientations write it."""
-    numbers = zip(COEFFICIENT_NAMES, calibration.coefficients, calibration.standard_uncertainties, strict=True)
-    rows = [
-        {
-            "name": f"{calibration.triad}.{name}",
-            "unit": "1" if name.startswith("K") else "rad/s",
-            "estimate": float(value),
-            "standard_uncertainty": float(sd),
-            "from_noise": 0.25,
-        }
-        for name, value, sd in numbers
-    ]
-    of_other = {"name": "gyro.asymmetry_x", "unit": "1", "estimate": 0.125, "standard_uncertainty": 0.5}
-    return {"triads": [{"calibration": to_jsonable_python(calibration), "coefficients": rows}], "more": [of_other]}
 
 
 def test_a_coefficient_is_stored_once(stores: Stores, database: Database, new_result: NewResult) -> None:
