@@ -17,6 +17,7 @@ from bench_service.formats.plain_json import A_NUMBER, NOT_SO_DEEP, is_finite, s
 from bench_service.model.errors import (
     AlreadyReserved,
     BenchBusy,
+    CalibrationRefused,
     IdempotencyConflict,
     IllegalTransition,
     NameTaken,
@@ -42,6 +43,7 @@ STATUS: dict[type[Exception], int] = {
     BenchBusy: 409,
     AlreadyReserved: 409,
     NameTaken: 409,
+    CalibrationRefused: 409,
     NotDriving: 503,
     NotReady: 503,
     Overloaded: 503,
