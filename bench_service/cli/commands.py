@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from bench_service.cli import bench_commands, campaign_commands
+from bench_service.cli import access_commands, bench_commands, campaign_commands
 from bench_service.cli.client import RESULT, call, check, connect, segment
 from bench_service.cli.files import check_folder, text_of, whole_file
 from bench_service.cli.options import AsJson, Server, announce, console, errors, parameter, wide
@@ -30,6 +30,9 @@ app = typer.Typer(
 )
 app.add_typer(campaign_commands.campaigns, name="campaign")
 app.add_typer(campaign_commands.schedules, name="schedule")
+app.add_typer(access_commands.users, name="user")
+app.add_typer(access_commands.tokens, name="token")
+app.add_typer(access_commands.trail, name="audit")
 
 
 def run_command_line(settings: Settings, arguments: list[str] | None = None) -> int:
