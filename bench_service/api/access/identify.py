@@ -196,7 +196,7 @@ def behind_proxies(app: Any, trusted: Sequence[str | list[str] | None]) -> Any:
 
 
 def found_of(scope: Scope) -> Found:
-    """What is known of a request's sender; nothing, for a request that was refused before."""
+    """Return the identification of a request; an empty one for a request that was refused before."""
     return scope.get(FOUND) or Found(False)
 
 
