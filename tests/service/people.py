@@ -7,7 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import pytest
+from argon2 import PasswordHasher
 
+from bench_service.access import passwords
 from bench_service.cli.client import connect
 from bench_service.cli.serving import serving
 from bench_service.settings import Settings
@@ -79,11 +82,22 @@ class House:
 
 
 @contextmanager
+def cheap_passwords() -> Generator[None]:
+    """Hash passwords with little memory and time, so that tests of other things do not wait for them."""
+    with pytest.MonkeyPatch.context() as patch:
+        hasher = PasswordHasher(time_cost=1, memory_cost=64, parallelism=1)
+        patch.setattr(passwords, "_hasher", lambda: hasher)
+        passwords._nobody.cache_clear()
+        yield
+    passwords._nobody.cache_clear()
+
+
+@contextmanager
 def house(folder: Path, **more: Any) -> Generator[House]:
     """Open a service without accounts; it drives nothing, and its bench is known."""
     settings = Settings(database_url=f"sqlite:///{folder / 'bench.sqlite'}", port=free_port(), **more)
     register_bench(settings)
-    with serving(settings, drive=False), connect(settings, None, drive=False) as owner:
+    with cheap_passwords(), serving(settings, drive=False), connect(settings, None, drive=False) as owner:
         made = House(settings, owner)
         yield made
         made.close()

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import httpx
 import pytest
+from argon2 import Type, extract_parameters
 
+from bench_service.access import passwords
 from bench_service.access import service as access_service
 from bench_service.access.credentials import IDLE, LONGEST
 from bench_service.access.lockout import FREE
@@ -155,6 +157,16 @@ def test_failures_lock_a_name_whether_or_not_somebody_has_it(home: House) -> Non
     changed = home.owner.patch("/api/v1/accounts/carol", json={"password": f"{PASSWORD} 2"})
     assert changed.status_code == 200
     home.person("carol", f"{PASSWORD} 2").close()
+
+
+def test_a_stored_password_is_argon2id_with_at_least_what_owasp_asks_for() -> None:
+    """OWASP's password storage cheat sheet: 19 MiB and two passes, or 46 MiB and one."""
+    stored = extract_parameters(passwords.PasswordHasher().hash(PASSWORD))
+    assert stored.type is Type.ID
+    assert stored.memory_cost >= 19 * 1024
+    assert stored.time_cost >= 2
+    assert not passwords.matches(PASSWORD, None)
+    assert not passwords.matches(PASSWORD, "no hash")
 
 
 def test_guesses_at_the_same_time_all_count(home: House) -> None:

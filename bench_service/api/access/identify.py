@@ -149,6 +149,11 @@ class Identification:
         stopper = identity if session.stops(now()) else None
         return Found(local, stopper=stopper, refusal=Refusal(401, "NotLoggedIn", text, account.name))
 
+    def has_credential(self, headers: Headers) -> bool:
+        """Return whether a request states anything about its sender that another look may find."""
+        by_proxy = self._proxies.header is not None and self._proxies.header in headers
+        return by_proxy or "authorization" in headers or cookie_of(headers) is not None
+
     async def look_again(self) -> None:
         """Have accounts and tokens read again, for a short time at the most."""
         await asyncio.wait((asyncio.wrap_future(self._book.refreshed()),), timeout=LOOK_AGAIN_S)
@@ -171,7 +176,7 @@ class Identified:
         headers, client = Headers(scope=scope), _address(scope.get("client"))
         peer = _address(scope.get(PEER, scope.get("client")))
         found = self._rules.find(headers, client, peer)
-        if found.identity is None and _has_credential(headers):
+        if found.identity is None and self._rules.has_credential(headers):
             await self._rules.look_again()
             found = self._rules.find(headers, client, peer)
         return found
@@ -204,10 +209,6 @@ def cookie_of(headers: Headers) -> str | None:
     """The secret in the log-in's cookie; None where there is none."""
     cookies = cookie_parser(headers.get("cookie", ""))
     return cookies.get(SECURE_COOKIE) or cookies.get(COOKIE)
-
-
-def _has_credential(headers: Headers) -> bool:
-    return "authorization" in headers or cookie_of(headers) is not None
 
 
 def _address(pair: Any) -> str | None:
