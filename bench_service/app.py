@@ -13,13 +13,13 @@ from threadpoolctl import threadpool_limits
 from bench_service.api import audit, audit_chain, health, metrics, procedures, recordings, reservations, results, trends
 from bench_service.api.access import guard, identify
 from bench_service.api.access import routes as access
-from bench_service.api.access.openapi import declare_security
 from bench_service.api.benches import routes as benches
 from bench_service.api.campaigns import routes as campaigns
 from bench_service.api.campaigns import schedules
-from bench_service.api.http import bodies, door, errors, headers, request_id
+from bench_service.api.http import bodies, door, errors, headers, queries, request_id, transfer
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs import routes as jobs
+from bench_service.api.openapi import document
 from bench_service.api.units import routes as units
 from bench_service.bench.devices import BenchDevices
 from bench_service.bench.directory import BenchDirectory
@@ -197,7 +197,7 @@ def create_app(
         version=version("bench-service"),
         lifespan=lifespan,
         generate_unique_id_function=lambda route: route.name,
-        dependencies=[Depends(guard.authorised), Depends(bodies.only_plain_json)],
+        dependencies=[Depends(guard.authorised), Depends(queries.only_known_names), Depends(bodies.only_plain_json)],
         openapi_url=None,  # a route of our own has the document, so that its right is asked for as of every other
         docs_url=None,  # the framework's own pages load scripts from another host
         redoc_url=None,
@@ -211,6 +211,7 @@ def create_app(
     for page in PAGES:
         app.include_router(page.router)
     app.add_middleware(guard.Guarded, access=service.access)
+    transfer.install(app)
     app.add_middleware(bodies.Bounded)
     errors.install(app)
     app.add_middleware(identify.Identified, rules=identify.Identification(rules, service.access.book, proxies))
@@ -220,22 +221,5 @@ def create_app(
     app.add_middleware(headers.SecurityHeaders)
     app.add_middleware(request_id.RequestId)
     service.traces.instrument(app)
-    _declare_problem(app)
+    document.install(app, lambda: service.catalogue)
     return app
-
-
-def _declare_problem(app: FastAPI) -> None:
-    """Put the problem document into the OpenAPI components, where every route's errors point."""
-    made = app.openapi
-
-    def openapi() -> dict[str, object]:
-        if app.openapi_schema is None:
-            schema = made()
-            components = errors.Problem.model_json_schema(ref_template="#/components/schemas/{model}")
-            schemas = schema["components"]["schemas"]
-            schemas.update(components.pop("$defs"))
-            schemas["Problem"] = components
-            declare_security(schema)
-        return app.openapi_schema or {}
-
-    app.openapi = openapi

@@ -14,7 +14,7 @@ from bench_service.cli.commands import run_command_line
 from bench_service.cli.refusal import Refused
 from bench_service.cli.serving import check_address
 from bench_service.settings import Settings
-from tests.service.people import PASSWORD, cheap_passwords
+from tests.kit.people import PASSWORD, cheap_passwords
 
 Run = Callable[..., tuple[int, str, str]]
 

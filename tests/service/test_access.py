@@ -18,7 +18,7 @@ from bench_service.access.lockout import FREE
 from bench_service.api.access import identify
 from bench_service.cli.logs import Lines, set_up
 from bench_service.wall_clock import monotonic_s, now, pause
-from tests.service.people import CSRF, PASSWORD, SEEN_S, House, house
+from tests.kit.people import CSRF, PASSWORD, SEEN_S, House, house
 
 JOB = {"procedure": "no_operation", "unit": "SIM-0001"}
 

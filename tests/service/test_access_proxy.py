@@ -6,7 +6,7 @@ import httpx
 import pytest
 
 from bench_service.settings import BadSettings, Settings
-from tests.service.people import CSRF, House, house
+from tests.kit.people import CSRF, House, house
 
 HEADER = "X-Forwarded-User"
 JOB = {"procedure": "no_operation", "unit": "SIM-0001"}

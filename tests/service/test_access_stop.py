@@ -12,7 +12,7 @@ from bench_service.access.credentials import IDLE, STOPS_AFTER_END
 from bench_service.api.access import identify
 from bench_service.bench.stop.channel import StopChannel
 from bench_service.wall_clock import monotonic_s, now
-from tests.service.people import CSRF, House, house
+from tests.kit.people import CSRF, House, house
 
 STOP = "/api/v1/benches/sim/stop"
 AFAR = {"X-Forwarded-For": "192.0.2.7"}

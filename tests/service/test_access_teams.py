@@ -8,8 +8,8 @@ import pytest
 from bench_service.cli.serving import serving
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
+from tests.kit.people import House, free_port, house
 from tests.service.client import Client
-from tests.service.people import House, free_port, house
 
 JOB = {"procedure": "no_operation", "unit": "SIM-0001"}
 

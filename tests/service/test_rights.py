@@ -6,8 +6,8 @@ import httpx
 import pytest
 
 from bench_service.access.roles import Right, Role
+from tests.kit.people import House, house
 from tests.kit.rights_page import RouteRight, allowed, routes
-from tests.service.people import House, house
 
 ROUTES = list(routes())
 REFUSED = (401, 403)

@@ -30,13 +30,12 @@ NEEDS = "x-needs-role"
 METHODS = ("get", "put", "post", "delete", "patch")
 
 
-def declare_security(schema: dict[str, Any]) -> None:
-    """Declare the schemes, and security and least role of every operation.
+def declare_security(paths: dict[str, Any]) -> None:
+    """Declare security and least role of every operation.
 
     A service without accounts takes requests from its own host without any of them: that is not in the document.
     """
-    schema["components"]["securitySchemes"] = SCHEMES
-    for item in schema["paths"].values():
+    for item in paths.values():
         for method in METHODS:
             if method in item:
                 right = right_of(item[method]["operationId"], method.upper())
