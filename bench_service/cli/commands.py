@@ -11,6 +11,7 @@ import typer
 
 from bench_service.cli.completion import completion, prepare
 from bench_service.cli.groups import (
+    access,
     benches,
     calibrations,
     campaigns,
@@ -67,6 +68,9 @@ app.add_typer(job, name="job", rich_help_panel="Jobs")
 app.add_typer(calibrations.calibration, name="calibration", rich_help_panel="Evidence")
 app.add_typer(campaigns.campaigns, name="campaign", rich_help_panel="Jobs")
 app.add_typer(campaigns.schedules, name="schedule", rich_help_panel="Jobs")
+app.add_typer(access.users, name="user", rich_help_panel="Access")
+app.add_typer(access.tokens, name="token", rich_help_panel="Access")
+app.add_typer(access.trail, name="audit", rich_help_panel="Access")
 prepare()
 
 
