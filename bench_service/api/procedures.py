@@ -2,18 +2,19 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query
-from pydantic import BaseModel, Field
+from fastapi import APIRouter
+from fastapi import Request as HttpRequest
+from pydantic import BaseModel, Field, ValidationError
 
 from bench_service.api.http.dependencies import Service
-from bench_service.api.http.errors import problems
+from bench_service.api.http.errors import Problem, problem_of, problems, status_of
 from bench_service.api.http.fields import NAME, Request
+from bench_service.jobs.planning import Plan
 from bench_service.mapping import copied
-from bench_service.model.errors import NotMounted
-from bench_service.service import BenchService
+from bench_service.model.errors import ServiceError
 from procedures.core.errors import DomainError
 from procedures.core.recording import Station
-from procedures.procedure import Method, Outcome, Parameters, PredictedUncertainty, Procedure
+from procedures.procedure import Context, Method, Outcome, Parameters, PredictedUncertainty, Procedure
 
 router = APIRouter(prefix="/api/v1", tags=["procedures"])
 
@@ -52,13 +53,29 @@ class Preview(BaseModel):
     violations: list[str]
 
 
-class PlanView(BaseModel):
-    """A procedure's plan with default parameters, in brief."""
+class PlanRequest(PreviewRequest):
+    """One plan of a batch: the procedure with what a preview of it takes."""
 
-    procedure: str
-    duration_s: float | None = Field(description="Bench time; null: there is no plan")
-    stations: int | None
-    refusal: str | None = Field(description="Why it cannot be done on this unit and bench")
+    procedure: str = NAME
+
+
+class PreviewBatch(Request):
+    """Plans to be previewed together."""
+
+    plans: list[PlanRequest] = Field(min_length=1, max_length=500)
+
+
+class PreviewOutcome(BaseModel):
+    """The preview of one plan of a batch, or the reason why it cannot be run."""
+
+    preview: Preview | None
+    refusal: Problem | None
+
+
+class PreviewOutcomes(BaseModel):
+    """Outcomes of a batch, in the order of its plans."""
+
+    items: list[PreviewOutcome]
 
 
 def _view(entry: Procedure[Parameters, Outcome] | Method[Parameters, Outcome]) -> ProcedureView:
@@ -76,25 +93,6 @@ def list_procedures(service: Service) -> list[ProcedureView]:
     return [_view(procedure) for procedure in service.catalogue.procedures.values()]
 
 
-@router.get("/plans", responses=problems(404))
-def list_plans(
-    service: Service,
-    unit: Annotated[str, Query(min_length=1, max_length=100)],
-    bench: Annotated[str | None, Query(max_length=100)] = None,
-) -> list[PlanView]:
-    """List what each procedure would take on a unit with its default parameters, or why it cannot be done."""
-    return [_brief(service, name, unit, bench) for name in service.catalogue.procedures]
-
-
-def _brief(service: BenchService, name: str, unit: str, bench: str | None) -> PlanView:
-    try:
-        plan = service.planner.plan(name, unit, {}, bench)
-    except (DomainError, NotMounted) as error:
-        return PlanView(procedure=name, duration_s=None, stations=None, refusal=str(error))
-    refusal = plan.violations[0] if plan.violations else None
-    return PlanView(procedure=name, duration_s=plan.prediction.duration_s, stations=len(plan.stations), refusal=refusal)
-
-
 @router.get("/procedures/{name}", responses=problems(404))
 def read_procedure(name: str, service: Service) -> ProcedureView:
     """Read one procedure by its name."""
@@ -105,12 +103,35 @@ def read_procedure(name: str, service: Service) -> ProcedureView:
 def preview(name: str, request: PreviewRequest, service: Service) -> Preview:
     """Preview stations, duration, predicted uncertainties and warnings of a plan; violations of axis limits."""
     plan = service.planner.plan(name, request.unit, request.parameters, request.bench)
+    return _preview(name, request.unit, plan)
+
+
+@router.post("/previews", responses=problems(413))
+def preview_batch(body: PreviewBatch, service: Service, request: HttpRequest) -> PreviewOutcomes:
+    """Preview up to 500 plans at once; a plan that cannot be run is refused by itself, the others are previewed."""
+    contexts: dict[tuple[str, str | None], Context] = {}
+    items: list[PreviewOutcome] = []
+    for wanted in body.plans:
+        place = wanted.unit, wanted.bench
+        try:
+            if place not in contexts:
+                contexts[place] = service.planner.context(*place)
+            plan = service.planner.plan_in(contexts[place], wanted.procedure, wanted.parameters)
+            items.append(PreviewOutcome(preview=_preview(wanted.procedure, wanted.unit, plan), refusal=None))
+        except (DomainError, ServiceError, ValidationError) as error:
+            if not isinstance(error, ValidationError) and status_of(error) >= 500:
+                raise  # not this plan's affair
+            items.append(PreviewOutcome(preview=None, refusal=problem_of(request, error)))
+    return PreviewOutcomes(items=items)
+
+
+def _preview(procedure: str, unit: str, plan: Plan) -> Preview:
     return copied(
         Preview,
         plan,
         plan.prediction,
-        procedure=name,
-        unit=request.unit,
+        procedure=procedure,
+        unit=unit,
         bench=plan.context.bench.id,
         parameters=plan.parameters.model_dump(mode="json"),
         predicted_uncertainties=plan.prediction.uncertainties,

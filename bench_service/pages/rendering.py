@@ -10,6 +10,7 @@ from fastapi import Request
 from fastapi.templating import Jinja2Templates
 from markupsafe import Markup, escape
 
+from bench_service.access.identity import Identity, Proof
 from bench_service.model.errors import ServiceError
 from bench_service.pages.languages import (
     LANGUAGE,
@@ -53,6 +54,17 @@ def number(value: Any) -> str:
     if isinstance(value, bool):
         return translated("yes") if value else translated("no")
     return f"{value:.{LEAST_DIGITS}g}" if isinstance(value, float) else str(value)
+
+
+def who(request: Request) -> dict[str, Any]:
+    """Describe the reader of a page: name and role, whether people log in here, and what changes must repeat."""
+    identity: Identity | None = getattr(request.state, "identity", None)
+    log_in_on = service_of(request).access.book.log_in_on
+    if identity is None:
+        return {"name": None, "role": None, "csrf": "", "log_in_on": log_in_on, "session": False}
+    session = identity.proof is Proof.SESSION
+    name, role = identity.proven_name, identity.role.value
+    return {"name": name, "role": role, "csrf": identity.csrf or "", "log_in_on": log_in_on, "session": session}
 
 
 def measured(value: Any, uncertainty: Any) -> str:
@@ -122,6 +134,7 @@ templates.env.add_extension("jinja2.ext.i18n")
 templates.env.install_gettext_callables(  # pyright: ignore[reportAttributeAccessIssue]
     translated, translated_number, newstyle=True
 )
+templates.env.globals["who"] = who
 templates.env.filters |= {
     "number": number,
     "asset": asset,

@@ -7,19 +7,11 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from bench_service.wall_clock import monotonic_s, pause
 from tests.browser.conftest import Watched
 from tests.end_to_end.bench_process import BenchProcess
+from tests.kit.waiting import ended
 
 FAST = {"dwell_s": 5.0, "settle_s": 0.5}
-
-
-def ended(service: BenchProcess, job: str, seconds: float = 90.0) -> dict[str, Any]:
-    deadline = monotonic_s() + seconds
-    while (found := service.client.get(f"/api/v1/jobs/{job}").json())["state"] in ("queued", "running"):
-        assert monotonic_s() < deadline
-        pause(0.1)
-    return found
 
 
 @pytest.fixture(scope="module")

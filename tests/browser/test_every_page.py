@@ -9,8 +9,8 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.conftest import Watched, address
-from tests.browser.test_day import ended
 from tests.end_to_end.bench_process import BenchProcess
+from tests.kit.waiting import ended
 
 GRAVE = ("serious", "critical")
 DRESSES = [(width, scheme) for width in (400, 1280) for scheme in ("light", "dark")]

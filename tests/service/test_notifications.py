@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.model.errors import Misconfigured
 from bench_service.notifications.channels import SIGNATURE
 from bench_service.notifications.messages import Message

@@ -6,7 +6,19 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import JSONResponse, StreamingResponse
 
-from bench_service.api.http.dependencies import After, ClientName, Hub, IdempotencyKey, Limit, RequestedBy, Service
+from bench_service.access.service import require_team
+from bench_service.api.access.teams import TeamOfJob
+from bench_service.api.http.dependencies import (
+    After,
+    ClientName,
+    Hub,
+    IdempotencyKey,
+    Limit,
+    Me,
+    ProvenName,
+    RequestedBy,
+    Service,
+)
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.queries import Searched
 from bench_service.api.jobs import event_stream
@@ -63,10 +75,16 @@ def submit(
     body: JobSubmission,
     service: Service,
     response: Response,
+    requested_by: RequestedBy,
+    me: Me,
     key: IdempotencyKey = None,
-    requested_by: RequestedBy = None,
 ) -> JobView:
-    """Submit a job to the queue. The same `Idempotency-Key` with the same body gives the job of the first request."""
+    """Submit a job to the queue. The same `Idempotency-Key` with the same body gives the job of the first request.
+
+    An operator submits approved procedures; under a reservation, a member of its team.
+    """
+    service.access.require_approved(me, body.procedure, lambda: service.catalogue.procedure(body.procedure).version)
+    require_team(me, service.queues.team_of(body.reservation), f"reservation {body.reservation}")
     job = service.jobs.submit(copied(JobRequest, body), key, requested_by or "")
     response.headers["Location"] = f"/api/v1/jobs/{job.id}"
     return _view(service, job)
@@ -102,7 +120,7 @@ def read_job(job_id: str, service: Service) -> JobView:
     return _view(service, service.stores.jobs.get(job_id))
 
 
-@router.patch("/{job_id}", responses=problems(404, 409, 413, 507))
+@router.patch("/{job_id}", responses=problems(404, 409, 413, 507), dependencies=[TeamOfJob])
 def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
     """Change the priority of a queued job, and with it its place in the queue."""
     return _view(service, service.jobs.set_priority(job_id, body.priority))
@@ -111,6 +129,7 @@ def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
 @router.post(
     "/{job_id}/cancel",
     status_code=202,
+    dependencies=[TeamOfJob],
     response_model=JobView,
     responses={
         **problems(404, 409, 413, 507),
@@ -118,7 +137,7 @@ def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
     },
 )
 def cancel(
-    job_id: str, service: Service, client: ClientName, body: CancelRequest | None = None
+    job_id: str, service: Service, client: ClientName, proven: ProvenName, body: CancelRequest | None = None
 ) -> JobView | JSONResponse:
     """Cancel a job: a queued one at once, a running one as soon as its bench is safe. Its recordings are kept.
 
@@ -127,35 +146,35 @@ def cancel(
     """
     try:
         asked = body or CancelRequest.model_validate({})
-        return _view(service, service.jobs.cancel(job_id, asked.by or client, asked.reason))
+        return _view(service, service.jobs.cancel(job_id, proven or asked.by or client, asked.reason))
     except NotUnderstood as error:
         _, state = service.stores.jobs.last_event(job_id)
         return JSONResponse(ForeignJob(id=job_id, state=state, waiting=str(error)).model_dump(mode="json"), 200)
 
 
-@router.post("/{job_id}/pause", status_code=202, responses=problems(404, 409, 507))
+@router.post("/{job_id}/pause", status_code=202, responses=problems(404, 409, 507), dependencies=[TeamOfJob])
 def pause(job_id: str, service: Service) -> JobView:
     """Pause a job: a queued one at once, a running one before its next station. The bench is then safe and free."""
     return _view(service, service.jobs.pause(job_id))
 
 
-@router.post("/{job_id}/answer", status_code=202, responses=problems(404, 409, 413, 507))
-def answer(job_id: str, body: PromptAnswer, service: Service, requested_by: RequestedBy = None) -> JobView:
+@router.post("/{job_id}/answer", status_code=202, responses=problems(404, 409, 413, 507), dependencies=[TeamOfJob])
+def answer(job_id: str, body: PromptAnswer, service: Service, requested_by: RequestedBy) -> JobView:
     """Confirm that the person at the bench did what the job's prompt asks (`prompt`), or decline it."""
     said = Answer(body.done, body.remark, requested_by or "")
     return _view(service, service.stores.prompts.answer(job_id, body.prompt, said, now()))
 
 
-@router.post("/{job_id}/notes", status_code=201, responses=problems(404, 409, 413, 507))
-def add_note(job_id: str, body: NoteRequest, service: Service, client: ClientName) -> EventView:
+@router.post("/{job_id}/notes", status_code=201, responses=problems(404, 409, 413, 507), dependencies=[TeamOfJob])
+def add_note(job_id: str, body: NoteRequest, service: Service, client: ClientName, proven: ProvenName) -> EventView:
     """Add a person's remark to a job: an event of the kind `note`, with its author."""
-    said = {"text": body.text, "by": body.by or client}
+    said = {"text": body.text, "by": proven or body.by or client}
     service.stores.jobs.note(job_id, "note", now(), said)
     last, _ = service.stores.jobs.last_event(job_id)
     return EventView.of(service.stores.jobs.events(job_id, last - 1)[0])
 
 
-@router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409, 507))
+@router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409, 507), dependencies=[TeamOfJob])
 def resume(job_id: str, service: Service) -> JobView:
     """Resume a paused, interrupted or resumable failed job: it is queued again and does the stations that remain."""
     return _view(service, service.jobs.resume(job_id))

@@ -21,7 +21,8 @@ function sentence(status, problem, fallback) {
 
 /** Asks the API; gives the document of a good answer. Raises `Refused` with a sentence for a person. */
 export async function ask(method, path, body, { key = null, patience = PATIENCE_MS, signal = null } = {}) {
-  const headers = {};
+  const headers = {}, csrf = document.querySelector('meta[name="csrf"]');
+  if (csrf && method !== "GET") headers["X-CSRF-Token"] = csrf.content;
   if (body !== undefined && !(body instanceof FormData)) headers["Content-Type"] = "application/json";
   if (key) headers["Idempotency-Key"] = key;
   if (me() && method !== "GET") headers["X-Requested-By"] = utf8(me());

@@ -44,6 +44,9 @@ function open() {
   source.onerror = () => {
     tell(false, "away");
     source.close();
+    fetch("/api/v1/session", { cache: "no-store" }).then((answer) => answer.json()).then((me) => {  // it lives: is it the log-in?
+      if (me.log_in_needed && !me.name) tell(false, "log-in");
+    }).catch(() => { /* it is away */ });
     if (!timer) timer = setTimeout(open, AGAIN_MS);
   };
 }

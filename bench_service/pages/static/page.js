@@ -16,7 +16,9 @@ function away() {
   document.getElementById("main").setAttribute("aria-busy", String(gone));
   box.hidden = !gone && !feed.state.why;
   box.replaceChildren();
-  if (gone) {
+  if (gone && feed.state.why === "log-in") {
+    box.append(h("strong", {}, t("Your log-in has ended; the stop works without one.")), " ", h("a", { href: `/log-in?next=${part(location.pathname)}` }, t("Log in")));
+  } else if (gone) {
     const since = new Date(feed.state.at).toLocaleTimeString();
     box.append(h("strong", {}, t("The service does not answer since {since}.", { since })), " ",
       t("What this page shows is old. A stop may not arrive: where there is danger, use the hardware emergency stop."));

@@ -57,11 +57,12 @@ function choose(procedure, parameters = null) {
 
 async function howLong() {
   if (!unit()) return;
-  const plans = await read(`/api/v1/plans?${new URLSearchParams({ unit: unit(), ...(bench() && { bench: bench() }) })}`).catch(() => []);
-  for (const plan of plans) {
-    const place = document.querySelector(`#cards [data-procedure="${plan.procedure}"] .long`);
-    if (place) place.textContent = plan.refusal || `${span(plan.duration_s)}, ${t("{n} stations", { n: plan.stations })}`;
-  }
+  const plans = procedures.map((one) => ({ procedure: one.name, unit: unit(), ...(bench() && { bench: bench() }) }));
+  const { items } = await send("/api/v1/previews", { plans }).catch(() => ({ items: [] }));
+  items.forEach(({ preview: plan, refusal }, k) => {
+    const place = document.querySelector(`#cards [data-procedure="${plans[k].procedure}"] .long`);
+    if (place) place.textContent = refusal ? refusal.detail : `${span(plan.duration_s)}, ${t("{n} stations", { n: plan.stations.length })}`;
+  });
 }
 
 function extras() {

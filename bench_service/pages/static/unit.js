@@ -4,21 +4,15 @@ import { busy } from "./act.js";
 import { fill, h, number, shownIn } from "./dom.js";
 import { t } from "./words.js";
 
-const form = document.getElementById("compare"), NAMES = ["x", "y", "z"].flatMap((axis, k) => [`b_${axis}`, `K${k + 1}1`, `K${k + 1}2`, `K${k + 1}3`]);
-
-const coefficients = (triad) => triad.bias.flatMap((b, i) => [b, ...triad.matrix[i]]);
+const form = document.getElementById("compare");
 
 function differences(a, b) {
-  return a.triads.flatMap((triad) => {
-    const other = b.triads.find((one) => one.triad === triad.triad);
-    if (!other) return [];
-    const before = coefficients(other);
-    return coefficients(triad).map((value, k) => {
-      const bias = k % 4 === 0, [unit, size] = bias ? shownIn(triad.output_unit) : ["ppm", 1e-6];
-      const delta = (value - before[k]) / size, variance = (c) => (c.covariance[k] ? c.covariance[k][k] : NaN);
-      const sigma = Math.sqrt(variance(triad) + variance(other)) / size;
-      return { name: `${triad.triad} ${NAMES[k]}`, delta, sigma, unit, ratio: delta / sigma };
-    });
+  if (a.triad !== b.triad) throw new Error(t("Choose two calibrations of the same triad."));
+  const variance = (one, k) => (one.calibration.covariance[k] ? one.calibration.covariance[k][k] : NaN);
+  return a.coefficients.map((one, k) => {
+    const [unit, size] = k % 4 === 0 ? shownIn(one.unit) : ["ppm", 1e-6], delta = (one.value - b.coefficients[k].value) / size;
+    const sigma = Math.sqrt(variance(a, k) + variance(b, k)) / size;
+    return { name: `${a.triad} ${one.name}`, delta, sigma, unit, ratio: delta / sigma };
   });
 }
 
@@ -27,10 +21,11 @@ if (form) {
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
     const { a, b } = Object.fromEntries(new FormData(form));
-    const page = await busy(form.querySelector("button"), output, () => read(`/api/v1/units/${part(form.dataset.unit)}/calibrations?limit=500`));
-    if (!page) return;
-    const [first, second] = [a, b].map((id) => page.items.find((one) => one.id === id));
-    const rows = differences(first, second);
+    const rows = await busy(form.querySelector("button"), output, async () => {
+      const [first, second] = await Promise.all([a, b].map((id) => read(`/api/v1/units/${part(form.dataset.unit)}/calibrations/${part(id)}`)));
+      return differences(first, second);
+    });
+    if (!rows) return;
     fill(document.getElementById("difference"), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Differences") }, h("table", {},
       h("thead", {}, h("tr", {}, ...["Coefficient", "Difference", "± standard uncertainty", "Unit", "Difference over σ"].map((name) => h("th", {}, t(name))))),
       h("tbody", {}, ...rows.map((row) => h("tr", {}, h("th", { scope: "row" }, row.name), h("td", { class: "n" }, number(row.delta, row.sigma)), h("td", { class: "n" }, number(Number(row.sigma.toPrecision(2)))), h("td", {}, row.unit),
