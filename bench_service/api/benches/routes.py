@@ -90,7 +90,7 @@ async def stop(
     of a bench can stand at the same time.
     """
     asked = body or StopRequest.model_validate({})
-    done = await stop_in_own_thread(service.stops, bench_id, asked.reason, proven or asked.by or client)
+    done = await stop_in_own_thread(service.stops, bench_id, asked.reason, proven or asked.by or client, asked.wait)
     return Stopping(
         bench=bench_id, stop=done.stop.id, job=done.job, safety=SafetyView.of(done.safety), books=done.books or None
     )

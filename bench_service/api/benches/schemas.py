@@ -19,6 +19,10 @@ class StopRequest(Request):
     """Request to stop a bench, with reason and author."""
 
     reason: str = Field("stopped by an operator", min_length=1, max_length=500)
+    wait: bool = Field(
+        True,
+        description="Answer once the devices are safe and the database has it, at most a second later; false: at once",
+    )
     by: By | None = None
 
 
