@@ -83,7 +83,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     files = BenchFiles(settings)
     rescued = files.rescue() if drive else None
     threadpool_limits(1)  # the matrices have at most 72 rows: BLAS threads would only spin against the bench's own
-    stores, database = open_stores(settings.database_url)
+    stores, database = open_stores(settings.database_url, settings.copies_in())
     closing.callback(database.dispose)
     driver = _driver(settings, partial(AskedOperator, stores.prompts)) if drive else None
     holder = partial(lease_holder, database, settings.database_url)

@@ -57,6 +57,9 @@ class Settings(BaseModel):
     """Folder where a simulated bench's devices keep their state; None: with the SQLite file, in .bench/ for Postgres.
 
     A folder of the bench's own host, the same for every process of that bench."""
+    backup_folder: Path | None = None
+    """Folder for the copy that is made before a newer version changes the database's tables; None: next to an SQLite
+    file, in the device folder for Postgres."""
     stop_listen: str = Field("127.0.0.1:0", pattern=r"^(|\S+:\d{1,5})$")
     """Address at which a bench's supervisor takes stops from other hosts, `host:port`, port 0 for any; empty: none.
 
@@ -87,6 +90,12 @@ class Settings(BaseModel):
     def stop_secret_in(self) -> Path:
         """The file of the secret under which a stop goes to another host."""
         return self.stop_secret_file or self.devices_in() / "bench-stop.secret"
+
+    def copies_in(self) -> Path | None:
+        """The folder of copies made before a migration; None: next to the SQLite file."""
+        if self.backup_folder is not None or self.database_url.startswith("sqlite"):
+            return self.backup_folder
+        return self.devices_in()
 
     def token(self) -> str | None:
         """The token of `token_file`; None where the settings name none. Raises `BadSettings`."""
