@@ -17,6 +17,7 @@ ServiceError
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
+    ├── DatabaseMoved     the database's file was deleted or replaced while it was open
     ├── DamagedRecording  the stored bytes of a recording are not those written
     └── UnfitValue        a value cannot be stored, now or later
 """
@@ -124,6 +125,10 @@ class StorageFull(ServiceError):
 
 class StorageFailure(ServiceError):
     """Raised where the database failed in any other way."""
+
+
+class DatabaseMoved(StorageFailure):
+    """Raised where the file of the database is no longer the one that was opened."""
 
 
 class DamagedRecording(StorageFailure):
