@@ -80,6 +80,8 @@ class Settings(BaseModel):
     """Format of the log's lines."""
     log_level: Literal["debug", "info", "warning", "error"] | None = None
     """Lowest level that is logged; None: info for a service, warning for a command that works in this process."""
+    log_file: Path | None = None
+    """File for the log's lines, begun anew at 10 MB, with the five before it kept; None: standard error."""
     log_access: bool = False
     """True where every request is a line of the log."""
     traces_url: str | None = Field(None, pattern=r"^https?://\S+$")

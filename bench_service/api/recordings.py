@@ -1,5 +1,6 @@
 """Routes of recordings: list them, export samples, and import a recorded file."""
 
+from collections.abc import Callable
 from datetime import datetime
 from typing import Annotated, Any
 
@@ -9,11 +10,14 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, Field, ValidationError
 
+from bench_service.api.http.admitted_stream import AdmittedStream
 from bench_service.api.http.bodies import refuse_unfit
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.http.errors import made, problems
+from bench_service.evidence.admission import Places
+from bench_service.evidence.recordings import require_undamaged
 from bench_service.formats.description import ImportDescription
-from bench_service.formats.export import ExportFormat, export, extract
+from bench_service.formats.export import ExportFormat, Extract, export, export_bytes, extract
 from bench_service.formats.import_file import ImportFile
 from bench_service.formats.plain_json import shown
 from bench_service.mapping import copied
@@ -62,6 +66,8 @@ class RecordingPage(BaseModel):
     next: str | None
 
 
+EXPORTS = Places("exports", most=8, most_bytes=100_000_000)
+"""Exports at a time: each holds a chunk of samples and its form in the file."""
 DATA: dict[int | str, dict[str, object]] = {
     200: {
         "description": "The raw samples; scale, offset and unit of each channel travel with them",
@@ -90,7 +96,7 @@ def read_recording(recording_id: str, service: Service) -> RecordingView:
     return RecordingView.of(stored, service.stores.results.of_recording(recording_id))
 
 
-@router.get("/{recording_id}/data", response_class=StreamingResponse, responses={**problems(404), **DATA})
+@router.get("/{recording_id}/data", response_class=StreamingResponse, responses={**problems(404, 409), **DATA})
 def read_data(
     recording_id: str,
     service: Service,
@@ -99,18 +105,36 @@ def read_data(
     start_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="From the first sample")] = None,
     stop_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="Not included")] = None,
 ) -> StreamingResponse:
-    """Stream the raw samples, whole or by channel and time; none are held in memory, however long the recording."""
+    """Stream the raw samples, whole or by channel and time; none are held in memory, however long the recording.
+
+    Refused with 409 where a stored sample of that part is damaged, and with 503 while too many others are exported.
+    """
     recordings = service.stores.recordings
     stored = recordings.get(recording_id)
     names = None if channels is None else channels.split(",")
     part = extract(stored.info, stored.dtype, names, start_s, stop_s)
+    give_back = EXPORTS.take(export_bytes(form))
+    try:
+        return _exported(service, part, form, give_back)
+    except BaseException:
+        give_back()
+        raise
+
+
+def _exported(
+    service: BenchService, part: Extract, form: ExportFormat, give_back: Callable[[], None]
+) -> StreamingResponse:
+    recordings, recording_id = service.stores.recordings, part.info.id
+    require_undamaged(recordings, recording_id, part.start, part.stop)
     blocks = recordings.read(recording_id, [c.name for c in part.info.channels], part.start, part.stop)
     file_name = f"{recording_id}.{form.value}"
-    return StreamingResponse(
+    stream = AdmittedStream(
         export(part, blocks, form),
         media_type=form.media_type,
         headers={"Content-Disposition": f'attachment; filename="{file_name}"'},
     )
+    stream.give_back = give_back
+    return stream
 
 
 @router.post(

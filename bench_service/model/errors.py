@@ -11,12 +11,14 @@ ServiceError
 ├── NotReady             a job could not start here now
 ├── NotSafe              the bench's devices are not known to be safe
 ├── SeveralStops         a release must name one of the stops that stand
+├── TooManyStops         so many stops of a bench stand that one more is not kept apart
 ├── AlreadyReserved      another holder has reserved this bench or unit
 ├── Overloaded           too much is requested at one time
 ├── NotUnderstood        a job was stored by a version whose format this one does not know
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
+    ├── DamagedDatabase   the database's file is damaged
     ├── DatabaseMoved     the database's file was deleted or replaced while it was open
     ├── DamagedRecording  the stored bytes of a recording are not those written
     └── UnfitValue        a value cannot be stored, now or later
@@ -96,6 +98,10 @@ class SeveralStops(ServiceError):
         self.stops = tuple(stops)
 
 
+class TooManyStops(ServiceError):
+    """Raised where so many stops of a bench stand already that one more is not stored on its own."""
+
+
 class AlreadyReserved(ServiceError):
     """Raised where another holder has reserved this bench or unit."""
 
@@ -125,6 +131,10 @@ class StorageFull(ServiceError):
 
 class StorageFailure(ServiceError):
     """Raised where the database failed in any other way."""
+
+
+class DamagedDatabase(StorageFailure):
+    """Raised where the database's own file is damaged: a part of it cannot be read, now or later."""
 
 
 class DatabaseMoved(StorageFailure):

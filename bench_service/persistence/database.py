@@ -22,7 +22,7 @@ from sqlalchemy.pool import QueuePool
 
 from bench_service import wall_clock
 from bench_service.formats.plain_json import read_back
-from bench_service.model.errors import DatabaseMoved, StorageFailure, StorageFull, UnfitValue
+from bench_service.model.errors import DamagedDatabase, DatabaseMoved, StorageFailure, StorageFull, UnfitValue
 from bench_service.persistence.upkeep.file_identity import FileIdentity
 
 BUSY_S = 30.0
@@ -42,6 +42,8 @@ nothing of it applies. One that is reached and hangs is waited for: who must not
 _NEWS = "news"
 _SQLITE_FULL = frozenset({sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_SHMSIZE})
 _POSTGRES_FULL = frozenset({"53100"})
+_SQLITE_DAMAGED = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
+_POSTGRES_DAMAGED = frozenset({"XX001", "XX002"})
 _JSON: dict[str, Any] = {
     "json_serializer": partial(json.dumps, allow_nan=False),
     "json_deserializer": read_back,
@@ -216,12 +218,16 @@ def storage_errors() -> Generator[None, None, None]:
     except DBAPIError as error:
         if is_full(error.orig):
             raise StorageFull("the database cannot grow: the disk is full") from error
+        if is_damaged(error.orig):
+            raise _damaged(error.orig) from error
         raise StorageFailure(f"the database failed: {error.orig}") from error
     except StatementError as error:  # raised before the database is asked: the value has no form there
         raise UnfitValue(f"a value cannot be stored: {error.orig}") from error
     except SQLAlchemyError as error:
         raise StorageFailure(f"the database failed: {error}") from error
     except sqlite3.Error as error:
+        if is_damaged(error):
+            raise _damaged(error) from error
         raise StorageFailure(f"the database failed: {error}") from error
     except (ValueError, OverflowError) as error:
         raise UnfitValue(f"a value cannot be stored, or not be read again: {error}") from error
@@ -247,3 +253,14 @@ def is_full(error: BaseException | None) -> bool:
         code = getattr(error, "sqlite_errorcode", 0)
         return code in _SQLITE_FULL or code & 0xFF == sqlite3.SQLITE_FULL
     return getattr(error, "sqlstate", None) in _POSTGRES_FULL
+
+
+def is_damaged(error: BaseException | None) -> bool:
+    """Return whether a driver's error means that the database's stored bytes are damaged."""
+    if isinstance(error, sqlite3.Error):
+        return getattr(error, "sqlite_errorcode", 0) & 0xFF in _SQLITE_DAMAGED
+    return getattr(error, "sqlstate", None) in _POSTGRES_DAMAGED
+
+
+def _damaged(error: BaseException | None) -> DamagedDatabase:
+    return DamagedDatabase(f"the database is damaged ({error}): `bench scrub` names what, `bench restore` takes a copy")

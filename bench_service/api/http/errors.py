@@ -17,6 +17,8 @@ from bench_service.formats.plain_json import A_NUMBER, NOT_SO_DEEP, is_finite, s
 from bench_service.model.errors import (
     AlreadyReserved,
     BenchBusy,
+    DamagedDatabase,
+    DamagedRecording,
     IdempotencyConflict,
     IllegalTransition,
     NameTaken,
@@ -52,6 +54,8 @@ STATUS: dict[type[Exception], int] = {
     DomainError: 422,
     BenchError: 502,
     StorageFull: 507,
+    DamagedRecording: 409,
+    DamagedDatabase: 500,
     StorageFailure: 503,
     ServiceError: 500,
 }
