@@ -60,6 +60,9 @@ class Settings(BaseModel):
     backup_folder: Path | None = None
     """Folder for the copy that is made before a newer version changes the database's tables; None: next to an SQLite
     file, in the device folder for Postgres."""
+    scrub_at: str = Field("03:30", pattern=r"^(|([01][0-9]|2[0-3]):[0-5][0-9])$")
+    """Time of day, on this host's clock, of the nightly check of the database by a process that drives a bench; empty:
+    none."""
     stop_listen: str = Field("127.0.0.1:0", pattern=r"^(|\S+:\d{1,5})$")
     """Address at which a bench's supervisor takes stops from other hosts, `host:port`, port 0 for any; empty: none.
 

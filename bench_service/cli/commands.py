@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from bench_service.cli import bench_commands, campaign_commands
+from bench_service.cli import bench_commands, campaign_commands, database_commands
 from bench_service.cli.client import RESULT, call, check, connect, segment
 from bench_service.cli.files import check_folder, text_of, whole_file
 from bench_service.cli.options import AsJson, Server, announce, console, errors, parameter, wide
@@ -89,7 +89,10 @@ def serve(
         server.run()
 
 
-for _command in (bench_commands.worker, bench_commands.supervise, bench_commands.stop):
+for _command in (
+    *(bench_commands.worker, bench_commands.supervise, bench_commands.stop),
+    *(database_commands.database, database_commands.scrub, database_commands.backup, database_commands.restore),
+):
     app.command()(_command)
 
 

@@ -9,10 +9,10 @@ import sys
 from datetime import UTC, datetime
 from logging.handlers import RotatingFileHandler
 
-from bench_service.cli.log_restraint import Restraint
 from bench_service.model.errors import Misconfigured
 from bench_service.settings import Settings
 from bench_service.telemetry.log_context import AddSubjects
+from bench_service.telemetry.log_restraint import Restraint
 
 FIELDS = "{asctime} {levelname} {name} {message}"
 OWN_HANDLERS = ("uvicorn", "uvicorn.error", "uvicorn.access", "dbos")

@@ -226,6 +226,8 @@ def storage_errors() -> Generator[None, None, None]:
     except SQLAlchemyError as error:
         raise StorageFailure(f"the database failed: {error}") from error
     except sqlite3.Error as error:
+        if is_full(error):
+            raise StorageFull("the database cannot grow: the disk is full") from error
         if is_damaged(error):
             raise _damaged(error) from error
         raise StorageFailure(f"the database failed: {error}") from error

@@ -51,3 +51,47 @@ class UpkeepStore(Protocol):
     def list(self, *, kind: UpkeepKind | None = None, after: str | None = None, limit: int = 50) -> Page[UpkeepReport]:
         """List reports, newest first."""
         ...
+
+
+@dataclass(frozen=True)
+class DatabaseSize:
+    """The size of a database."""
+
+    kind: str
+    """"sqlite" or "postgresql"."""
+    stored_bytes: int
+    log_bytes: int | None
+    """Length of the write-ahead log's file; None where the database is a server's."""
+    free_bytes: int | None
+    """Room on the disk of the file; None where the database is a server's."""
+    revision: str | None
+    """Revision of the tables."""
+
+
+class DatabasePort(Protocol):
+    """PORT: the database as a whole."""
+
+    def size(self) -> DatabaseSize:
+        """Read the size of the database. Raises `StorageFailure`."""
+        ...
+
+    def faults(self) -> tuple[str, ...]:
+        """Return what the database itself finds wrong with its pages and references; it may take minutes."""
+        ...
+
+    def trouble(self) -> str | None:
+        """Return why the database's file is no longer the one that was opened; None where it is."""
+        ...
+
+
+class NoDatabase:
+    """A `DatabasePort` of a service whose database is not known as a whole."""
+
+    def size(self) -> DatabaseSize:
+        return DatabaseSize("unknown", 0, None, None, None)
+
+    def faults(self) -> tuple[str, ...]:
+        return ()
+
+    def trouble(self) -> str | None:
+        return None
