@@ -1,5 +1,6 @@
 """One service of a process: the services of each noun, and its life from registration to its end."""
 
+import logging
 from collections.abc import Callable, Sequence
 
 from bench_service.bench.driver import BenchDriver
@@ -15,6 +16,7 @@ from bench_service.evidence.imports import ImportService
 from bench_service.evidence.units import register
 from bench_service.evidence.upkeep import NightlyScrub, UpkeepService
 from bench_service.evidence.work_processes import WorkProcesses
+from bench_service.jobs.history import is_empty, missing_history
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue_service import QueueService
 from bench_service.jobs.service import JobService
@@ -25,6 +27,7 @@ from bench_service.model.records import reasons_of
 from bench_service.telemetry.tracing import Traces
 from bench_service.telemetry.upkeep import DatabasePort, NoDatabase
 
+log = logging.getLogger(__name__)
 LEAST_FREE_BYTES = 200_000_000
 """Free bytes on the database's disk below which the service is not ready: an hour of samples is about 17 MB."""
 
@@ -76,6 +79,8 @@ class BenchService:
         self._free_bytes = free_bytes
         self._rescued = rescued
         self.upkeep = UpkeepService(stores, database or NoDatabase(), f"the service, {ProcessIdentity.own()}")
+        self._missing = ""
+        """The sentence on a history that the devices remember and the database does not; empty: there is none."""
         self._nightly = NightlyScrub(self.upkeep, scrub_at)
 
     def register(self) -> None:
@@ -88,6 +93,9 @@ class BenchService:
             register(self.stores.units, unit)
         self.stores.benches.put_bench(self._driver.description, [unit.serial for unit in mounted])
         if self._worker is not None:
+            self._missing = missing_history(self.safety.known(self._driver.description.id).devices, self.stores.jobs)
+            if self._missing:
+                log.warning("bench %s: %s", self._driver.description.id, self._missing)
             self.safety.at_start(self._driver.description.id, self._rescued)
 
     def begin(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
@@ -131,7 +139,9 @@ class BenchService:
             raise NotReady(reasons)
         standing = ((bench, self.stores.benches.standing_stops(bench)) for bench in self.benches.ids())
         stopped = (f"bench {bench} is stopped: {reasons_of(stops)}" for bench, stops in standing if stops)
-        return (*stopped, *self.catalogue.notes(), *self.upkeep.notes())
+        self._missing = self._missing if self._missing and is_empty(self.stores.jobs) else ""
+        missing = (self._missing,) if self._missing else ()
+        return (*stopped, *missing, *self.catalogue.notes(), *self.upkeep.notes())
 
     def stop(self) -> None:
         """End the service: the running job is left for the next start, and the bench made safe."""

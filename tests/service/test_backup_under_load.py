@@ -99,7 +99,9 @@ def test_a_copy_made_under_load_has_everything_acknowledged_and_its_running_job_
     assert stores.jobs.get(long_job).state.value == "running"
     database.dispose()
     shutil.rmtree(devices)  # another host: nothing but the copy is there
-    with connect(settings.model_copy(update={"database_url": restored, "real_time_factor": None}), None, drive=True) as http:
+    with connect(
+        settings.model_copy(update={"database_url": restored, "real_time_factor": None}), None, drive=True
+    ) as http:
         client = Client(http)
         assert client.wait(long_job)["state"] == "succeeded"
         assert _hashes(client, long_job) == digest
