@@ -28,6 +28,9 @@ test: $(VENV)/.ready  ## the whole test suite
 chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books; press stop while something is in its way
 	@kept=0; $(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both || kept=1; $(BIN)/python -m tests.chaos.stop_matrix --runs 5 || kept=1; exit $$kept
 
+soak: $(VENV)/.ready  ## mixed load for MINUTES (60): memory, descriptors, threads and logs must stay level
+	@$(BIN)/python -m tests.soak --minutes $(or $(MINUTES),60)
+
 format: $(VENV)/.ready  ## format the code, put imports in order, mend what ruff can mend safely
 	@$(BIN)/ruff check --fix-only --quiet . ; $(BIN)/ruff format --quiet .
 
