@@ -2,13 +2,13 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := calibration allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
+VALIDATIONS := calibration multi_position allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners)
 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
 
 .DEFAULT_GOAL := help
-.PHONY: help run test bench chaos soak format check validate lock audit images clean
+.PHONY: help run test bench chaos soak format check validate rights lock audit images clean
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -60,6 +60,10 @@ audit: .venv-audit/.ready  ## licences and bill of materials into build/, and kn
 
 images: $(VENV)/.ready  ## pin the images of docker-compose.yml by digest and build, where a container engine is
 	@$(BIN)/python .ci/images.py
+
+rights: $(VENV)/.ready  ## write docs/rights.md anew, from the routes and their rights
+	@$(BIN)/python -m tests.kit.rights_page
+
 
 clean:  ## remove the environment and the demo's data
 	rm -rf $(VENV) .venv-audit .bench

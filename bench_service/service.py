@@ -3,6 +3,8 @@
 import logging
 from collections.abc import Callable, Sequence
 
+from bench_service.access.book import AccessBook
+from bench_service.access.service import AccessService
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import LiveBoard
 from bench_service.bench.make_safe import Rescue
@@ -59,6 +61,7 @@ class BenchService:
         analyses are computed; None: in the caller's thread. `database`: the database as a whole; None: not known.
         `scrub_at`: the time of the nightly check, "HH:MM"; empty: none.
         """
+        self.access = AccessService(stores.access, AccessBook(stores.access))
         self.safety = safety
         self.traces = traces or Traces()
         self.live = live or LiveBoard(stores.live)

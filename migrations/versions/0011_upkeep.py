@@ -1,13 +1,13 @@
 """reports of the database's upkeep: checks of its contents, and copies that were made of it
 
-Revision: 0011, after 0007
+Revision: 0011, after 0009
 """
 
 import sqlalchemy as sa
 from alembic import op
 
 revision = "0011"
-down_revision = "0007"
+down_revision = "0009"
 branch_labels = None
 depends_on = None
 

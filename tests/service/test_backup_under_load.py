@@ -8,7 +8,7 @@ from threading import Event, Lock, Thread
 
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.persistence import open_stores
 from bench_service.persistence.upkeep.backups import back_up
 from bench_service.persistence.upkeep.restoring import restore_database

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause

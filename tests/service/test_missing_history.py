@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from bench_service.bench.devices import DeviceState
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.jobs.history import missing_history
 from bench_service.persistence import open_stores
 from bench_service.settings import Settings

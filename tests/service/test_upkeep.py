@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.cli.commands import run_command_line
 from bench_service.evidence.upkeep import NightlyScrub, UpkeepService, next_time
 from bench_service.persistence import open_stores

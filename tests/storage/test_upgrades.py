@@ -17,14 +17,16 @@ from bench_service.model.job import Job
 from bench_service.model.records import NewRecording, StoredResult
 from bench_service.persistence import Database, open_stores
 from bench_service.persistence.database import connect
-from bench_service.persistence.migration import newest_revision, upgrade
+from bench_service.persistence.migration import SCRIPTS, newest_revision, upgrade
 from bench_service.persistence.tables.every import METADATA
 from procedures.core.recording import RawArray
 
+LANDED = tuple(path.name[:4] for path in sorted(SCRIPTS.glob("versions/0*.py")))[:-1]
+"""Every revision before the one of today."""
 EARLY = Path(__file__).parent / "early_forms"
 HELD = ("units", "jobs", "events", "recordings", "chunks", "results", "result_recordings")
 """Tables that every form has; a database of that form held what its columns can hold."""
-FORMS = ("0001", "0002", "0003", "0004", "0005", "0006", "0007", "011c34e", "6817c92", "3219e54", "011c34e at 0006")
+FORMS = (*LANDED, "011c34e", "6817c92", "3219e54", "011c34e at 0006")
 """Revisions; and 0004 as of the commits that edited it, the first also with what came after it."""
 
 

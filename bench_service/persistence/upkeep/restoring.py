@@ -88,7 +88,10 @@ def _into_server(copy: Path, database_url: str) -> None:
                 _check_empty(connection)
                 upgrade(connection, revision)
                 names = {row[0] for row in from_.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-                for table in tables_of(connection, names - {"alembic_version"}):
+                tables = tables_of(connection, names - {"alembic_version"})
+                for table in reversed(tables):  # a migration may have put rows of its own into a new table
+                    connection.execute(table.delete())
+                for table in tables:
                     _fill(connection, table, from_)
     finally:
         database.dispose()
