@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bench_service.cli import logs
+from bench_service.cli.processes import logs
 from bench_service.settings import Settings
 from bench_service.telemetry.log_restraint import BURST, FIRST, STEADY, WINDOW_S, Restraint
 
