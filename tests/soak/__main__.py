@@ -78,6 +78,7 @@ def judge(samples: Samples, minutes: float) -> list[str]:
     for name, values in (("memory", samples.memory_mb), ("memory with children", samples.with_children_mb)):
         series = np.array(values)
         print(f"{name}: {series[0]:.0f} MB at first, {series[late].mean():.0f} MB later, {series.max():.0f} MB at most")
+        print(f"  by quarter: {', '.join(f'{quarter.mean():.0f}' for quarter in np.array_split(series, 4))} MB")
         try:
             found = slope(times[late], series[late])
         except ValueError as error:
