@@ -1,6 +1,5 @@
 """Routes of recordings: list them, export samples, and import a recorded file."""
 
-from collections.abc import Callable
 from datetime import datetime
 from typing import Annotated, Any
 
@@ -10,7 +9,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, Field, ValidationError
 
-from bench_service.api.http.admitted_stream import AdmittedStream
+from bench_service.api.http.admitted_stream import AdmittedStream, place_in_turn
 from bench_service.api.http.bodies import refuse_unfit
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.http.errors import made, problems
@@ -105,7 +104,7 @@ def read_recording(recording_id: str, service: Service) -> RecordingView:
 
 
 @router.get("/{recording_id}/data", response_class=StreamingResponse, responses={**problems(404, 409), **DATA})
-def read_data(
+async def read_data(
     recording_id: str,
     service: Service,
     form: Annotated[ExportFormat, Query(alias="format")] = ExportFormat.ARROW,
@@ -115,34 +114,37 @@ def read_data(
 ) -> StreamingResponse:
     """Stream the raw samples, whole or by channel and time; none are held in memory, however long the recording.
 
-    Refused with 409 where a stored sample of that part is damaged, and with 503 while too many others are exported.
+    Refused with 409 where a stored sample of that part is damaged, and with 503 where too many others wait.
     """
-    recordings = service.stores.recordings
-    stored = recordings.get(recording_id)
     names = None if channels is None else channels.split(",")
-    part = extract(stored.info, stored.dtype, names, start_s, stop_s)
-    give_back = EXPORTS.take(export_bytes(form))
+    part = await to_thread.run_sync(_part, service, recording_id, names, start_s, stop_s)
+    give_back = await place_in_turn(EXPORTS, export_bytes(form))
     try:
-        return _exported(service, part, form, give_back)
+        stream = await to_thread.run_sync(_exported, service, part, form)
     except BaseException:
         give_back()
         raise
+    stream.give_back = give_back
+    return stream
 
 
-def _exported(
-    service: BenchService, part: Extract, form: ExportFormat, give_back: Callable[[], None]
-) -> StreamingResponse:
+def _part(
+    service: BenchService, recording_id: str, names: list[str] | None, start_s: float | None, stop_s: float | None
+) -> Extract:
+    stored = service.stores.recordings.get(recording_id)
+    return extract(stored.info, stored.dtype, names, start_s, stop_s)
+
+
+def _exported(service: BenchService, part: Extract, form: ExportFormat) -> AdmittedStream:
     recordings, recording_id = service.stores.recordings, part.info.id
     require_undamaged(recordings, recording_id, part.start, part.stop)
     blocks = recordings.read(recording_id, [c.name for c in part.info.channels], part.start, part.stop)
     file_name = f"{recording_id}.{form.value}"
-    stream = AdmittedStream(
+    return AdmittedStream(
         export(part, blocks, form),
         media_type=form.media_type,
         headers={"Content-Disposition": f'attachment; filename="{file_name}"'},
     )
-    stream.give_back = give_back
-    return stream
 
 
 @router.post(

@@ -1,11 +1,12 @@
 """Heavy requests are admitted within bounds: more of them are refused with 503 and Retry-After, or wait their turn."""
 
 import asyncio
-from threading import Event
+from threading import Event, Timer
 
 import pytest
 
 from bench_service.api import recordings
+from bench_service.api.http import admitted_stream
 from bench_service.evidence import admission
 from bench_service.evidence.admission import Places, Turns
 from bench_service.model.errors import Overloaded
@@ -80,10 +81,12 @@ def test_an_export_beyond_the_places_is_refused_and_may_be_sent_again(
     recording = sqlite_client.recordings(job["id"])[0]["id"]
     places = Places("exports", most=1, most_bytes=10**9)
     monkeypatch.setattr(recordings, "EXPORTS", places)
+    monkeypatch.setattr(admitted_stream, "WAIT_S", 0.2)
     other = places.take(1)
     refused = sqlite_client.http.get(f"/api/v1/recordings/{recording}/data")
     assert (refused.status_code, refused.headers["Retry-After"]) == (503, "2")
-    other()
+    monkeypatch.setattr(admitted_stream, "WAIT_S", 10.0)
+    Timer(0.3, other).start()  # now it waits for its turn
     for _ in range(3):  # each gives its place back, a refused one too
         assert sqlite_client.http.get(f"/api/v1/recordings/{recording}/data").status_code == 200
         assert sqlite_client.http.get(f"/api/v1/recordings/{recording}/data?channels=none").status_code == 422
