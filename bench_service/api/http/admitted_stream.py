@@ -9,7 +9,7 @@ from starlette.types import Message, Receive, Scope, Send
 
 from bench_service.evidence.admission import Places
 from bench_service.model.errors import Overloaded
-from bench_service.wall_clock import monotonic_s
+from bench_service.wall_clock import monotonic_s, pause_async
 
 STALLED_S = 60.0
 """Time after which a client that takes no more bytes of a stream is let go [s]: it holds a place of others."""
@@ -37,7 +37,7 @@ async def place_in_turn(places: Places, wanted_bytes: int) -> Callable[[], None]
             except Overloaded:
                 if _waiting > WAITING or monotonic_s() > deadline:
                     raise
-            await anyio.sleep(LOOK_S)
+            await pause_async(LOOK_S)
     finally:
         _waiting -= 1
 
