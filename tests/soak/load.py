@@ -15,6 +15,8 @@ DESCRIPTION += '"quantity": "angular_rate", "unit": "deg/s"}]}'
 CLIENTS = 3
 QUEUED_MOST = 20
 """Jobs that may wait: the load does not run ahead of the bench."""
+RELEASES = 25
+"""Attempts at the release of a bench."""
 PAGES = ("/", "/benches/sim/stops", "/metrics", "/readyz", "/api/v1/jobs", "/api/v1/recordings", "/api/v1/database")
 
 
@@ -116,7 +118,12 @@ class Load:
 
     def _stop(self, client: httpx.Client, chance: random.Random) -> httpx.Response:
         answer = client.post("/api/v1/benches/sim/stop", json={"reason": "a soak", "by": f"client {chance.random()}"})
-        if answer.status_code != 202:
-            return answer
-        stop = answer.json()["stop"]
-        return client.post(f"/api/v1/benches/sim/stops/{stop}/release", json={"by": "a soak", "remark": "goes on"})
+        for _ in range(RELEASES):  # refused while the bench is being made safe; then the bench would do nothing more
+            standing = client.get("/api/v1/benches/sim").json()["stops"]
+            if not standing:
+                break
+            for stop in standing:
+                path = f"/api/v1/benches/sim/stops/{stop['id']}/release"
+                client.post(path, json={"by": "a soak", "remark": "goes on"})
+            pause(0.2)
+        return answer

@@ -84,7 +84,9 @@ def _handler(settings: Settings) -> logging.Handler:
         return logging.StreamHandler(sys.stderr)
     try:
         settings.log_file.parent.mkdir(parents=True, exist_ok=True)
-        return RotatingFileHandler(settings.log_file, maxBytes=FILE_BYTES, backupCount=FILES_KEPT, encoding="utf-8")
+        handler = RotatingFileHandler(settings.log_file, maxBytes=FILE_BYTES, backupCount=FILES_KEPT, encoding="utf-8")
+        settings.log_file.chmod(0o600)  # begun before the service takes rights away from what it makes
+        return handler
     except OSError as error:
         raise Misconfigured(f"BENCH_LOG_FILE {settings.log_file} cannot be written: {error.strerror}") from error
 
