@@ -10,7 +10,18 @@ from fastapi import Depends, FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
-from bench_service.api import audit, audit_chain, health, metrics, procedures, recordings, reservations, results, trends
+from bench_service.api import (
+    audit,
+    audit_chain,
+    database,
+    health,
+    metrics,
+    procedures,
+    recordings,
+    reservations,
+    results,
+    trends,
+)
 from bench_service.api.access import guard, identify
 from bench_service.api.access import routes as access
 from bench_service.api.benches import routes as benches
@@ -46,11 +57,12 @@ from bench_service.jobs.worker import Worker
 from bench_service.pages import access_pages, campaign_pages, docs, figures, images, static_files
 from bench_service.pages import routes as pages
 from bench_service.pages.drawing_process import open_drawing
-from bench_service.persistence import BenchLease, acquire_lease, engine_database, lease_holder, open_stores
+from bench_service.persistence import BenchLease, Database, acquire_lease, engine_database, lease_holder, open_stores
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.database import as_storage_error
 from bench_service.persistence.evidence.analysis_run import open_run
+from bench_service.persistence.upkeep.contents import DatabaseContents
 from bench_service.service import BenchService
 from bench_service.settings import Settings
 from bench_service.telemetry.code_version import code_version
@@ -74,6 +86,7 @@ ROUTERS = (
     schedules,
     access,
     audit,
+    database,
     audit_chain,
     health,
     metrics,
@@ -91,10 +104,10 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     files = BenchFiles(settings)
     rescued = files.rescue() if drive else None
     threadpool_limits(1)  # the matrices have at most 72 rows: BLAS threads would only spin against the bench's own
-    stores, database = open_stores(settings.database_url)
-    closing.callback(database.dispose)
+    stores, opened = open_stores(settings.database_url, settings.copies_in())
+    closing.callback(opened.dispose)
     driver = _driver(settings, partial(AskedOperator, stores.prompts)) if drive else None
-    holder = partial(lease_holder, database, settings.database_url)
+    holder = partial(lease_holder, opened, settings.database_url)
     planner = Planner(
         stores.units,
         BenchDirectory(stores.benches, stores.units, driver, settings.bench_id, drawn_unit, holder),
@@ -125,24 +138,47 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
-    addresses = StopAddresses(SqlStopAddresses(database).all, settings.stop_secret_in())
-    addresses.begin()
-    closing.callback(addresses.end)
-    roads = StopRoads(settings.devices_in(), addresses.road, addresses.host)
-    processes = WorkProcesses(open_run, settings.database_url, code) if apart else None
-    if processes is not None:
-        drawing = WorkProcesses(open_drawing, at_once=1, waiting=DRAWINGS)
-        figures.draw_in(drawing)
-        for undo in (processes.close, drawing.close, partial(figures.draw_in, None)):
-            closing.callback(undo)
+    roads = _roads(settings, opened, closing)
+    processes = _work_apart(settings, code, closing) if apart else None
+    whole = DatabaseContents(opened), settings.scrub_at
     service = BenchService(
-        stores, driver, planner, worker, code, safety, board, database.free_bytes, traces, roads, rescued, processes
+        stores,
+        driver,
+        planner,
+        worker,
+        code,
+        safety,
+        board,
+        opened.free_bytes,
+        traces,
+        roads,
+        rescued,
+        processes,
+        *whole,
     )
     service.access.book.begin()
     closing.callback(service.access.book.end)
     closing.callback(service.stop)
     service.register()
     return service
+
+
+def _roads(settings: Settings, opened: Database, closing: ExitStack) -> StopRoads:
+    """The ways of a stop to the benches of this host and of others."""
+    addresses = StopAddresses(SqlStopAddresses(opened).all, settings.stop_secret_in())
+    addresses.begin()
+    closing.callback(addresses.end)
+    return StopRoads(settings.devices_in(), addresses.road, addresses.host)
+
+
+def _work_apart(settings: Settings, code: str, closing: ExitStack) -> WorkProcesses:
+    """Processes for analyses; figures are drawn in another one from now on."""
+    processes = WorkProcesses(open_run, settings.database_url, code)
+    drawing = WorkProcesses(open_drawing, at_once=1, waiting=DRAWINGS)
+    figures.draw_in(drawing)
+    for undo in (processes.close, drawing.close, partial(figures.draw_in, None)):
+        closing.callback(undo)
+    return processes
 
 
 def _devices(settings: Settings, bench_id: str) -> BenchDevices:

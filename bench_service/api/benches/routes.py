@@ -21,6 +21,7 @@ from bench_service.api.http.dependencies import (
     REQUESTED_BY,
     After,
     ClientName,
+    IdempotencyKey,
     Limit,
     ProvenName,
     RequestedBy,
@@ -80,16 +81,22 @@ def read_queue(bench_id: str, service: Service) -> QueueView:
 
 @router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 413, 507))
 async def stop(
-    bench_id: str, service: Service, client: ClientName, proven: ProvenName, body: StopRequest | None = None
+    bench_id: str,
+    service: Service,
+    client: ClientName,
+    proven: ProvenName,
+    body: StopRequest | None = None,
+    key: IdempotencyKey = None,
 ) -> Stopping:
     """Stop a bench by software: end the running job, stop the table, switch the unit off; until this stop is released.
 
     The stop goes to the bench itself first, on its host, and needs no database for that: a worker sees it, and in its
     place the bench's supervisor. The database follows when it can; `books` says why where it has not yet. Several stops
-    of a bench can stand at the same time.
+    of a bench can stand at the same time, sixteen at most: of one more, `books` says that it waits. Sent again with its
+    Idempotency-Key it is the same stop, as long as this process lives.
     """
     asked = body or StopRequest.model_validate({})
-    done = await stop_in_own_thread(service.stops, bench_id, asked.reason, proven or asked.by or client)
+    done = await stop_in_own_thread(service.stops, bench_id, asked.reason, proven or asked.by or client, key)
     return Stopping(
         bench=bench_id, stop=done.stop.id, job=done.job, safety=SafetyView.of(done.safety), books=done.books or None
     )
