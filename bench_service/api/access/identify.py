@@ -185,7 +185,7 @@ class Identified:
 class PeerKept:
     """ASGI middleware that keeps the address of the socket, before a proxy's word about its client is taken."""
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: Any) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
