@@ -1,7 +1,7 @@
 """Rendering shared by all pages: templates, the filters in them, and the service behind the request."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from fastapi import Request
 from fastapi.templating import Jinja2Templates
@@ -42,4 +42,4 @@ def service_of(request: Request) -> BenchService:
     return request.app.state.service
 
 
-templates.env.globals.update(who=who)
+cast(dict[str, Any], templates.env.globals)["who"] = who
