@@ -20,6 +20,7 @@ from bench_service.api.http import bodies, door, errors, headers, queries, reque
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs import routes as jobs
 from bench_service.api.openapi import document
+from bench_service.api.units import calibrations
 from bench_service.api.units import routes as units
 from bench_service.bench.devices import BenchDevices
 from bench_service.bench.directory import BenchDirectory
@@ -65,6 +66,7 @@ ROUTERS = (
     recordings,
     results,
     units,
+    calibrations,
     trends,
     benches,
     reservations,

@@ -1,8 +1,9 @@
-"""Stores of the evidence room: units, recordings, results, corrections, and clients' idempotency keys."""
+"""Stores of the evidence room: units, recordings, results, calibrations, corrections, and clients' idempotency keys."""
 
 from dataclasses import dataclass
 
 from bench_service.access.stores import AccessStores
+from bench_service.evidence.calibrations import CalibrationStore
 from bench_service.evidence.corrections import CorrectionStore
 from bench_service.evidence.keys import KeyStore
 from bench_service.evidence.recordings import RecordingStore
@@ -17,5 +18,6 @@ class EvidenceStores(AccessStores):
     units: UnitStore
     recordings: RecordingStore
     results: ResultStore
+    calibrations: CalibrationStore
     corrections: CorrectionStore
     keys: KeyStore

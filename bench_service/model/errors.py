@@ -5,6 +5,7 @@ ServiceError
 ├── IllegalTransition    the job's state does not allow it
 ├── IdempotencyConflict  the key was used before with another request
 ├── NameTaken            a campaign of that name exists already
+├── CalibrationRefused   a calibration may not become the one that counts
 ├── BenchBusy            another process drives this bench
 ├── Misconfigured        a file that the settings name cannot be used
 ├── NotDriving           this process drives no bench
@@ -52,6 +53,10 @@ class IdempotencyConflict(ServiceError):
 
 class NameTaken(ServiceError):
     """Raised where a campaign of that name exists already."""
+
+
+class CalibrationRefused(ServiceError):
+    """Raised where a calibration may not become its triad's current one; the message has the way out."""
 
 
 class BenchBusy(ServiceError):

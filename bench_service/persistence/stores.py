@@ -7,6 +7,7 @@ from bench_service.persistence.bench.prompt_store import SqlPromptStore
 from bench_service.persistence.bench.registry_store import SqlBenchRegistry
 from bench_service.persistence.campaign_store import SqlCampaignStore
 from bench_service.persistence.database import Database, connect
+from bench_service.persistence.evidence.calibration_store import SqlCalibrationStore
 from bench_service.persistence.evidence.correction_store import SqlCorrectionStore
 from bench_service.persistence.evidence.recording_store import SqlRecordingStore
 from bench_service.persistence.evidence.result_store import SqlResultStore
@@ -42,6 +43,7 @@ def stores_of(database: Database) -> Stores:
         units=SqlUnitStore(database),
         benches=SqlBenchRegistry(database),
         campaigns=SqlCampaignStore(database),
+        calibrations=SqlCalibrationStore(database),
         corrections=SqlCorrectionStore(database),
         live=SqlLiveStore(database),
         prompts=SqlPromptStore(database),

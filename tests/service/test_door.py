@@ -9,9 +9,9 @@ import pytest
 from starlette.datastructures import Headers
 
 from bench_service.api.http.door import Door, is_loopback, is_loopback_address, may_listen
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.cli.commands import run_command_line
-from bench_service.cli.serving import serving
+from bench_service.cli.processes.serving import serving
 from bench_service.model.errors import Misconfigured
 from bench_service.settings import BadSettings, Settings
 from tests.service.client import Client

@@ -11,7 +11,7 @@ from typing import Any
 import httpx
 import pytest
 
-from bench_service.cli.serving import serving
+from bench_service.cli.processes.serving import serving
 from bench_service.settings import Settings
 
 METHODS = ("get", "put", "post", "delete", "patch")

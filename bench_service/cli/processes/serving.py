@@ -14,9 +14,9 @@ import uvicorn
 from bench_service.api.access.identify import Proxies, behind_proxies
 from bench_service.api.http.door import Door, may_listen
 from bench_service.app import create_app, open_service
-from bench_service.cli.connections import AT_ONCE, BoundedConnections, lengthen_queue, raise_descriptors
-from bench_service.cli.logs import set_up
-from bench_service.cli.private_files import protect
+from bench_service.cli.processes.connections import AT_ONCE, BoundedConnections, lengthen_queue, raise_descriptors
+from bench_service.cli.processes.logs import set_up
+from bench_service.cli.processes.private_files import protect
 from bench_service.cli.refusal import Refused
 from bench_service.persistence.access.peek import has_credentials
 from bench_service.service import BenchService

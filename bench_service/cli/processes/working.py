@@ -5,10 +5,10 @@ from collections.abc import Callable
 from contextlib import ExitStack
 
 from bench_service.app import open_service
-from bench_service.cli.companion import accompanied
-from bench_service.cli.ending import ending_on_signals
-from bench_service.cli.logs import set_up
-from bench_service.cli.private_files import protect
+from bench_service.cli.processes.companion import accompanied
+from bench_service.cli.processes.ending import ending_on_signals
+from bench_service.cli.processes.logs import set_up
+from bench_service.cli.processes.private_files import protect
 from bench_service.settings import Settings
 
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from bench_service.access.roles import Role
-from bench_service.cli.client import answer, call, connect, segment
+from bench_service.cli.asking.client import answer, call, connect, segment
 from bench_service.cli.files import text_of
 from bench_service.cli.options import AsJson, Server, console, notice, wide
 from bench_service.cli.refusal import Refused

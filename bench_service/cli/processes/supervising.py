@@ -13,9 +13,9 @@ from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.stop.listener import StopListener
 from bench_service.bench.stop.messages import made_secret
 from bench_service.bench.supervisor import Supervisor
-from bench_service.cli.ending import ending_on_signals
-from bench_service.cli.logs import set_up
-from bench_service.cli.private_files import protect
+from bench_service.cli.processes.ending import ending_on_signals
+from bench_service.cli.processes.logs import set_up
+from bench_service.cli.processes.private_files import protect
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.model.errors import BenchBusy

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from math import inf
 from pathlib import Path
 
-from bench_service.cli.supervising import SUPERVISED_ALREADY
+from bench_service.cli.processes.supervising import SUPERVISED_ALREADY
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s

@@ -15,13 +15,14 @@ ROWS_MAX = 60
 """Largest number of rows that are printed of a table; the page has them all."""
 
 
-def report_tables(method: str, document: dict[str, Any]) -> Iterator[ScreenTable]:
-    """Build each table of a method's report on a result.
+def report_tables(name: str, document: dict[str, Any]) -> Iterator[ScreenTable]:
+    """Build each table of the report that a method or procedure gives of a result.
 
-    None where this version does not know the method, or where a service of another version wrote the document.
+    None where this version does not know the name, or where a service of another version wrote the document.
     """
+    catalogue = Catalogue()
     try:
-        entry = Catalogue().method(method)
+        entry = catalogue.procedures.get(name) or catalogue.method(name)
         report = entry.report(entry.result.model_validate(document))
     except (NotFound, ValidationError):
         return

@@ -8,22 +8,32 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bench_service.cli.client import answer, call, connect, segment
+from bench_service.cli.asking.client import answer, call, connect, segment
+from bench_service.cli.asking.lists import everything, show
+from bench_service.cli.asking.patience import patiently
 from bench_service.cli.files import clear_place, whole_file
-from bench_service.cli.options import AsJson, Server, console, errors, notice, parameter, wide
-from bench_service.cli.patience import patiently
+from bench_service.cli.options import (
+    NO_ITEMS,
+    AsJson,
+    Server,
+    console,
+    errors,
+    key_or_new,
+    labels,
+    notice,
+    parameter,
+    wide,
+)
 from bench_service.cli.refusal import Refused
-from bench_service.wall_clock import new_id
 
 if TYPE_CHECKING:
-    import httpx
+    pass
 
 campaigns = typer.Typer(no_args_is_help=True, help="Campaigns: procedures in order, with limits and a verdict.")
 schedules = typer.Typer(no_args_is_help=True, help="Schedules: campaigns that start by themselves.")
 
 Unit = Annotated[str, typer.Option(help="Serial of the unit")]
 Bench = Annotated[str | None, typer.Option(help="Bench, where there are several")]
-NO_ITEMS: list[str] = []
 
 
 @campaigns.command("run")
@@ -43,21 +53,24 @@ def run_campaign(
     as_json: AsJson = False,
 ) -> int:
     """Run a campaign on a unit and wait for its verdict. Exit code: 0 pass, 1 fail, 2 error."""
-    from bench_service.cli.campaign_tables import run_table
-    from bench_service.cli.watching import CAMPAIGN_RUN, exit_code, watch_campaign
+    from bench_service.cli.asking.leaving import INTERRUPTED, leave_campaign
+    from bench_service.cli.asking.watching import CAMPAIGN_RUN, exit_code, watch_campaign
+    from bench_service.cli.printing.campaign_tables import run_table
 
     if junit is not None:
         clear_place(junit)
-    body = {"unit": unit, "bench": bench, "seed": seed, "labels": _labels(label), "parameters": _step_parameters(set_)}
-    if key is not None and not (key.isascii() and key.isprintable()):
-        raise Refused(f"--key {key!r}: letters, digits and signs of ASCII are needed")
-    key = new_id() if key is None else key  # so that there is a way back to every run
+    body = {"unit": unit, "bench": bench, "seed": seed, "labels": labels(label), "parameters": _step_parameters(set_)}
+    key = key_or_new(key)
     with connect(context.obj, server, drive=True) as client:
         headers = {"Idempotency-Key": key}
         run = call(client, "POST", f"/api/v1/campaigns/{segment(name)}/runs", CAMPAIGN_RUN, json=body, headers=headers)
         again = f"the same command with --key {quote(key)} waits for it again"
         goes_on = f"The service has run {run['id']} and goes on with it: {again}"
-        run = watch_campaign(client, run, errors, goes_on)
+        try:
+            run = watch_campaign(client, run, errors, goes_on)
+        except KeyboardInterrupt:
+            leave_campaign(client, run["id"], server, again, notice)
+            return INTERRUPTED
         path = f"/api/v1/campaign-runs/{run['id']}/report"
         report = patiently(partial(call, client, "GET", path, ("run",)), notice, goes_on)
         if junit is not None:
@@ -77,11 +90,11 @@ def run_campaign(
 @campaigns.command("list")
 def list_campaigns(context: typer.Context, server: Server = None, as_json: AsJson = False) -> None:
     """List the campaigns by name."""
-    from bench_service.cli.campaign_tables import campaign_table
+    from bench_service.cli.printing.campaign_tables import campaign_table
 
     with connect(context.obj, server, drive=False) as client:
-        items = _all(client, "/api/v1/campaigns")
-    _show(items, as_json, campaign_table)
+        items = everything(client, "/api/v1/campaigns")
+    show(items, as_json, campaign_table)
 
 
 @campaigns.command("show")
@@ -126,12 +139,12 @@ def list_runs(
     as_json: AsJson = False,
 ) -> None:
     """Runs of campaigns, newest first."""
-    from bench_service.cli.campaign_tables import runs_table
+    from bench_service.cli.printing.campaign_tables import runs_table
 
     query = {"limit": limit} | ({} if campaign is None else {"campaign": campaign})
     with connect(context.obj, server, drive=False) as client:
         items = call(client, "GET", "/api/v1/campaign-runs", ("items",), params=query)["items"]
-    _show(items, as_json, runs_table)
+    show(items, as_json, runs_table)
 
 
 @schedules.command("add")
@@ -166,11 +179,11 @@ def add_schedule(
 @schedules.command("list")
 def list_schedules(context: typer.Context, server: Server = None, as_json: AsJson = False) -> None:
     """List the schedules, newest first."""
-    from bench_service.cli.campaign_tables import schedule_table
+    from bench_service.cli.printing.campaign_tables import schedule_table
 
     with connect(context.obj, server, drive=False) as client:
-        items = _all(client, "/api/v1/schedules")
-    _show(items, as_json, schedule_table)
+        items = everything(client, "/api/v1/schedules")
+    show(items, as_json, schedule_table)
 
 
 @schedules.command("remove")
@@ -198,30 +211,3 @@ def _step_parameters(texts: list[str]) -> dict[str, dict[str, Any]]:
             raise Refused(f"--set {text}: expected step.name=value")
         found.setdefault(step, {})[name] = value
     return found
-
-
-def _labels(texts: list[str]) -> dict[str, str]:
-    pairs = [text.partition("=") for text in texts]
-    for name, equals, value in pairs:
-        if not (name and equals and value):
-            raise Refused(f"--label {name}{equals}{value}: expected name=text")
-    return {name: value for name, _, value in pairs}
-
-
-def _all(client: "httpx.Client", path: str) -> list[dict[str, Any]]:
-    """Read every page of a list."""
-    items: list[dict[str, Any]] = []
-    query: dict[str, Any] = {"limit": 500}
-    while True:
-        page = call(client, "GET", path, ("items", "next"), params=query)
-        items += page["items"]
-        if page["next"] is None:
-            return items
-        query["after"] = page["next"]
-
-
-def _show(items: list[dict[str, Any]], as_json: bool, table: Any) -> None:
-    if as_json:
-        print(json.dumps(items, indent=2))
-    else:
-        wide().print(table(items))

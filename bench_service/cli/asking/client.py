@@ -54,7 +54,7 @@ def _address(server: str) -> "httpx.URL":
     """Return the address of the service as a URL. Raises `Refused` for a host name that no resolver would take."""
     import httpx
 
-    url = httpx.URL(server)
+    url = httpx.URL(server if "://" in server else f"http://{server}")
     try:
         url.host.encode("idna")
     except UnicodeError as error:
@@ -70,7 +70,9 @@ def _client(settings: Settings, server: str | None, drive: bool) -> Generator["h
         with httpx.Client(base_url=_address(server), timeout=TIMEOUT_S, headers=_token(settings)) as client:
             yield client
         return
-    from bench_service.cli.serving import serving  # a quarter of a second that a client of a server does not need
+    from bench_service.cli.processes.serving import (
+        serving,  # a quarter of a second that a client of a server does not need
+    )
 
     with tempfile.TemporaryDirectory(prefix="bench-") as folder:
         socket_file = Path(folder) / "http"
@@ -140,7 +142,7 @@ def _sentence(response: "httpx.Response") -> str:
 
 
 def _field(one: dict[str, Any]) -> str:
-    given = f" = {one['value']!r}" if "value" in one else ""
+    given = f" = {one['value']!r}" if one.get("value") is not None else ""
     return ": ".join(filter(None, [f"{one.get('field', '')}{given}", str(one.get("message", ""))]))
 
 

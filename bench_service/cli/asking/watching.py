@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from bench_service.cli.client import call
+from bench_service.cli.asking.client import call
+from bench_service.cli.asking.patience import patiently
 from bench_service.cli.options import notice
-from bench_service.cli.patience import patiently
 from bench_service.wall_clock import pause
 
 if TYPE_CHECKING:
@@ -30,7 +30,11 @@ def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict
     goes_on = f"The service has job {job['id']} and goes on with it: {page} shows it, `bench jobs` lists it"
     with _progress(console) as progress:
         bar = progress.add_task(f"{job['procedure']} {job['unit']}", total=job["progress"]["stations"] or 1, doing="")
+        paused = False
         while job["state"] not in ENDED:
+            if (job["state"] == "paused") > paused:
+                notice(f"job {job['id']} is paused: `bench job resume {job['id']}` goes on with it")
+            paused = job["state"] == "paused"
             pause(LOOK_S)
             ask = partial(call, client, "GET", f"/api/v1/jobs/{job['id']}", JOB, timeout=LOOK_TIMEOUT_S)
             job = patiently(ask, notice, goes_on)
