@@ -16,7 +16,7 @@ from bench_service.api.access import routes as access
 from bench_service.api.benches import routes as benches
 from bench_service.api.campaigns import routes as campaigns
 from bench_service.api.campaigns import schedules
-from bench_service.api.http import bodies, door, errors, headers, queries, request_id, transfer
+from bench_service.api.http import bodies, door, endings, errors, headers, queries, request_id, transfer
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs import routes as jobs
 from bench_service.api.openapi import document
@@ -216,6 +216,7 @@ def create_app(
     transfer.install(app)
     app.add_middleware(bodies.Bounded)
     errors.install(app)
+    endings.install(app)
     app.add_middleware(identify.Identified, rules=identify.Identification(rules, service.access.book, proxies))
     app.add_middleware(door.Doorkeeper, door=rules)
     metrics.install(app, service)
