@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncGenerator, Callable
 from contextlib import ExitStack, asynccontextmanager
+from datetime import timedelta
 from functools import partial
 from importlib.metadata import version
 
@@ -53,6 +54,7 @@ from bench_service.persistence.database import as_storage_error
 from bench_service.persistence.evidence.analysis_run import open_run
 from bench_service.service import BenchService
 from bench_service.settings import Settings
+from bench_service.telemetry.audit_retention import AuditRetention
 from bench_service.telemetry.code_version import code_version
 from bench_service.telemetry.tracing import traces_to
 
@@ -138,6 +140,10 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     service = BenchService(
         stores, driver, planner, worker, code, safety, board, database.free_bytes, traces, roads, rescued, processes
     )
+    if settings.audit_days is not None:
+        retention = AuditRetention(stores.audit, timedelta(days=settings.audit_days))
+        retention.begin()
+        closing.callback(retention.end)
     service.access.book.begin()
     closing.callback(service.access.book.end)
     closing.callback(service.stop)

@@ -11,7 +11,6 @@ from pydantic import BaseModel, Field
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from bench_service.access.credentials import without_tokens
 from bench_service.api.access.identify import found_of
 from bench_service.api.http.bodies import is_json
 from bench_service.api.http.dependencies import NO_CONTROL_CHARACTERS, REQUESTED_BY, WHO_LENGTH, After, Limit, Service
@@ -21,6 +20,7 @@ from bench_service.formats.plain_json import faults, mended, shown
 from bench_service.mapping import copied
 from bench_service.telemetry.audit import AuditEntry, AuditTrail, record
 from bench_service.telemetry.log_context import request_id
+from bench_service.telemetry.redaction import without_tokens
 
 router = APIRouter(prefix="/api/v1/audit", tags=["audit"])
 
