@@ -314,6 +314,9 @@ def test_a_wrong_account_is_refused_with_what_is_allowed(home: House) -> None:
         assert answer.status_code == 422
         assert field in answer.json()["errors"][0]["field"]
         assert "short" not in answer.text
+    for path in ("/api/v1/accounts", "/api/v1/tokens"):
+        taken = home.owner.post(path, json={"name": "service-token", "role": "viewer"})
+        assert taken.status_code == 422, "a name with which the service signs"
     twice = home.owner.post("/api/v1/accounts", json={"name": "ada", "role": "viewer", "password": PASSWORD})
     assert twice.status_code == 409
     assert home.owner.patch("/api/v1/accounts/ada", json={"role": "viewer"}).status_code == 409, "the last admin"
