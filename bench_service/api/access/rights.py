@@ -21,7 +21,6 @@ RIGHTS: dict[str, Right] = {
     "preview": Right.SEE,
     "preview_batch": Right.SEE,
     "preview_campaign": Right.SEE,
-    "preview_batch": Right.SEE,
     "stop": Right.STOP,
     "submit": Right.OPERATE,
     "change_job": Right.OPERATE,
