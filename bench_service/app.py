@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncGenerator, Callable
 from contextlib import ExitStack, asynccontextmanager
+from datetime import timedelta
 from functools import partial
 from importlib.metadata import version
 
@@ -27,7 +28,7 @@ from bench_service.api.access import routes as access
 from bench_service.api.benches import routes as benches
 from bench_service.api.campaigns import routes as campaigns
 from bench_service.api.campaigns import schedules
-from bench_service.api.http import bodies, door, errors, headers, queries, request_id, transfer
+from bench_service.api.http import bodies, door, endings, errors, headers, queries, request_id, transfer
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs import routes as jobs
 from bench_service.api.openapi import document
@@ -65,6 +66,7 @@ from bench_service.persistence.evidence.analysis_run import open_run
 from bench_service.persistence.upkeep.contents import DatabaseContents
 from bench_service.service import BenchService
 from bench_service.settings import Settings
+from bench_service.telemetry.audit_retention import AuditRetention
 from bench_service.telemetry.code_version import code_version
 from bench_service.telemetry.tracing import traces_to
 
@@ -156,6 +158,10 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         processes,
         *whole,
     )
+    if settings.audit_days is not None:
+        retention = AuditRetention(stores.audit, timedelta(days=settings.audit_days))
+        retention.begin()
+        closing.callback(retention.end)
     service.access.book.begin()
     closing.callback(service.access.book.end)
     closing.callback(service.stop)
@@ -252,6 +258,7 @@ def create_app(
     transfer.install(app)
     app.add_middleware(bodies.Bounded)
     errors.install(app)
+    endings.install(app)
     app.add_middleware(identify.Identified, rules=identify.Identification(rules, service.access.book, proxies))
     app.add_middleware(door.Doorkeeper, door=rules)
     metrics.install(app, service)

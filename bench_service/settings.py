@@ -91,6 +91,8 @@ class Settings(BaseModel):
     """True where `bench serve` drives its bench; false: an API alone, for benches that workers drive."""
     retry_scale: float = Field(1.0, gt=0, le=1)
     """Factor on the pauses before a retry after a fault of the bench (10 s, 30 s, 60 s, …)."""
+    audit_days: float | None = Field(None, ge=1)
+    """Retention of the audit trail [d]: older entries are removed, and leave a checkpoint; None: all are kept."""
     log: Literal["text", "json"] = "text"
     """Format of the log's lines."""
     log_level: Literal["debug", "info", "warning", "error"] | None = None

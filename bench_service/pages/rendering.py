@@ -1,7 +1,7 @@
 """Rendering shared by all pages: templates, the filters in them, and the service behind the request."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from fastapi import Request
 from fastapi.templating import Jinja2Templates
@@ -24,7 +24,6 @@ def number(value: Any) -> str:
 
 templates.env.filters["number"] = number
 templates.env.filters["asset"] = asset
-templates.env.globals["who"] = lambda request: who(request)
 
 
 def who(request: Request) -> dict[str, Any]:
@@ -41,3 +40,6 @@ def who(request: Request) -> dict[str, Any]:
 def service_of(request: Request) -> BenchService:
     """Return the service that the application serves."""
     return request.app.state.service
+
+
+cast(dict[str, Any], templates.env.globals)["who"] = who

@@ -19,8 +19,8 @@ RIGHTS: dict[str, Right] = {
     "log_out": Right.SEE,
     # previews change nothing
     "preview": Right.SEE,
-    "preview_campaign": Right.SEE,
     "preview_batch": Right.SEE,
+    "preview_campaign": Right.SEE,
     "stop": Right.STOP,
     "submit": Right.OPERATE,
     "change_job": Right.OPERATE,

@@ -23,8 +23,8 @@ from bench_service.api.http.dependencies import (
     ClientName,
     IdempotencyKey,
     Limit,
-    ProvenName,
     RequestedBy,
+    Sender,
     Service,
 )
 from bench_service.api.http.errors import problems
@@ -84,7 +84,7 @@ async def stop(
     bench_id: str,
     service: Service,
     client: ClientName,
-    proven: ProvenName,
+    sender: Sender,
     body: StopRequest | None = None,
     key: IdempotencyKey = None,
 ) -> Stopping:
@@ -96,7 +96,7 @@ async def stop(
     Idempotency-Key it is the same stop, as long as this process lives.
     """
     asked = body or StopRequest.model_validate({})
-    done = await stop_in_own_thread(service.stops, bench_id, asked.reason, proven or asked.by or client, key)
+    done = await stop_in_own_thread(service.stops, bench_id, asked.reason, sender.name(asked.by) or client, key)
     return Stopping(
         bench=bench_id, stop=done.stop.id, job=done.job, safety=SafetyView.of(done.safety), books=done.books or None
     )
@@ -112,7 +112,7 @@ def list_stops(bench_id: str, service: Service, after: After = None, limit: Limi
 
 @router.post("/{bench_id}/stops/{stop_id}/release", responses=problems(404, 409, 413, 507), dependencies=[TeamOfBench])
 def release_stop(
-    bench_id: str, stop_id: str, service: Service, body: ReleaseRequest, proven: ProvenName, requested_by: RequestedBy
+    bench_id: str, stop_id: str, service: Service, body: ReleaseRequest, sender: Sender, requested_by: RequestedBy
 ) -> Releasing:
     """Release one stop, the client's own or another's, once the bench is known to be safe.
 
@@ -120,7 +120,7 @@ def release_stop(
     `X-Requested-By`. The jobs in the bench's queue go on once
     no stop stands.
     """
-    by = proven or body.by or requested_by
+    by = sender.name(body.by) or requested_by
     if by is None:
         text = f"the person who releases a stop names himself, here or in {REQUESTED_BY}"
         raise RequestValidationError([{"type": "missing", "loc": ("body", "by"), "msg": text, "input": None}])
