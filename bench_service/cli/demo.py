@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.text import Text
 
-from bench_service.cli.client import RESULT, call
-from bench_service.cli.tables import check_table, coefficient_table
-from bench_service.cli.watching import JOB, exit_code, watch
+from bench_service.cli.asking.client import RESULT, call
+from bench_service.cli.asking.watching import JOB, exit_code, watch
+from bench_service.cli.printing.tables import check_table, coefficient_table
 
 if TYPE_CHECKING:
     import httpx

@@ -1,6 +1,7 @@
 """Construction of the stores: one database, all stores. Must not know their callers."""
 
 from bench_service.campaigns.stores import Stores
+from bench_service.persistence.access.access_store import SqlAccessStore
 from bench_service.persistence.bench.live_store import SqlLiveStore
 from bench_service.persistence.bench.prompt_store import SqlPromptStore
 from bench_service.persistence.bench.registry_store import SqlBenchRegistry
@@ -48,5 +49,6 @@ def stores_of(database: Database) -> Stores:
         prompts=SqlPromptStore(database),
         audit=SqlAuditTrail(database),
         tallies=SqlTallyStore(database),
+        access=SqlAccessStore(database),
         keys=SqlKeyStore(database),
     )
