@@ -41,7 +41,7 @@ bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 	@kept=0; for part in $(BENCHMARKS); do $(BIN)/python -m $$part || kept=1; done; exit $$kept
 
 lock: $(VENV)/.ready  ## compile requirements.lock anew
-	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev pyproject.toml -o requirements.lock
+	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev --extra formats pyproject.toml -o requirements.lock
 
 clean:  ## remove the environment and the demo's data
 	rm -rf $(VENV) .bench

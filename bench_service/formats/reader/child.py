@@ -84,6 +84,7 @@ def _found(imported: ImportedRecording) -> dict[str, Any]:
         "count": imported.count,
         "dtype": np.dtype(imported.dtype).name,
         "source": imported.source,
+        "simulated": imported.description.simulated,
     }
 
 

@@ -138,6 +138,8 @@ class FileReader:
                 raise NoReader(f"a frame of kind {kind!r} came first")
             found = json.loads(payload)
             dtype = np.int32 if found["dtype"] == "int32" else np.float64
+            if found["simulated"]:  # the file itself may say so
+                description = description.model_copy(update={"simulated": True})
             yield _Reading(description, found["rate_hz"], found["count"], dtype, found["source"], line)
 
     def _connected(self) -> socket.socket:
