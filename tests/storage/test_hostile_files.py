@@ -1,5 +1,6 @@
 """Any file becomes a recording or a refusal of bounded length."""
 
+import gzip
 import io
 from typing import Any
 

@@ -37,7 +37,7 @@ _PROCESSED = (
     (re.compile(r"(?:^|[^a-z])(?:mag|magn|magnetometer|gravity|quat|euler|orientation|covariance|cov|bias|std)"), ""),
 )
 _TIME = re.compile(
-    r"^(?:#?\s*)(?:time|timestamp|t|stamp|sec|seconds|tow|gps_?time|time_?s|elapsed|uptime)(?:[^a-z]|$)|sampletimefine|seconds_elapsed|timestartup|time_?gps|_time$|timestamp"
+    r"^(?:#?\s*)(?:time|timestamp|t|stamp|sec|seconds|tow|gps_?time|time_?s|elapsed|uptime)(?:[^a-z]|$)|sample_?time_?fine|seconds_elapsed|timestartup|time_?gps|_time$|timestamp"
 )
 _TIME_UNITS = (
     (re.compile(r"(?:\bns\b|nano|_ns$|\[ns\])"), "ns"),
