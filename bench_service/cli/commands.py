@@ -6,15 +6,14 @@ Tables and progress bars are imported by the commands that show them: a server t
 import json
 import logging
 import sys
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from bench_service.cli import bench_commands, campaign_commands
+from bench_service.cli import bench_commands, campaign_commands, import_command
 from bench_service.cli.client import RESULT, call, check, connect, segment
-from bench_service.cli.files import check_folder, text_of, whole_file
+from bench_service.cli.files import check_folder, whole_file
 from bench_service.cli.options import AsJson, Server, announce, console, errors, parameter, wide
 from bench_service.cli.refusal import Refused
 from bench_service.model.errors import ServiceError
@@ -151,22 +150,7 @@ def run(
     return exit_code(job["verdict"])
 
 
-@app.command("import")
-def import_(
-    context: typer.Context,
-    files: Annotated[list[Path], typer.Argument(exists=True, dir_okay=False)],
-    description: Annotated[Path, typer.Option(exists=True, dir_okay=False, help="JSON file that says what is in them")],
-    server: Server = None,
-) -> None:
-    """Import a recorded file, or several that are columns of one recording."""
-    data = {"description": text_of(description)}
-    with connect(context.obj, server, drive=False) as client, ExitStack() as closing:
-        opened = [(path.name, closing.enter_context(path.open("rb"))) for path in files]
-        parts = [("files", (name, file, "application/octet-stream")) for name, file in opened]
-        recording = call(client, "POST", "/api/v1/recordings", ("id", "warnings"), files=parts, data=data)
-    console.print_json(json.dumps(recording))
-    for warning in recording["warnings"]:
-        errors.print(f"warning: {warning}", soft_wrap=True)
+app.command("import")(import_command.import_)
 
 
 @app.command()

@@ -51,3 +51,8 @@ def announce(text: str) -> None:
 def wide() -> Console:
     """A console for tables: wide enough for their columns where the terminal is narrow, or none."""
     return Console(width=max(console.width, 140), markup=False, emoji=False)
+
+
+def wide_errors() -> Console:
+    """A console on standard error for tables, as wide as they need."""
+    return Console(stderr=True, width=max(errors.width, 160), markup=False, emoji=False)

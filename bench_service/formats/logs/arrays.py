@@ -52,6 +52,4 @@ def _column(name: str, array: NamedArray, guess: Hint) -> LogColumn:
         return LogColumn(name)
     said = unit_of(array.unit, guess.quantity) if array.unit else None
     source = f"the array's own unit, {array.unit}" if said else "the name of the array"
-    if guess.doubt:
-        source += f"; {guess.doubt}"
-    return LogColumn(name, guess.quantity, said or guess.unit, channel=guess.channel, source=source)
+    return LogColumn(name, guess.quantity, said or guess.unit, channel=guess.channel, source=source, doubt=guess.doubt)

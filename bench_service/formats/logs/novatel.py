@@ -80,10 +80,12 @@ class NovAtel:
         rows = {key: Rows(key, name) for key in set(IDS.values())}
         counts = dict.fromkeys(rows, 0)
         kinds: dict[str, set[int]] = {key: set() for key in rows}
-        configured, errors, encrypted = set[int](), 0, 0
+        configured, summed, errors, encrypted = set[int](), set[int](), 0, 0
         for found in frames(stream, _Logs(), counted):
             for key, data in _by_kind(found, rows):
                 counts[key] += len(data)
+                if key == "CORRIMUS":
+                    summed |= set(np.unique(data["count"]).tolist())
                 if "type" in (data.dtype.names or ()):
                     kinds[key] |= set(np.unique(data["type"]).tolist())
                     errors += int(np.count_nonzero(data["info"] & 1))
@@ -93,6 +95,10 @@ class NovAtel:
         self.warnings += counted.warnings("logs")
         if errors:
             self.warnings.append(f"{errors} raw logs report an error of the inertial unit (bit 0 of its information)")
+        if len(summed) > 1:
+            self.warnings.append(
+                f"the records of CORRIMUS sum over {min(summed)} to {max(summed)} samples: rows are not of one length"
+            )
         for key, count in counts.items():
             if count:
                 known = kinds[key] or configured

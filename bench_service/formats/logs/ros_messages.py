@@ -207,7 +207,12 @@ class Topic:
             guess = hint(name)
             if guess.quantity is not None and "covariance" not in name:
                 found[name] = LogColumn(
-                    name, guess.quantity, guess.unit, channel=guess.channel, source="the name of the field"
+                    name,
+                    guess.quantity,
+                    guess.unit,
+                    channel=guess.channel,
+                    source="the name of the field",
+                    doubt=guess.doubt,
                 )
         return found
 

@@ -36,6 +36,8 @@ class LogColumn:
     """Proposed name of the channel, gyro_x for example; empty: the column is not proposed."""
     source: str = ""
     """Origin of quantity, unit and scale, in words."""
+    doubt: str = ""
+    """A sentence where the column may be something else, as its name tells."""
 
 
 @dataclass(frozen=True)

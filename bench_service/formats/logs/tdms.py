@@ -134,7 +134,7 @@ def _column(name: str, channel: Any) -> LogColumn:
         return LogColumn(name)
     unit = unit_of(said, guess.quantity) if said else None
     source = f"unit_string of the channel, {quoted(said)}" if unit else "the name of the channel"
-    return LogColumn(name, guess.quantity, unit or guess.unit, channel=guess.channel, source=source)
+    return LogColumn(name, guess.quantity, unit or guess.unit, channel=guess.channel, source=source, doubt=guess.doubt)
 
 
 def _words(error: Exception) -> str:

@@ -215,7 +215,14 @@ def _text_table(member: str, found: TextLook) -> LogTable:
         if guess.quantity is None and name.lower() in ("x", "y", "z"):
             guess = hint(f"{where}_{name}")
         columns.append(
-            LogColumn(name, guess.quantity, guess.unit, channel=guess.channel, source="the names of file and column")
+            LogColumn(
+                name,
+                guess.quantity,
+                guess.unit,
+                channel=guess.channel,
+                source="the names of file and column",
+                doubt=guess.doubt,
+            )
         )
         if is_time(name):
             unit = time_unit(name) or ("ns" if name == "time" and "seconds_elapsed" in names else None)

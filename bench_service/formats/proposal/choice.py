@@ -42,7 +42,7 @@ def chosen_columns(table: LogTable) -> tuple[list[LogColumn], list[str]]:
 
 def _is_better(new: LogColumn, known: LogColumn) -> bool:
     """Return whether a column is closer to the sensor: one without a doubt before one with."""
-    return ";" in known.source and ";" not in new.source
+    return bool(known.doubt) and not new.doubt
 
 
 def _require_one_quantity(first: dict[str, LogColumn], kind: Sequence[str]) -> None:

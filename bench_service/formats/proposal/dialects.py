@@ -52,13 +52,7 @@ def guessed(name: str, file: str = "") -> LogColumn:
     if guess.quantity is None and name.lower() in ("x", "y", "z") and file:
         guess = hint(f"{file}_{name}")
     source = "the names of file and column" if file else "the name of the column"
-    return LogColumn(
-        name,
-        guess.quantity,
-        guess.unit,
-        channel=guess.channel,
-        source=f"{source}; {guess.doubt}" if guess.doubt else source,
-    )
+    return LogColumn(name, guess.quantity, guess.unit, channel=guess.channel, source=source, doubt=guess.doubt)
 
 
 def in_dialect(found: TextLook, name: str, fields: dict[str, Any]) -> Table:

@@ -94,7 +94,7 @@ def _proposed(
     columns, more, said = with_units(columns, values, rate_hz)
     if missing := missing_axes(columns):
         suspicious.append(f"no column is recognised for {', '.join(missing)}")
-    unknown += [*more, *asks, *(_doubt(c) for c in columns if ";" in c.source and "guessed" not in c.source)]
+    unknown += [*more, *asks, *(f"{c.channel} is column {c.name!r}: {c.doubt}" for c in columns if c.doubt)]
     suspicious += suspicions(columns, values, rate_hz)
     suspicious += [
         f"{c.column!r}: {words}" for c in clocks for words in (c.warnings if c.problem is None else [c.problem])
@@ -115,10 +115,6 @@ def _proposed(
         clocks,
         (unknown, suspicious, [*notes, *said, *table.notes]),
     )
-
-
-def _doubt(column: LogColumn) -> str:
-    return f"{column.channel} is column {column.name!r}: {column.source.partition('; ')[2]}"
 
 
 def _clocks(

@@ -46,10 +46,10 @@ def with_units(
         words = f"the unit of the {kind} ({', '.join(named)}) is not said; taken as {unit} ({why})"
         (notes if sure else asks).append(words)
         for i in places:
-            found[i] = replace(found[i], unit=unit, source=f"{found[i].source}; unit guessed")
+            found[i] = replace(found[i], unit=unit, source=f"{found[i].source}, the unit a guess")
     for i, column in enumerate(found):
         if column.unit is None and column.quantity is Quantity.TEMPERATURE:
-            found[i] = replace(column, unit="degC", source=f"{column.source}; unit guessed")
+            found[i] = replace(column, unit="degC", source=f"{column.source}, the unit a guess")
             asks.append(f"the unit of {column.name} is not said; taken as degC")
     return found, asks, notes
 
