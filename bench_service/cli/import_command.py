@@ -26,14 +26,10 @@ def import_(
     description: Annotated[
         Path | None, typer.Option(exists=True, dir_okay=False, help="JSON file that says what is in them")
     ] = None,
-    describe: Annotated[
-        bool, typer.Option("--describe", help="Print the description that would be used, no more")
-    ] = False,
+    describe: Annotated[bool, typer.Option("--describe", help="Print the description that would be used")] = False,
     unit: Annotated[str | None, typer.Option(help="Serial of the unit, for a proposed description")] = None,
     form: Annotated[str | None, typer.Option("--format", help="Format of the file, where it is not recognised")] = None,
-    table: Annotated[
-        str | None, typer.Option(help="Topic, message type or file of an archive, where there are several")
-    ] = None,
+    table: Annotated[str | None, typer.Option(help="Topic, message type, archive's file")] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Take a proposed description in which nothing is unknown")] = False,
     server: Server = None,
 ) -> None:

@@ -55,7 +55,8 @@ class Tdms:
                 same = {n: c for n, c in channels.items() if len(c) == length}
                 found.append(self._table(group if len(lengths) == 1 else f"{group}, {length} rows", same, length))
         if not found:
-            raise UnreadableFile(self._name, "holds no channel with more than one value")
+            cut = ": the file is cut off" if self.warnings else ""
+            raise UnreadableFile(self._name, f"holds no channel with more than one value{cut}")
         return found
 
     def _table(self, title: str, channels: dict[str, Any], rows: int) -> LogTable:

@@ -10,8 +10,12 @@ MOST_CHANNELS = 16
 
 
 def chosen_table(tables: Sequence[LogTable]) -> LogTable:
-    """Choose the table with the most axes; of equal ones that with a clock, then the longest."""
-    return max(tables, key=lambda t: (_axes(t), bool(t.clocks), t.rows or 0))
+    """Choose the table with the most axes; of equal ones that with a clock, then increments, then the longest."""
+    return max(tables, key=lambda t: (_axes(t), bool(t.clocks), _has_increments(t), t.rows or 0))
+
+
+def _has_increments(table: LogTable) -> bool:
+    return any(c.quantity in (Quantity.ANGLE_INCREMENT, Quantity.VELOCITY_INCREMENT) for c in table.columns)
 
 
 def _axes(table: LogTable) -> int:
@@ -64,11 +68,3 @@ def missing_axes(columns: Sequence[LogColumn]) -> list[str]:
         if part and len(part) < len(kind):
             found += [name for name in kind if name not in part]
     return found
-
-
-INERTIAL = (
-    Quantity.ANGULAR_RATE,
-    Quantity.ANGLE_INCREMENT,
-    Quantity.SPECIFIC_FORCE,
-    Quantity.VELOCITY_INCREMENT,
-)

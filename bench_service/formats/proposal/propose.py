@@ -33,7 +33,7 @@ def propose(file: ImportFile, unit: str | None, form: str | None, table: str | N
     log = found.opened(file.stream, file.name)
     tables = log.tables()
     if not tables:
-        raise UnreadableFile(file.name, "holds no table of samples")
+        raise UnreadableFile(file.name, "; ".join(["holds no table of samples", *log.warnings]))
     chosen = chosen_table(tables) if table is None else find_table(log, file.name, table, [])
     looked = Table(found.NAME, found.TITLE, chosen, {"table": chosen.name} if len(tables) > 1 else {})
     proposal = _proposed([Opened(file, log)], looked, tables, unit, form)
