@@ -1,4 +1,4 @@
-"""Byte streams of devices with the known motion: frames packed by the published layouts, or by the makers' libraries."""
+"""Byte streams of devices with the known motion: frames packed by the published layouts."""
 
 import struct
 from collections.abc import Callable

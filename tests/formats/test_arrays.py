@@ -64,7 +64,7 @@ def test_mutated_mat_files_are_refused_with_the_place() -> None:
         proposed(data[:128] + b"\x63" + data[129:])
     broken = bytearray(data)
     broken[300:340] = bytes(40)
-    with pytest.raises(UnreadableFile, match="is damaged|cannot be unpacked"):
+    with pytest.raises(UnreadableFile, match=r"is damaged|cannot be unpacked"):
         proposed(bytes(broken))
 
 

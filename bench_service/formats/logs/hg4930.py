@@ -101,7 +101,7 @@ class Hg4930:
                 2.0**-27 * FOOT,
                 _SOURCE,
             )
-            found.append(LogTable("inertial", columns, (), 100.0, self._counts[2], (note,)))
+            found.append(LogTable("inertial", columns, (), 100.0, self._counts[2], (note,), rank=1))
         columns = triad(
             [f"rate_{a}" for a in "xyz"], "gyro", Quantity.ANGULAR_RATE, "rad/s", 600.0 * 2.0**-20, _SOURCE
         ) + triad(

@@ -67,6 +67,9 @@ class LogTable:
     asks: tuple[str, ...] = ()
     """Sentences on what the file cannot say and a person has to decide; the proposal has a guess there."""
 
+    rank: int = 0
+    """Preference among tables of equal axes: the measurement itself above what is derived from it."""
+
     def column(self, name: str) -> LogColumn | None:
         """Return the column of a name; None: there is none."""
         return next((c for c in self.columns if c.name == name), None)

@@ -3,19 +3,15 @@
 from collections.abc import Sequence
 
 from bench_service.formats.logs.table import LogColumn, LogTable
-from procedures.core.recording import ACCELEROMETER, GYRO, Quantity
+from procedures.core.recording import ACCELEROMETER, GYRO
 
 ORDER = (*GYRO, *ACCELEROMETER)
 MOST_CHANNELS = 16
 
 
 def chosen_table(tables: Sequence[LogTable]) -> LogTable:
-    """Choose the table with the most axes; of equal ones that with a clock, then increments, then the longest."""
-    return max(tables, key=lambda t: (_axes(t), bool(t.clocks), _has_increments(t), t.rows or 0))
-
-
-def _has_increments(table: LogTable) -> bool:
-    return any(c.quantity in (Quantity.ANGLE_INCREMENT, Quantity.VELOCITY_INCREMENT) for c in table.columns)
+    """Choose the table with the most axes; of equal ones that with a clock, of higher rank, the longest."""
+    return max(tables, key=lambda t: (_axes(t), bool(t.clocks), t.rank, t.rows or 0))
 
 
 def _axes(table: LogTable) -> int:
