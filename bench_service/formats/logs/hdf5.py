@@ -1,5 +1,6 @@
 """Reader of HDF5 files, MATLAB 7.3 among them, by h5py: datasets of one length as one table, in blocks of rows."""
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, BinaryIO
@@ -66,7 +67,7 @@ class Hdf5:
         h5py = needed("h5py", name)
         stream.seek(0)
         try:
-            self._file = h5py.File(stream, "r", rdcc_nbytes=2 * MEGABYTE)
+            self._file = h5py.File(_by_descriptor(stream) or stream, "r", rdcc_nbytes=2 * MEGABYTE)
             self._collect(h5py)
         except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
             raise UnreadableFile(name, f"cannot be read as HDF5: {_words(error)}") from error
@@ -153,6 +154,15 @@ class Hdf5:
             return np.ascontiguousarray(data[place.field])
         column = data if data.ndim == 1 else data[:, index]
         return np.ascontiguousarray(column).astype(column.dtype.newbyteorder("="), copy=False)
+
+
+def _by_descriptor(stream: BinaryIO) -> str | None:
+    """Return a path to the open file of a stream, which HDF5 reads faster than through Python; None: it has none."""
+    try:
+        path = f"/proc/self/fd/{stream.fileno()}"
+    except (OSError, ValueError, AttributeError):
+        return None
+    return path if os.path.exists(path) else None
 
 
 def _text(value: Any) -> str:

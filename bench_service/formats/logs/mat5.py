@@ -98,7 +98,7 @@ class Mat5:
 
     def _variable(self, kind: int, at: int, length: int) -> None:
         if kind == _COMPRESSED:
-            source: Source = Packed(self._stream, at + 8, length)
+            source: Source = Packed(self._stream, at + 8, length, self._order == ">")
             inner, size = struct.unpack(f"{self._order}II", source.read(0, 8))
             if inner != _MATRIX:
                 return

@@ -4,6 +4,9 @@ import zlib
 from typing import Any, BinaryIO, Protocol
 
 _PIECE = 256 * 1024
+WHOLE_BYTES = 16 * 1024 * 1024
+"""Size of a variable that is unpacked at once."""
+MOST_MARKS = 16
 
 
 class Walk(Protocol):
@@ -57,9 +60,12 @@ class _PlainWalk:
 class Packed:
     """A variable packed by zlib. Reading goes forward; a place that lies behind begins anew."""
 
-    def __init__(self, stream: BinaryIO, begin: int, length: int) -> None:
+    def __init__(self, stream: BinaryIO, begin: int, length: int, big_endian: bool) -> None:
         self._stream, self._begin, self._length = stream, begin, length
         self._reading = _PackedWalk(stream, begin, length)
+        self._whole: bytes | None = None
+        self._marks: list[_PackedWalk] = []
+        self.unpacked_bytes = 8 + int.from_bytes(self._reading.glance(0, 8)[4:], "big" if big_endian else "little")
 
     def read(self, at: int, size: int) -> bytes:
         """Return bytes at a place. Raises `EOFError`, `zlib.error`."""
@@ -70,11 +76,32 @@ class Packed:
         self._reading.skip_to(at)
         return self._reading.take(size)
 
-    def walk(self, at: int) -> "_PackedWalk":
-        """Return a walk from a place on; it starts from where the reading is, if that is before the place."""
-        found = self._reading.twin() if self._reading.at <= at else _PackedWalk(self._stream, self._begin, self._length)
+    def walk(self, at: int) -> Walk:
+        """Return a walk from a place on. Raises `EOFError`, `zlib.error`.
+
+        A variable that is small unpacked is unpacked once; of a larger one each walk goes on from the last mark before
+        its place, so that columns which are asked for in their order are skipped once and read once.
+        """
+        if self.unpacked_bytes <= WHOLE_BYTES:
+            if self._whole is None:
+                self._whole = _PackedWalk(self._stream, self._begin, self._length).take(self.unpacked_bytes)
+            return _WholeWalk(self._whole, at)
+        nearest = max((m for m in self._marks if m.at <= at), key=lambda m: m.at, default=None)
+        found = _PackedWalk(self._stream, self._begin, self._length) if nearest is None else nearest.twin()
         found.skip_to(at)
+        self._marks = [*self._marks[-MOST_MARKS:], found.twin()]
         return found
+
+
+class _WholeWalk:
+    def __init__(self, data: bytes, at: int) -> None:
+        self._data, self._at = data, at
+
+    def take(self, size: int) -> bytes:
+        if self._at + size > len(self._data):
+            raise EOFError("it ends too early")
+        self._at += size
+        return self._data[self._at - size : self._at]
 
 
 class _PackedWalk:

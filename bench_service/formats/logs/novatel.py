@@ -45,15 +45,16 @@ class _Logs:
     def is_whole(self, frame: bytes) -> bool:
         """Return whether the CRC is right: reflected CRC-32, start 0, nothing at the end."""
         if frame[0] == 0xAA:
-            return _crc(frame[:-4]) == int.from_bytes(frame[-4:], "little")
+            return crc(frame[:-4]) == int.from_bytes(frame[-4:], "little")
         body, star, tail = frame[1:].rstrip(b"\r\n").rpartition(b"*")
         try:
-            return bool(star) and len(tail) == 8 and _crc(body) == int(tail, 16)
+            return bool(star) and len(tail) == 8 and crc(body) == int(tail, 16)
         except ValueError:
             return False
 
 
-def _crc(data: bytes) -> int:
+def crc(data: bytes) -> int:
+    """NovAtel's CRC-32: reflected, start 0, nothing at the end."""
     return crc32(data, 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
