@@ -2,11 +2,11 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := calibration allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
+VALIDATIONS := calibration multi_position allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners formats)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test bench chaos format check validate lock clean
+.PHONY: help run test bench chaos format check validate rights lock clean
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -39,6 +39,9 @@ validate: $(VENV)/.ready  ## Monte Carlo against theory over 1000 simulated unit
 
 bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 	@kept=0; for part in $(BENCHMARKS); do $(BIN)/python -m $$part || kept=1; done; exit $$kept
+
+rights: $(VENV)/.ready  ## write docs/rights.md anew, from the routes and their rights
+	@$(BIN)/python -m tests.kit.rights_page
 
 lock: $(VENV)/.ready  ## compile requirements.lock anew
 	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev --extra formats pyproject.toml -o requirements.lock

@@ -6,9 +6,12 @@ from math import isfinite
 from typing import Annotated, Any
 
 import typer
+from pydantic import ValidationError
 from rich.console import Console
 
 from bench_service.cli.refusal import Refused
+from bench_service.settings import Settings
+from bench_service.wall_clock import new_id
 
 console = Console(markup=False, emoji=False)
 errors = Console(stderr=True, markup=False, emoji=False)
@@ -16,6 +19,12 @@ errors = Console(stderr=True, markup=False, emoji=False)
 
 Server = Annotated[str | None, typer.Option(help="Address of a service; without it, work in this process")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables")]
+Limit = Annotated[int, typer.Option(min=1, help="How many")]
+By = Annotated[str | None, typer.Option(help="Your name, for the job and the audit trail")]
+Set = Annotated[list[str], typer.Option("--set", help="A parameter, name=JSON value; may be repeated")]
+Label = Annotated[list[str], typer.Option(help="name=text; may be repeated")]
+Key = Annotated[str | None, typer.Option(help="Idempotency key: repeated with it, the same job is waited for")]
+NO_ITEMS: list[str] = []
 
 
 def parameter(text: str) -> tuple[str, Any]:
@@ -56,3 +65,42 @@ def wide() -> Console:
 def wide_errors() -> Console:
     """A console on standard error for tables, as wide as they need."""
     return Console(stderr=True, width=max(errors.width, 160), markup=False, emoji=False)
+
+
+def labels(texts: list[str]) -> dict[str, str]:
+    """Convert ``name=text`` texts to labels. Raises `Refused`."""
+    pairs = [text.partition("=") for text in texts]
+    for name, equals, value in pairs:
+        if not (name and equals and value):
+            raise Refused(f"--label {name}{equals}{value}: expected name=text")
+    return {name: value for name, _, value in pairs}
+
+
+def key_or_new(key: str | None) -> str:
+    """Return the key of a create, a new one where none is given: so that there is a way back. Raises `Refused`."""
+    if key is None:
+        return new_id()
+    if not (key.isascii() and key.isprintable() and key):
+        raise Refused(f"--key {key!r}: letters, digits and signs of ASCII are needed")
+    return key
+
+
+def named(by: str | None) -> dict[str, str]:
+    """Build the header by which a person is known to the service. Raises `Refused`."""
+    if by is None:
+        return {}
+    if not (by.isprintable() and by.strip()):
+        raise Refused(f"--by {by!r}: a name in one line is needed")
+    try:
+        by.encode("latin-1")
+    except UnicodeEncodeError as error:
+        raise Refused(f"--by {by!r}: a header holds Latin letters only") from error
+    return {"X-Requested-By": by}
+
+
+def of_bench(settings: Settings, bench: str | None) -> Settings:
+    """Return the settings of another bench. Raises `Refused` for a name that no bench can have."""
+    try:
+        return Settings.model_validate({**settings.model_dump(), "bench_id": bench or settings.bench_id})
+    except ValidationError as error:
+        raise Refused(f"--bench {bench}: {error.errors()[0]['msg']}") from error
