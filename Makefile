@@ -3,7 +3,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
 VALIDATIONS := calibration multi_position allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit access
-BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners)
+BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners formats)
 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
 
@@ -46,8 +46,8 @@ bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 	@kept=0; for part in $(BENCHMARKS); do $(BIN)/python -m $$part || kept=1; done; exit $$kept
 
 lock: $(VENV)/.ready  ## compile requirements.lock anew, with its part for run time and the tools of the audit
-	@$(COMPILE) --extra dev pyproject.toml -o requirements.lock
-	@$(COMPILE) -c requirements.lock pyproject.toml -o .ci/runtime.lock
+	@$(COMPILE) --extra dev --extra formats pyproject.toml -o requirements.lock
+	@$(COMPILE) --extra formats -c requirements.lock pyproject.toml -o .ci/runtime.lock
 	@$(COMPILE) .ci/audit.in -o .ci/audit.lock
 
 .venv-audit/.ready: .ci/audit.lock $(VENV)/.ready
