@@ -103,6 +103,8 @@ class Settings(BaseModel):
     """True where every request is a line of the log."""
     traces_url: str | None = Field(None, pattern=r"^https?://\S+$")
     """Address for traces (OTLP over HTTP, protobuf); None: none, unless OTEL_EXPORTER_OTLP_ENDPOINT gives one."""
+    notify: Path | None = None
+    """TOML file of mail servers and webhooks that get messages (`docs/who-is-told.md`); None: nobody is told."""
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported [MB]."""
 

@@ -13,7 +13,15 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from bench_service.api.access.identify import found_of
 from bench_service.api.http.bodies import is_json
-from bench_service.api.http.dependencies import NO_CONTROL_CHARACTERS, REQUESTED_BY, WHO_LENGTH, After, Limit, Service
+from bench_service.api.http.dependencies import (
+    NO_CONTROL_CHARACTERS,
+    REQUESTED_BY,
+    WHO_LENGTH,
+    After,
+    Limit,
+    Service,
+    as_utf8,
+)
 from bench_service.api.http.errors import FieldError, problems, respond
 from bench_service.background import in_background
 from bench_service.formats.plain_json import faults, mended, shown
@@ -86,7 +94,7 @@ class Audited:
             await self._app(scope, receive, send)
             return
         request = Request(scope)
-        who = request.headers.get(REQUESTED_BY)
+        who = as_utf8(request.headers.get(REQUESTED_BY))
         if who is not None and not (0 < len(who) <= WHO_LENGTH and NO_CONTROL_CHARACTERS.match(who)):
             field = FieldError(field=REQUESTED_BY, message=f"1 … {WHO_LENGTH} characters, no control characters")
             await respond(request, 422, f"{field.field}: {field.message}", "Invalid", [field])(scope, receive, send)

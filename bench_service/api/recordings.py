@@ -19,6 +19,7 @@ from bench_service.evidence.recordings import require_undamaged
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.export import ExportFormat, Extract, export, export_bytes, extract
 from bench_service.formats.import_file import ImportFile
+from bench_service.formats.overview import overview
 from bench_service.formats.plain_json import shown
 from bench_service.formats.proposal.model import Proposal
 from bench_service.mapping import copied
@@ -146,6 +147,51 @@ def _exported(service: BenchService, part: Extract, form: ExportFormat) -> Admit
         media_type=form.media_type,
         headers={"Content-Disposition": f'attachment; filename="{file_name}"'},
     )
+
+
+class OverviewChannel(BaseModel):
+    """One channel of an overview, one number for each bin."""
+
+    name: str
+    unit: str
+    minimum: list[float]
+    mean: list[float]
+    maximum: list[float]
+
+
+class OverviewView(BaseModel):
+    """A stretch of a recording as a plot needs it: values in nominal rate units, in bins of equal length."""
+
+    edges_s: list[float] = Field(description="Edges of the bins since the first sample, one more than there are bins")
+    channels: list[OverviewChannel]
+
+
+@router.get("/{recording_id}/overview", responses=problems(404))
+def read_overview(
+    recording_id: str,
+    service: Service,
+    channels: Annotated[str | None, Query(max_length=4000, description="Names, separated by commas")] = None,
+    start_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="From the first sample")] = None,
+    stop_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="Not included")] = None,
+    bins: Annotated[int, Query(ge=1, le=5000)] = 800,
+) -> OverviewView:
+    """Read least, mean and greatest values of a stretch in bins: what a plot needs, however long the recording."""
+    recordings = service.stores.recordings
+    stored = recordings.get(recording_id)
+    part = extract(stored.info, stored.dtype, None if channels is None else channels.split(","), start_s, stop_s)
+    blocks = recordings.read(recording_id, [c.name for c in part.info.channels], part.start, part.stop)
+    made = overview(part, blocks, bins)
+    shown = [
+        OverviewChannel(
+            name=channel.name,
+            unit=channel.rate_unit,
+            minimum=made.minimum[:, k].tolist(),
+            mean=made.mean[:, k].tolist(),
+            maximum=made.maximum[:, k].tolist(),
+        )
+        for k, channel in enumerate(part.info.channels)
+    ]
+    return OverviewView(edges_s=made.edges.tolist(), channels=shown)
 
 
 @router.post(

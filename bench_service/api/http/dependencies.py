@@ -4,6 +4,7 @@ import re
 from typing import Annotated
 
 from fastapi import Depends, Header, Query, Request
+from pydantic import AfterValidator, Field
 
 from bench_service.access.identity import Identity, Proof
 from bench_service.access.roles import Role
@@ -37,8 +38,28 @@ NOBODY = Identity("", Role.VIEWER, Proof.NONE, proven=False)
 """Somebody on this host who has not logged in, and may only stop a bench."""
 REQUESTED_BY = "X-Requested-By"
 WHO_LENGTH = 200
+By = Annotated[
+    str,
+    Field(
+        min_length=1,
+        max_length=WHO_LENGTH,
+        pattern=NO_CONTROL_CHARACTERS.pattern,
+        description=f"Who does it; without it, `{REQUESTED_BY}` counts",
+    ),
+]
+
+
+def as_utf8(text: str | None) -> str | None:
+    """Read a header as the UTF-8 that browsers send; one that is none stays as it came (ISO 8859-1)."""
+    try:
+        return None if text is None else text.encode("latin-1").decode("utf-8")
+    except (UnicodeEncodeError, UnicodeDecodeError):
+        return text
+
+
 _Claimed = Annotated[
     str | None,
+    AfterValidator(as_utf8),
     Header(
         alias=REQUESTED_BY,
         min_length=1,
