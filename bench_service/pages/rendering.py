@@ -134,7 +134,7 @@ templates.env.add_extension("jinja2.ext.i18n")
 templates.env.install_gettext_callables(  # pyright: ignore[reportAttributeAccessIssue]
     translated, translated_number, newstyle=True
 )
-templates.env.globals["who"] = who
+cast(dict[str, Any], templates.env.globals)["who"] = who
 templates.env.filters |= {
     "number": number,
     "asset": asset,

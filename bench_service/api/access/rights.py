@@ -22,8 +22,8 @@ RIGHTS: dict[str, Right] = {
     "log_out": Right.SEE,
     # previews change nothing
     "preview": Right.SEE,
-    "preview_campaign": Right.SEE,
     "preview_batch": Right.SEE,
+    "preview_campaign": Right.SEE,
     "stop": Right.STOP,
     "stop_by_form": Right.STOP,
     "submit": Right.OPERATE,
@@ -41,6 +41,7 @@ RIGHTS: dict[str, Right] = {
     "analyse_again": Right.ENGINEER,
     "run_method": Right.ENGINEER,
     "import_recording": Right.ENGINEER,
+    "describe_file": Right.ENGINEER,
     "declare_unit": Right.ENGINEER,
     "choose_correction": Right.ENGINEER,
     "enter_calibration": Right.ENGINEER,
