@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncGenerator, Callable
 from contextlib import ExitStack, asynccontextmanager
+from datetime import timedelta
 from functools import partial
 from importlib.metadata import version
 
@@ -27,7 +28,9 @@ from bench_service.api.access import routes as access
 from bench_service.api.benches import routes as benches
 from bench_service.api.campaigns import routes as campaigns
 from bench_service.api.campaigns import schedules
-from bench_service.api.http import bodies, door, errors, headers, queries, request_id, transfer
+from bench_service.api.feed import news
+from bench_service.api.feed import routes as feed
+from bench_service.api.http import bodies, door, endings, errors, headers, queries, request_id, transfer
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs import routes as jobs
 from bench_service.api.openapi import document
@@ -54,17 +57,30 @@ from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.worker import Worker
-from bench_service.pages import access_pages, campaign_pages, docs, figures, images, static_files
+from bench_service.notifications.opening import open_notifier
+from bench_service.pages import (
+    access_pages,
+    campaign_pages,
+    console_pages,
+    docs,
+    figures,
+    images,
+    languages,
+    static_files,
+    stop_pages,
+)
 from bench_service.pages import routes as pages
 from bench_service.pages.drawing_process import open_drawing
+from bench_service.pages.errors import ErrorPages
 from bench_service.persistence import BenchLease, Database, acquire_lease, engine_database, lease_holder, open_stores
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.database import as_storage_error
 from bench_service.persistence.evidence.analysis_run import open_run
 from bench_service.persistence.upkeep.contents import DatabaseContents
-from bench_service.service import BenchService
+from bench_service.service import LEAST_FREE_BYTES, BenchService
 from bench_service.settings import Settings
+from bench_service.telemetry.audit_retention import AuditRetention
 from bench_service.telemetry.code_version import code_version
 from bench_service.telemetry.tracing import traces_to
 
@@ -90,8 +106,9 @@ ROUTERS = (
     audit_chain,
     health,
     metrics,
+    feed,
 )
-PAGES = (static_files, docs, access_pages, images, pages, campaign_pages)
+PAGES = (static_files, languages, docs, access_pages, images, stop_pages, console_pages, pages, campaign_pages)
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apart: bool = False) -> BenchService:
@@ -135,6 +152,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         guard.begin()
         closing.callback(guard.end)
         closing.callback(files.keep_books(stores).end)
+        if settings.notify is not None:
+            closing.callback(open_notifier(settings, stores, database.free_bytes, LEAST_FREE_BYTES).end)
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
@@ -156,6 +175,10 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         processes,
         *whole,
     )
+    if settings.audit_days is not None:
+        retention = AuditRetention(stores.audit, timedelta(days=settings.audit_days))
+        retention.begin()
+        closing.callback(retention.end)
     service.access.book.begin()
     closing.callback(service.access.book.end)
     closing.callback(service.stop)
@@ -242,6 +265,7 @@ def create_app(
     )
     app.state.service = service
     app.state.hub = EventHub(service.stores.jobs, service.live, event_stream.FRAMES)
+    app.state.news = news.NewsDesk(service)
     app.state.max_import_bytes = max_import_bytes
     app.state.import_threads = CapacityLimiter(IMPORT_THREADS)
     for module in ROUTERS:
@@ -252,10 +276,12 @@ def create_app(
     transfer.install(app)
     app.add_middleware(bodies.Bounded)
     errors.install(app)
+    endings.install(app)
     app.add_middleware(identify.Identified, rules=identify.Identification(rules, service.access.book, proxies))
     app.add_middleware(door.Doorkeeper, door=rules)
     metrics.install(app, service)
     app.add_middleware(audit.Audited, trail=service.stores.audit)
+    app.add_middleware(ErrorPages)
     app.add_middleware(headers.SecurityHeaders)
     app.add_middleware(request_id.RequestId)
     service.traces.instrument(app)

@@ -91,6 +91,8 @@ class Settings(BaseModel):
     """True where `bench serve` drives its bench; false: an API alone, for benches that workers drive."""
     retry_scale: float = Field(1.0, gt=0, le=1)
     """Factor on the pauses before a retry after a fault of the bench (10 s, 30 s, 60 s, …)."""
+    audit_days: float | None = Field(None, ge=1)
+    """Retention of the audit trail [d]: older entries are removed, and leave a checkpoint; None: all are kept."""
     log: Literal["text", "json"] = "text"
     """Format of the log's lines."""
     log_level: Literal["debug", "info", "warning", "error"] | None = None
@@ -101,6 +103,8 @@ class Settings(BaseModel):
     """True where every request is a line of the log."""
     traces_url: str | None = Field(None, pattern=r"^https?://\S+$")
     """Address for traces (OTLP over HTTP, protobuf); None: none, unless OTEL_EXPORTER_OTLP_ENDPOINT gives one."""
+    notify: Path | None = None
+    """TOML file of mail servers and webhooks that get messages (`docs/who-is-told.md`); None: nobody is told."""
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported [MB]."""
 

@@ -17,6 +17,7 @@ from bench_service.cli.groups import (
     campaigns,
     database,
     evidence,
+    importing,
     jobs,
     plans,
     reservations,
@@ -65,7 +66,7 @@ PANELS = {
 for _panel, _commands in PANELS.items():
     for _command in _commands:
         app.command(rich_help_panel=_panel)(_command)
-app.command("import", rich_help_panel="Evidence")(evidence.import_)
+app.command("import", rich_help_panel="Evidence")(importing.import_)
 app.add_typer(job, name="job", rich_help_panel="Jobs")
 app.add_typer(calibrations.calibration, name="calibration", rich_help_panel="Evidence")
 app.add_typer(campaigns.campaigns, name="campaign", rich_help_panel="Jobs")

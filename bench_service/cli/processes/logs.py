@@ -9,11 +9,11 @@ import sys
 from datetime import UTC, datetime
 from logging.handlers import RotatingFileHandler
 
-from bench_service.access.credentials import without_tokens
 from bench_service.model.errors import Misconfigured
 from bench_service.settings import Settings
 from bench_service.telemetry.log_context import AddSubjects
 from bench_service.telemetry.log_restraint import Restraint
+from bench_service.telemetry.redaction import without_tokens
 
 FIELDS = "{asctime} {levelname} {name} {message}"
 OWN_HANDLERS = ("uvicorn", "uvicorn.error", "uvicorn.access", "dbos")
