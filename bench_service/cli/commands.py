@@ -45,7 +45,7 @@ PANELS = {
         units.units,
     ),
     "Reservations": (reservations.reservations, reservations.reserve, reservations.unreserve),
-    "This program": (completion,),
+    "This program": (completion, services.openapi),
 }
 """Commands by the heading under which the help lists them."""
 for _panel, _commands in PANELS.items():

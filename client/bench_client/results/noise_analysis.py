@@ -1,0 +1,25 @@
+"""Result of `noise_analysis`. Written by `generate_results.py`; do not edit."""
+
+from typing import Literal
+
+from bench_client.results.part import Part, ResultHead
+from bench_client.results.shared import ChannelSummary, Check, LaunchNoise, Verdict
+
+
+class NoiseAnalysisDocument(Part):
+    """Noise of the recordings."""
+
+    checks: tuple[Check, ...] = ()
+    verdict: Verdict
+    warnings: tuple[str, ...] = ()
+    launches: tuple[LaunchNoise, ...]
+    channels: tuple[ChannelSummary, ...]
+    averaging_time_s: float | None
+
+
+class NoiseAnalysisResult(ResultHead):
+    """A result: Noise of recordings at rest."""
+
+    kind: Literal["method"]
+    name: Literal["noise_analysis"]
+    document: NoiseAnalysisDocument
