@@ -1,6 +1,5 @@
 """The Python client against a real service: submit to arrays, refusals in words, and a service that is away."""
 
-import socket
 import subprocess
 import sys
 from collections.abc import Callable, Generator
@@ -15,22 +14,9 @@ from bench_client.event_stream import frames
 from bench_client.results.allan_deviation import AllanDeviationResult
 from bench_client.results.calibration_12_orientations import Calibration12OrientationsResult
 from bench_client.results.part import OtherResult
-from bench_service.cli.processes.serving import serving
-from bench_service.settings import Settings
 
 ROOT = Path(__file__).parents[2]
 FAST = {"dwell_s": 5.0, "settle_s": 0.5}
-
-
-@pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Generator[str]:
-    """A service on a loopback port."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-    url = f"sqlite:///{tmp_path_factory.mktemp('served') / 'bench.sqlite'}"
-    with serving(Settings(database_url=url, port=port)):
-        yield f"http://127.0.0.1:{port}"
 
 
 @pytest.fixture(scope="module")
