@@ -6,7 +6,7 @@ VALIDATIONS := calibration allan noise foreign_noise inspection conditioning who
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test bench chaos format check validate lock clean
+.PHONY: help run test bench clients chaos format check validate lock clean
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -39,6 +39,9 @@ validate: $(VENV)/.ready  ## Monte Carlo against theory over 1000 simulated unit
 
 bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 	@kept=0; for part in $(BENCHMARKS); do $(BIN)/python -m $$part || kept=1; done; exit $$kept
+
+clients: $(VENV)/.ready  ## lint the OpenAPI document, generate clients from it, drive a service with the generated one
+	@$(BIN)/python -m tests.clients
 
 lock: $(VENV)/.ready  ## compile requirements.lock anew
 	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev pyproject.toml -o requirements.lock

@@ -37,7 +37,7 @@ class ExportFormat(StrEnum):
             "arrow": "application/vnd.apache.arrow.stream",
             "parquet": "application/vnd.apache.parquet",
             "csv": "text/csv; charset=utf-8",
-            "npy": "application/x-npy",
+            "npy": "application/octet-stream",
         }[self.value]
 
 

@@ -3,6 +3,7 @@
 import json
 import re
 from pathlib import Path
+from textwrap import dedent
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,15 @@ def test_the_python_of_the_readme_runs(address: str, capsys: pytest.CaptureFixtu
     assert found["job"].state == "succeeded"
     assert found["rates"].values.shape == (found["recording"].view.count, len(found["rates"].names))
     assert "100%" in capsys.readouterr().out
+
+
+def test_the_python_of_the_project_s_readme_runs(address: str) -> None:
+    text = (CLIENT.parent / "README.md").read_text()
+    found = re.search(r"((?: {4}.*\n)*? {4}client = Client\(.*\n(?: {4}.*\n)+)", text)
+    assert found is not None
+    lines = run([dedent(found[1])], address, "README.md")
+    assert lines["job"].state == "succeeded"
+    assert len(lines["rates"].values) > 0
 
 
 def test_the_cells_of_the_notebook_run(address: str) -> None:
