@@ -3,7 +3,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
 VALIDATIONS := calibration allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
-BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners)
+BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners previews)
 
 .DEFAULT_GOAL := help
 .PHONY: help run test bench clients chaos format check validate lock clean

@@ -1,7 +1,7 @@
 """Prediction of a calibration: the uncertainty of every coefficient, and the limits that it cannot resolve."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -58,8 +58,7 @@ class TriadPlan:
 
     def noise_covariance(self, dwell_s: float | None = None) -> Array | None:
         """Covariance of the station means, (3, n, n), at the planned or another dwell; None for unknown noise."""
-        stations = [s if dwell_s is None else replace(s, record_s=dwell_s) for s in self.stations]
-        return triad_covariance(self.unit.triad(self.triad), windows(stations, self.axes))
+        return triad_covariance(self.unit.triad(self.triad), windows(self.stations, self.axes, dwell_s))
 
     def estimator(self, noise_covariance: Array) -> Estimator:
         """The generalised least squares of this plan. Raises `Undetermined`."""

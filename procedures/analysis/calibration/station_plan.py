@@ -36,10 +36,11 @@ def _turn_time_s(degrees: float, rate_deg_s: float, acceleration_deg_s2: float) 
     return distance / rate_deg_s + rate_deg_s / acceleration_deg_s2
 
 
-def windows(stations: Sequence[Station], axes: Sequence[tuple[float, float]]) -> Array:
+def windows(stations: Sequence[Station], axes: Sequence[tuple[float, float]], record_s: float | None = None) -> Array:
     """[start, stop] of each station's record in bench time [s], shape (n, 2), the table starting from its zero.
 
-    `axes` are (rate_deg_s, acceleration_deg_s2) of outer, middle, inner.
+    `record_s`: length of every record; None: each station's own. `axes` are (rate_deg_s, acceleration_deg_s2) of outer,
+    middle, inner.
     """
     now, at = 0.0, TableAngles()
     spans: list[tuple[float, float]] = []
@@ -47,7 +48,7 @@ def windows(stations: Sequence[Station], axes: Sequence[tuple[float, float]]) ->
         to = station.angles or at
         now += move_time_s(at, to, axes) + station.settle_s
         now += station.power_off_s
-        spans.append((now, now + station.record_s))
+        spans.append((now, now + (station.record_s if record_s is None else record_s)))
         now, at = spans[-1][1], to
     return np.array(spans).reshape(-1, 2)
 
