@@ -2,11 +2,11 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := calibration allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
+VALIDATIONS := calibration multi_position allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners previews)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test bench clients chaos format check validate lock clean
+.PHONY: help run test bench clients chaos format check validate rights lock clean
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -42,6 +42,9 @@ bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 
 clients: $(VENV)/.ready  ## lint the OpenAPI document, generate clients from it, drive a service with the generated one
 	@$(BIN)/python -m tests.clients
+
+rights: $(VENV)/.ready  ## write docs/rights.md anew, from the routes and their rights
+	@$(BIN)/python -m tests.kit.rights_page
 
 lock: $(VENV)/.ready  ## compile requirements.lock anew
 	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev pyproject.toml -o requirements.lock

@@ -10,7 +10,18 @@ from typing import Annotated
 import typer
 
 from bench_service.cli.completion import completion, prepare
-from bench_service.cli.groups import benches, campaigns, evidence, jobs, plans, reservations, services, units
+from bench_service.cli.groups import (
+    access,
+    benches,
+    calibrations,
+    campaigns,
+    evidence,
+    jobs,
+    plans,
+    reservations,
+    services,
+    units,
+)
 from bench_service.cli.groups.one_job import job
 from bench_service.cli.options import errors
 from bench_service.cli.refusal import Refused
@@ -43,6 +54,7 @@ PANELS = {
         evidence.analyse,
         evidence.results,
         units.units,
+        calibrations.calibrations,
     ),
     "Reservations": (reservations.reservations, reservations.reserve, reservations.unreserve),
     "This program": (completion, services.openapi),
@@ -53,8 +65,12 @@ for _panel, _commands in PANELS.items():
         app.command(rich_help_panel=_panel)(_command)
 app.command("import", rich_help_panel="Evidence")(evidence.import_)
 app.add_typer(job, name="job", rich_help_panel="Jobs")
+app.add_typer(calibrations.calibration, name="calibration", rich_help_panel="Evidence")
 app.add_typer(campaigns.campaigns, name="campaign", rich_help_panel="Jobs")
 app.add_typer(campaigns.schedules, name="schedule", rich_help_panel="Jobs")
+app.add_typer(access.users, name="user", rich_help_panel="Access")
+app.add_typer(access.tokens, name="token", rich_help_panel="Access")
+app.add_typer(access.trail, name="audit", rich_help_panel="Access")
 prepare()
 
 

@@ -3,6 +3,7 @@
 from asyncio import CancelledError
 from collections.abc import Sequence
 from http import HTTPStatus
+from math import ceil
 from typing import Annotated, Any
 
 from fastapi import FastAPI, Request
@@ -17,9 +18,12 @@ from bench_service.formats.plain_json import A_NUMBER, NOT_SO_DEEP, is_finite, s
 from bench_service.model.errors import (
     AlreadyReserved,
     BenchBusy,
+    CalibrationRefused,
     IdempotencyConflict,
     IllegalTransition,
+    LockedOut,
     NameTaken,
+    NotAllowed,
     NotDriving,
     NotFound,
     NotMounted,
@@ -31,6 +35,7 @@ from bench_service.model.errors import (
     SeveralStops,
     StorageFailure,
     StorageFull,
+    WrongPassword,
 )
 from procedures.bench.errors import BenchError
 from procedures.core.errors import BadParameter, DomainError, Undetermined
@@ -42,6 +47,10 @@ STATUS: dict[type[Exception], int] = {
     BenchBusy: 409,
     AlreadyReserved: 409,
     NameTaken: 409,
+    CalibrationRefused: 409,
+    NotAllowed: 403,
+    WrongPassword: 401,
+    LockedOut: 429,
     NotDriving: 503,
     NotReady: 503,
     Overloaded: 503,
@@ -56,6 +65,14 @@ STATUS: dict[type[Exception], int] = {
     ServiceError: 500,
 }
 """Status codes by error class; an error has the status of its nearest ancestor here."""
+
+
+class AccessRefused(HTTPException):
+    """Raised where a request is refused for its sender; as it is raised while a body is read, it is an HTTP error."""
+
+    def __init__(self, status: int, kind: str, text: str, headers: dict[str, str] | None = None) -> None:
+        super().__init__(status, text, headers)
+        self.kind = kind
 
 
 Shown = Annotated[str, BeforeValidator(shown)]
@@ -183,6 +200,8 @@ def _on_known(request: Request, error: Exception) -> Response:
     response = respond(request, status_of(error), str(error), type(error).__name__, *_details(error))
     if isinstance(error, Overloaded):
         response.headers["Retry-After"] = RETRY_AFTER_S
+    if isinstance(error, LockedOut):
+        response.headers["Retry-After"] = str(ceil(error.wait_s))
     return response
 
 
@@ -239,7 +258,7 @@ def _on_http(request: Request, error: Exception) -> Response:
     status = error.status_code
     if status == 400 and (allowed := _UNREAD.get(type(error.__cause__))) is not None:
         return respond(request, 422, f"body: {allowed}", "Invalid", [FieldError(field="body", message=allowed)])
-    kind = HTTPStatus(status).phrase.replace(" ", "")
+    kind = error.kind if isinstance(error, AccessRefused) else HTTPStatus(status).phrase.replace(" ", "")
     allowed = str(error.detail).rpartition(": ")[2]
     fields = {400: [_NO_BODY], 413: [FieldError(field="body", message=allowed)]}.get(status, [])
     response = respond(request, status, str(error.detail), kind, fields)

@@ -56,6 +56,21 @@ def show_warnings(document: dict[str, Any], to: Console) -> None:
         to.print(Text(f"warning: {warning}", style="yellow"), soft_wrap=True)
 
 
+def calibration_table(calibrations: list[dict[str, Any]]) -> Table:
+    """Table of calibrations: their origin, which one counts and by whose choice, and how long."""
+    table = Table()
+    for column in ("calibration", "triad", "made", "method", "verdict", "current", "approval", "valid until"):
+        table.add_column(column, overflow="fold")
+    for one in calibrations:
+        chosen = ("by rule" if one["by_rule"] else "chosen") if one["current"] else ""
+        origin = f"{one['method']}: {one['origin']}" if one["origin"] else one["method"]
+        current = Text(f"{chosen}, not usable" if chosen and one["unusable"] else chosen)
+        until = one["valid_until"] or "–"
+        cells = (one["made_at"][:19], origin, one["verdict"] or "–", current, one["approval"], until[:19])
+        table.add_row(one["id"], one["triad"], *cells)
+    return table
+
+
 def job_table(jobs: list[dict[str, Any]]) -> Table:
     """Table of jobs, newest first."""
     table = Table()

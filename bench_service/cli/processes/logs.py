@@ -8,6 +8,7 @@ import re
 import sys
 from datetime import UTC, datetime
 
+from bench_service.access.credentials import without_tokens
 from bench_service.settings import Settings
 from bench_service.telemetry.log_context import AddSubjects
 
@@ -23,8 +24,8 @@ _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066
 
 
 def visible(text: str) -> str:
-    """Escape the control characters of a text, so that it stays one line and commands no terminal."""
-    return _CONTROL.sub(lambda found: ascii(found[0])[1:-1], text)
+    """Escape the control characters of a text, so that it stays one line and commands no terminal; hide tokens."""
+    return _CONTROL.sub(lambda found: ascii(found[0])[1:-1], without_tokens(text))
 
 
 class Lines(logging.Formatter):
@@ -73,7 +74,7 @@ def _json_lines() -> logging.Formatter:
         """Log lines as JSON: the record's own fields, and time, level, logger and message."""
 
         def format(self, record: logging.LogRecord) -> str:
-            return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", super().format(record))
+            return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", without_tokens(super().format(record)))
 
         def process_log_record(self, log_data: dict[str, object]) -> dict[str, object]:
             about = log_data.pop("subjects", None)

@@ -11,12 +11,14 @@ from types import FrameType
 
 import uvicorn
 
+from bench_service.api.access.identify import Proxies, behind_proxies
 from bench_service.api.http.door import Door, may_listen
 from bench_service.app import create_app, open_service
 from bench_service.cli.processes.connections import AT_ONCE, BoundedConnections, lengthen_queue, raise_descriptors
 from bench_service.cli.processes.logs import set_up
 from bench_service.cli.processes.private_files import protect
 from bench_service.cli.refusal import Refused
+from bench_service.persistence.access.peek import has_credentials
 from bench_service.service import BenchService
 from bench_service.settings import Settings
 from bench_service.wall_clock import pause
@@ -70,8 +72,9 @@ def _opened(
     rules = Door.of(settings) if socket_file is None else Door.of(settings, EMBEDDED)
     with ExitStack() as closing:
         service = open_service(settings, closing, drive, apart=socket_file is None)
+        proxies = Proxies.of(settings)
         config = uvicorn.Config(
-            create_app(service, int(settings.max_import_mb * 1e6), closing.close, rules),
+            create_app(service, int(settings.max_import_mb * 1e6), closing.close, rules, proxies),
             settings.host,
             settings.port,
             uds=None if socket_file is None else str(socket_file),
@@ -80,7 +83,9 @@ def _opened(
             timeout_graceful_shutdown=GRACE_S,
             http=BoundedConnections,
             backlog=AT_ONCE,
+            proxy_headers=False,  # ours are outside the application, and keep the socket's own address
         )
+        config.app = behind_proxies(config.app, [config.forwarded_allow_ips, *settings.proxy_addresses])
         server = _Server(config)
 
         def end() -> None:
@@ -98,11 +103,11 @@ def _check_start(service: BenchService) -> None:
 
 def check_address(settings: Settings) -> None:
     """Check the address of the server. Raises `Refused` if anyone could reach it, with the settings it needs."""
-    if not may_listen(settings):
+    if not may_listen(settings) and not has_credentials(settings.database_url):
         raise Refused(
-            f"BENCH_HOST = {settings.host}: this service listens on another address than a loopback one only with a "
-            "token for those who ask from there, BENCH_TOKEN_FILE, or where that address is reached through a loopback "
-            "one alone, BENCH_PUBLISHED=loopback"
+            f"BENCH_HOST = {settings.host}: this service listens on another address than a loopback one only with "
+            "accounts (`bench user add`) or a token (`bench token add`, or BENCH_TOKEN_FILE) for those who ask from "
+            "there, or where that address is reached through a loopback one alone, BENCH_PUBLISHED=loopback"
         )
 
 
