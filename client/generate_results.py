@@ -2,8 +2,8 @@
 
     python client/generate_results.py openapi.json
 
-A schema that one result alone uses goes into that result's module, what several use into `shared.py`. A test writes
-them again and compares.
+A schema that one result alone uses goes into that result's module, what two use into `shared_by_two.py`, what more use
+into `shared.py`. A test writes them again and compares.
 """
 
 import json
@@ -18,6 +18,10 @@ FOLDER = Path(__file__).parent / "bench_client" / "results"
 PREFIX = "#/components/schemas/"
 PLAIN = {"string": "str", "number": "float", "integer": "int", "boolean": "bool", "null": "None"}
 WIDTH = 116
+SHARED = {
+    "shared": "Parts that three results or more have in common.",
+    "shared_by_two": "Parts that two results have in common.",
+}
 Schemas = dict[str, dict[str, Any]]
 
 
@@ -26,19 +30,28 @@ def modules(document: dict[str, Any]) -> dict[str, str]:
     schemas: Schemas = document["components"]["schemas"]
     names: dict[str, str] = schemas["ResultView"]["discriminator"]["mapping"]
     roots = {name: reference.removeprefix(PREFIX) for name, reference in names.items()}
-    needed = {name: list(dict.fromkeys(_needed(schemas, f"{root[:-6]}Document"))) for name, root in roots.items()}
+    documents = {name: _document(schemas[root]) for name, root in roots.items()}
+    needed = {name: list(dict.fromkeys(_needed(schemas, document))) for name, document in documents.items()}
     users: dict[str, int] = {}
     for parts in needed.values():
         for part in parts:
             users[part] = users.get(part, 0) + 1
-    shared = list(dict.fromkeys(p for parts in needed.values() for p in parts if users[p] > 1))
-    made = {"shared.py": _module("Parts that results of several procedures have in common.", schemas, shared, set())}
+    places = {part: {1: "", 2: "shared_by_two"}.get(number, "shared") for part, number in users.items()}
+    made = {
+        f"{place}.py": _module(summary, schemas, [part for part in users if places[part] == place], places, place)
+        for place, summary in SHARED.items()
+    }
     for name, parts in needed.items():
-        own = [part for part in parts if users[part] == 1]
-        text = _module(f"Result of `{name}`.", schemas, own, set(shared))
-        made[f"{name}.py"] = text + _result_class(name, roots[name], schemas[roots[name]])
+        own = [part for part in parts if not places[part]]
+        own_class = _result_class(name, roots[name], schemas[roots[name]])
+        made[f"{name}.py"] = _module(f"Result of `{name}`.", schemas, own, places, last=own_class)
     made["__init__.py"] = _index(roots)
     return made
+
+
+def _document(result: dict[str, Any]) -> str:
+    """Return the name of the schema of a result's document; a procedure and a method may have one in common."""
+    return result["properties"]["document"]["$ref"].removeprefix(PREFIX)
 
 
 def _needed(schemas: Schemas, name: str) -> Iterator[str]:
@@ -59,17 +72,19 @@ def _references(node: Any) -> Iterator[str]:
             yield from _references(child)
 
 
-def _module(summary: str, schemas: Schemas, parts: list[str], shared: set[str]) -> str:
-    body = "\n\n".join(_class(part, schemas[part]) for part in parts)
-    used = sorted(name for name in shared if re.search(rf"\b{name}\b", body))
+def _module(
+    summary: str, schemas: Schemas, parts: list[str], places: dict[str, str], here: str = "", last: str = ""
+) -> str:
+    """Return the text of a module; what stands in the module of another place is imported from there."""
+    body = "\n\n".join([*(_class(part, schemas[part]) for part in parts), *([last] if last else [])])
+    used = [n for n, place in sorted(places.items()) if place not in ("", here) and re.search(rf"\b{n}\b", body)]
     head = f'"""{summary} Written by `generate_results.py`; do not edit."""\n\n'
     head += "from datetime import datetime\n" if re.search(r"\bdatetime\b", body) else ""
     words = [word for word in ("Any", "Literal") if re.search(rf"\b{word}\b", body)]
-    words += [] if "Literal" in words or summary.startswith("Parts") else ["Literal"]
     head += f"from typing import {', '.join(words)}\n\n" if words else "\n"
-    bases = "Part, ResultHead" if shared else "Part"
+    bases = "Part, ResultHead" if last else "Part"
     head += f"from bench_client.results.part import {bases}\n"
-    head += "".join(f"from bench_client.results.shared import {name}\n" for name in used)
+    head += "".join(f"from bench_client.results.{places[name]} import {name}\n" for name in used)
     return f"{head}\n\n{body}\n"
 
 
@@ -124,8 +139,8 @@ def _default(schema: dict[str, Any]) -> str:
 def _result_class(name: str, title: str, schema: dict[str, Any]) -> str:
     kind = schema["properties"]["kind"]["const"]
     return (
-        f"\n\nclass {title}(ResultHead):\n{_docstring(schema['description'])}\n"
-        f'    kind: Literal["{kind}"]\n    name: Literal["{name}"]\n    document: {title[:-6]}Document\n'
+        f"class {title}(ResultHead):\n{_docstring(schema['description'])}\n"
+        f'    kind: Literal["{kind}"]\n    name: Literal["{name}"]\n    document: {_document(schema)}\n'
     )
 
 

@@ -11,6 +11,8 @@ from bench_client.results.gyro_half_turns import GyroHalfTurnsResult
 from bench_client.results.initial_alignment import InitialAlignmentResult
 from bench_client.results.initial_alignment_of_recording import InitialAlignmentOfRecordingResult
 from bench_client.results.kalman_calibration import KalmanCalibrationResult
+from bench_client.results.multi_position_calibration import MultiPositionCalibrationResult
+from bench_client.results.multi_position_calibration_of_recordings import MultiPositionCalibrationOfRecordingsResult
 from bench_client.results.no_operation import NoOperationResult
 from bench_client.results.noise_analysis import NoiseAnalysisResult
 from bench_client.results.part import OtherResult, ResultHead
@@ -27,6 +29,7 @@ Result = (
     Calibration12OrientationsResult
     | ConverterBenchResult
     | InitialAlignmentResult
+    | MultiPositionCalibrationResult
     | NoOperationResult
     | ScaleFactorWholeTurnsResult
     | StaticRunResult
@@ -39,6 +42,7 @@ Result = (
     | GyroHalfTurnsResult
     | InitialAlignmentOfRecordingResult
     | KalmanCalibrationResult
+    | MultiPositionCalibrationOfRecordingsResult
     | NoiseAnalysisResult
     | PlanOrientationsResult
     | RunToRunResult
@@ -50,6 +54,7 @@ CLASSES: dict[str, type[ResultHead]] = {
     "calibration_12_orientations": Calibration12OrientationsResult,
     "converter_bench": ConverterBenchResult,
     "initial_alignment": InitialAlignmentResult,
+    "multi_position_calibration": MultiPositionCalibrationResult,
     "no_operation": NoOperationResult,
     "scale_factor_whole_turns": ScaleFactorWholeTurnsResult,
     "static_run": StaticRunResult,
@@ -62,6 +67,7 @@ CLASSES: dict[str, type[ResultHead]] = {
     "gyro_half_turns": GyroHalfTurnsResult,
     "initial_alignment_of_recording": InitialAlignmentOfRecordingResult,
     "kalman_calibration": KalmanCalibrationResult,
+    "multi_position_calibration_of_recordings": MultiPositionCalibrationOfRecordingsResult,
     "noise_analysis": NoiseAnalysisResult,
     "plan_orientations": PlanOrientationsResult,
     "run_to_run": RunToRunResult,

@@ -3,59 +3,8 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import (
-    CalibrationSummaryCoefficient,
-    Check,
-    Form,
-    Magnitudes,
-    TriadCalibration,
-    Verdict,
-)
-
-
-class StationResidual(Part):
-    """Outputs minus model at one station, channels x, y, z, with their expected standard deviations."""
-
-    label: str
-    residual: tuple[float, ...]
-    expected_sd: tuple[float, ...]
-
-
-class ScalarParameter(Part):
-    """Cross-check of one of the nine parameters: from magnitudes alone, from the linear fit, and their difference."""
-
-    name: str
-    unit: str
-    scalar: float
-    standard_uncertainty: float
-    linear: float
-    difference_sigmas: float
-
-
-class ScalarCheck(Part):
-    """The scalar calibration of the same stations, which trusts no angle of the table."""
-
-    parameters: tuple[ScalarParameter, ...]
-    condition: float
-    p_value: float | None
-
-
-class TriadSummary(Part):
-    """Complete calibration results of one triad."""
-
-    calibration: TriadCalibration
-    coefficients: tuple[CalibrationSummaryCoefficient, ...]
-    condition: float
-    residuals: tuple[StationResidual, ...]
-    chi_square: float
-    degrees_of_freedom: int
-    p_value: float | None
-    noise_known: bool
-    magnitudes: Magnitudes
-    scalar: ScalarCheck | None = None
-    weighting: Literal["noise_and_table", "noise"] = "noise"
-    misfit: float | None = None
-    worst: str = ""
+from bench_client.results.shared import Check, TriadSummary, Verdict
+from bench_client.results.shared_by_two import Form
 
 
 class ThermalShare(Part):

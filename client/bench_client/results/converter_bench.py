@@ -3,7 +3,8 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, ConverterModel, Verdict
+from bench_client.results.shared import Check, Verdict
+from bench_client.results.shared_by_two import ConverterModel
 
 
 class ChannelResult(Part):
