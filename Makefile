@@ -3,12 +3,12 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
 VALIDATIONS := calibration multi_position allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit access
-BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners formats)
+BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
 
 .DEFAULT_GOAL := help
-.PHONY: help run test browser bench chaos soak format check validate rights lock audit images clean
+.PHONY: help run test browser clients bench chaos soak format check validate rights lock audit images clean
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -69,6 +69,9 @@ audit: .venv-audit/.ready  ## licences and bill of materials into build/, and kn
 
 images: $(VENV)/.ready  ## pin the images of docker-compose.yml by digest and build, where a container engine is
 	@$(BIN)/python .ci/images.py
+
+clients: $(VENV)/.ready  ## lint the OpenAPI document, generate clients from it, drive a service with the generated one
+	@$(BIN)/python -m tests.clients
 
 rights: $(VENV)/.ready  ## write docs/rights.md anew, from the routes and their rights
 	@$(BIN)/python -m tests.kit.rights_page

@@ -71,12 +71,12 @@ class RecordingPage(BaseModel):
 EXPORTS = Places("exports", most=8, most_bytes=100_000_000)
 """Exports at a time: each holds a chunk of samples and its form in the file."""
 BYTES = {"type": "string", "format": "binary"}
+TYPES = [form.media_type.split(";")[0] for form in (ExportFormat.NPY, *ExportFormat)]
+"""Media types of exports. Bytes come first: generators take the first type that they know, and CSV would be text."""
 DATA: dict[int | str, dict[str, object]] = {
     200: {
-        "description": "The raw samples; scale, offset and unit of each channel travel with them",
-        "content": {
-            form.media_type.split(";")[0]: {"schema": {"type": "string", "format": "binary"}} for form in ExportFormat
-        },
+        "description": "The raw samples; scale, offset and unit of each channel travel with them, but not with `npy`",
+        "content": {media_type: {"schema": BYTES} for media_type in TYPES},
     }
 }
 

@@ -60,7 +60,7 @@ PANELS = {
     ),
     "Database": (database.database, database.scrub, database.backup, database.restore),
     "Reservations": (reservations.reservations, reservations.reserve, reservations.unreserve),
-    "This program": (completion,),
+    "This program": (completion, services.openapi),
 }
 """Commands by the heading under which the help lists them."""
 for _panel, _commands in PANELS.items():

@@ -1,9 +1,11 @@
-"""Export of a recording as Arrow, Parquet or CSV, a block at a time: memory does not grow with its length.
+"""Export of a recording as Arrow, Parquet, CSV or NumPy, a block at a time: memory does not grow with its length.
 
 Samples go out as they are stored, raw; scale, offset, unit and quantity of each channel, the rate and the content hash
-of the whole recording travel with them. ``value = scale·(raw − offset)``. Must not know where the blocks come from.
+of the whole recording travel with them (not in NumPy's format, which has no place for them).
+``value = scale·(raw − offset)``. Must not know where the blocks come from.
 """
 
+import io
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -26,6 +28,7 @@ class ExportFormat(StrEnum):
     ARROW = "arrow"
     PARQUET = "parquet"
     CSV = "csv"
+    NPY = "npy"
 
     @property
     def media_type(self) -> str:
@@ -34,6 +37,7 @@ class ExportFormat(StrEnum):
             "arrow": "application/vnd.apache.arrow.stream",
             "parquet": "application/vnd.apache.parquet",
             "csv": "text/csv; charset=utf-8",
+            "npy": "application/octet-stream",
         }[self.value]
 
 
@@ -93,6 +97,7 @@ def export(part: Extract, blocks: Iterable[RawArray], form: ExportFormat) -> Ite
         ExportFormat.ARROW: _arrow,
         ExportFormat.PARQUET: _parquet,
         ExportFormat.CSV: _csv,
+        ExportFormat.NPY: _npy,
     }
     return writers[form](part, blocks)
 
@@ -205,3 +210,14 @@ def _csv(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
         csv.write_csv(pa.Table.from_arrays(columns, names=["time_s", *names]), sink, options)
         yield sink.getvalue().to_pybytes()
         sample += len(block)
+
+
+def _npy(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
+    """NumPy's own format: one array of raw samples, (n, channels), for `numpy.load`."""
+    kind = np.dtype(sample_type(part.dtype)).newbyteorder("<")
+    head = io.BytesIO()
+    shape = (part.stop - part.start, len(part.info.channels))
+    np.lib.format.write_array_header_1_0(head, {"descr": kind.str, "fortran_order": False, "shape": shape})
+    yield head.getvalue()
+    for block in blocks:
+        yield np.ascontiguousarray(block, dtype=kind).tobytes()

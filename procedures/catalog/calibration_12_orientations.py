@@ -248,7 +248,7 @@ def _warnings(params: Params, plans: Sequence[TriadPlan]) -> tuple[str, ...]:
         f"the noise of the {p.triad} triad is not known: its uncertainties come from the scatter within the dwells and "
         "the residuals, which do not show noise slower than the job"
         for p in plans
-        if p.noise_covariance() is None
+        if p.at_dwell() is None
     ]
     return tuple(w for w in (*found, *unknown) if w is not None)
 

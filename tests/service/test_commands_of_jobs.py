@@ -2,7 +2,6 @@
 
 import json
 import os
-import socket
 from collections.abc import Callable, Generator
 from pathlib import Path
 
@@ -12,10 +11,10 @@ import pytest
 from bench_service.cli.asking import leaving
 from bench_service.cli.commands import run_command_line
 from bench_service.cli.options import console, errors
-from bench_service.cli.processes.serving import serving
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from tests.kit.command_line import Done, one_line
+from tests.kit.served import served
 
 Bench = Callable[..., Done]
 
@@ -23,12 +22,8 @@ Bench = Callable[..., Done]
 @pytest.fixture(scope="module")
 def address(tmp_path_factory: pytest.TempPathFactory) -> Generator[str]:
     """A service on a loopback port that drives a bench at 200 times real time."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-    url = f"sqlite:///{tmp_path_factory.mktemp('served') / 'bench.sqlite'}"
-    with serving(Settings(database_url=url, port=port, real_time_factor=200.0)):
-        yield f"http://127.0.0.1:{port}"
+    with served(tmp_path_factory.mktemp("served"), real_time_factor=200.0) as at:
+        yield at
 
 
 @pytest.fixture

@@ -118,6 +118,6 @@ def test_a_text_is_compressed_for_a_client_that_takes_it(sqlite_client: Client, 
 
 def test_samples_streams_and_short_answers_are_not_compressed(sqlite_client: Client, jobs: list[dict]) -> None:
     recording = ids(sqlite_client, "recordings", job=jobs[0]["id"])[0]
-    data = [f"/api/v1/recordings/{recording}/data?format={form}" for form in ("csv", "arrow", "parquet")]
+    data = [f"/api/v1/recordings/{recording}/data?format={form}" for form in ("csv", "arrow", "parquet", "npy")]
     for path in (*data, f"/api/v1/jobs/{jobs[0]['id']}/events", "/healthz"):
         assert "content-encoding" not in plain(sqlite_client, "GET", path, "gzip").headers, path

@@ -203,7 +203,7 @@ def test_files_and_samples_are_binary_and_the_description_of_files_is_a_schema(d
     assert upload["description"] == {"$ref": "#/components/schemas/ImportDescription"}
     assert form["encoding"]["description"]["contentType"] == "application/json"
     data = document["paths"]["/api/v1/recordings/{recording_id}/data"]["get"]["responses"]["200"]["content"]
-    assert len(data) == 3
+    assert len(data) == 4
     assert all(body["schema"] == {"type": "string", "format": "binary"} for body in data.values())
     assert "contentMediaType" not in str(document)
 

@@ -280,7 +280,7 @@ def recording(sqlite_client: Client) -> str:
 @pytest.mark.parametrize(
     ("query", "field", "value", "words"),
     [
-        ("format=xml", "format", "xml", "'arrow', 'parquet' or 'csv'"),
+        ("format=xml", "format", "xml", "'arrow', 'parquet', 'csv' or 'npy'"),
         ("start_s=-1", "start_s", "-1", "greater than or equal to 0"),
         ("start_s=nan", "start_s", "nan", "finite number"),
         ("start_s=5", "start_s", 5.0, "0 … 0.03, the length of the recording in seconds"),

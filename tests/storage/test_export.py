@@ -103,6 +103,9 @@ def test_a_part_by_channel_and_time(info: RecordingInfo, samples: Samples, form:
         rows = np.loadtxt(io.BytesIO(data), delimiter=",", skiprows=data.count(b"\n# ") + 2)
         np.testing.assert_array_equal(rows[:, 1:], expected)
         np.testing.assert_array_equal(rows[:, 0], np.arange(200, 500) / 400.0)
+    elif form is ExportFormat.NPY:
+        assert np.load(io.BytesIO(data)).dtype == raw.dtype
+        np.testing.assert_array_equal(np.load(io.BytesIO(data)), expected)
     else:
         table = _table(data, form)
         assert table.schema.metadata[b"first_sample"] == b"200"
@@ -113,7 +116,9 @@ def test_a_part_by_channel_and_time(info: RecordingInfo, samples: Samples, form:
 @pytest.mark.parametrize("form", list(ExportFormat))
 def test_an_empty_part_is_a_file_without_rows(info: RecordingInfo, samples: Samples, form: ExportFormat) -> None:
     data = _out(info, samples(1000), form, start_s=1.0, stop_s=1.0)
-    if form is not ExportFormat.CSV:
+    if form is ExportFormat.NPY:
+        assert np.load(io.BytesIO(data)).shape == (0, 6)
+    elif form is not ExportFormat.CSV:
         assert _table(data, form).num_rows == 0
     assert data
 

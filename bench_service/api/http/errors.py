@@ -3,15 +3,16 @@
 from collections.abc import Sequence
 from http import HTTPStatus
 from math import ceil
-from typing import Annotated, Any
+from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from pydantic import BaseModel, BeforeValidator, Field, ValidationError
+from pydantic import ValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
 from bench_service.api.http.headers import SECURITY_HEADERS
+from bench_service.api.http.problem import FieldError, Problem
 from bench_service.api.http.status import status_of
 from bench_service.formats.plain_json import A_NUMBER, NOT_SO_DEEP, is_finite, shown
 from bench_service.model.errors import (
@@ -31,30 +32,6 @@ class AccessRefused(HTTPException):
     def __init__(self, status: int, kind: str, text: str, headers: dict[str, str] | None = None) -> None:
         super().__init__(status, text, headers)
         self.kind = kind
-
-
-Shown = Annotated[str, BeforeValidator(shown)]
-"""Text as a message may quote it, with its unsendable characters escaped."""
-
-
-class FieldError(BaseModel):
-    """A faulty field of a request."""
-
-    field: Shown = Field(description="Path of the field, for example parameters.dwell_s")
-    message: Shown = Field(description="What is wrong, with the allowed range")
-    value: Any = Field(default=None, description="What was given; text where JSON has no such number")
-
-
-class Problem(BaseModel):
-    """Problem document of RFC 9457, with the fields that caused the error."""
-
-    type: str = Field("about:blank", description="Kind of error, a relative reference")
-    title: str
-    status: int
-    detail: Shown
-    instance: Shown = ""
-    errors: list[FieldError] = Field(default_factory=list[FieldError])
-    lost: list[Shown] = Field(default_factory=list[Shown], description="Combinations that a plan cannot determine")
 
 
 RETRY_AFTER_S = "2"

@@ -54,7 +54,8 @@ def _documents(schemas: dict[str, Schema], entries: Iterable[AnyProcedure | AnyM
     found, together = models_json_schema(roots, ref_template=REFERENCE)  # pyright: ignore[reportArgumentType]
     parts: dict[str, Any] = together["$defs"]
     own = {entry.name: found[entry.result, "serialization"]["$ref"].removeprefix(PREFIX) for entry in entries}
-    names = {part: plain_name(part) for part in parts} | {part: f"{camel(name)}Document" for name, part in own.items()}
+    names = {part: plain_name(part) for part in parts}
+    names |= {part: f"{camel(name)}Document" for name, part in reversed(own.items())}  # the first of several names it
     for part, name in names.items():
         made = _open(component(name, renamed(parts[part], names)))
         if name in schemas and schemas[name] != made:

@@ -54,7 +54,7 @@ def export(
     stop_s: Annotated[float | None, typer.Option(help="Up to this second of the recording")] = None,
     server: Server = None,
 ) -> None:
-    """Take a recording's samples out as .csv, .parquet or .arrow."""
+    """Take a recording's samples out as .csv, .parquet, .arrow or .npy."""
     options: dict[str, Any] = {"channels": channels, "start_s": start_s, "stop_s": stop_s}
     query = {"format": output.suffix.removeprefix("."), **{k: v for k, v in options.items() if v is not None}}
     check_folder(output)

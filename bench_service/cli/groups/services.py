@@ -1,12 +1,12 @@
-"""``bench serve`` and ``bench demo``: the service itself, and a demonstration of it."""
+"""``bench serve``, ``demo`` and ``openapi``: the service itself, a demonstration of it, and its document."""
 
 import sys
 from typing import Annotated, Any
 
 import typer
 
-from bench_service.cli.asking.client import connect
-from bench_service.cli.options import announce, console
+from bench_service.cli.asking.client import answer, connect
+from bench_service.cli.options import Server, announce, console
 from bench_service.settings import Settings
 
 
@@ -61,6 +61,12 @@ def demo(
             console.print(f"serving on {address} (API: {address}/docs); Ctrl-C ends", soft_wrap=True)
             _until_interrupted()
     return code
+
+
+def openapi(context: typer.Context, server: Server = None) -> None:
+    """Print the OpenAPI document of the service, from which clients can be generated."""
+    with connect(context.obj, server, drive=False) as client:
+        print(answer(client, "GET", "/openapi.json").text)
 
 
 def _with(settings: Settings, **given: Any) -> Settings:

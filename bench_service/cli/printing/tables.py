@@ -11,6 +11,9 @@ from bench_service.cli.printing.moments import moment
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.units import DISPLAY
 
+CURRENT = ("gyro_calibration", "accelerometer_calibration", "thermal_correction", "converter")
+"""Fields of a unit that name what is current of it."""
+
 
 def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]] | None) -> tuple[Table, float]:
     """Estimate ± standard uncertainty σ, truth, error in sigmas; and the largest error in sigmas (0 without truth)."""
@@ -118,9 +121,9 @@ def result_table(results: list[dict[str, Any]]) -> Table:
 
 def unit_table(units: list[dict[str, Any]]) -> Table:
     """Table of units with what is current of each."""
-    table = _table("unit", "rate, Hz", "channels", "calibration", "thermal correction", "converter")
+    table = _table("unit", "rate, Hz", "channels", *(name.replace("_", " ") for name in CURRENT))
     for one in units:
-        current = [one[name] or "–" for name in ("calibration", "thermal_correction", "converter")]
+        current = [one.get(name) or "–" for name in CURRENT]
         table.add_row(Text(one["serial"]), f"{one['sample_rate_hz']:g}", str(len(one["channels"])), *current)
     return table
 

@@ -87,7 +87,8 @@ def estimator(what: str, vectors: Array, noise_covariance: Array, of_table: Arra
         gain, covariance = _by_channel(design, whiteners)
     else:
         gain = _with_flaws(design, whiteners, flaws)
-        covariance = np.einsum("kci,cij,lcj->kl", gain, noise_covariance, gain, optimize=True)
+        rows = gain.reshape(12, -1)
+        covariance = _times_each(gain, noise_covariance).reshape(12, -1) @ rows.T
     return Estimator(design, gain, covariance, condition)
 
 
@@ -118,9 +119,15 @@ def _with_flaws(design: Array, whiteners: Array, flaws: Array) -> Array:
     stacked[3 * n :, :p] = np.eye(p)
     q, r = qr(stacked, mode="economic")
     whitened = np.asarray(solve_triangular(r[p:, p:], q[: 3 * n, p:].T)).reshape(12, 3, n)
-    return np.einsum("kci,cij->kcj", whitened, whiteners, optimize=True) / np.tile(scale, 3)[:, None, None]
+    return _times_each(whitened, whiteners) / np.tile(scale, 3)[:, None, None]
+
+
+def _times_each(gain: Array, matrices: Array) -> Array:
+    """The rows of each channel times that channel's matrix, (12, 3, n) by (3, n, n), shape (12, 3, n)."""
+    return np.matmul(gain.transpose(1, 0, 2), matrices).transpose(1, 0, 2)
 
 
 def table_share(plan: Estimator, of_table: Array, table: TableErrors) -> TableShare:
     """The table's flaws carried through the outputs `of_table` F (n, 3, P) and the estimator into the coefficients."""
-    return TableShare(np.einsum("kcn,ncp->kp", plan.gain, of_table, optimize=True), table.source)
+    flaws = of_table.transpose(1, 0, 2).reshape(-1, of_table.shape[2])
+    return TableShare(plan.gain.reshape(12, -1) @ flaws, table.source)

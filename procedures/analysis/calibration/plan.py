@@ -1,7 +1,8 @@
 """Prediction of a calibration: the uncertainty of every coefficient, and the limits that it cannot resolve."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.recording import Station
 from procedures.core.site import Site
+from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
 
 BIASES = (0, 4, 8)
@@ -44,19 +46,40 @@ class TriadPlan:
     """True if K comes from a calibration, not from nominal outputs."""
     weighting: Weighting = "noise_and_table"
 
+    _at_dwell: dict[float | None, "AtDwell | None"] = field(init=False, default_factory=dict, compare=False, repr=False)
+    """Estimators that were made, by their dwell: several limits ask for the same ones."""
+
+    def at_dwell(self, dwell_s: float | None = None) -> "AtDwell | None":
+        """Noise and estimator at the planned or another dwell; None for unknown noise. Raises `Undetermined`."""
+        if dwell_s not in self._at_dwell:
+            noise = self.noise_covariance(dwell_s)
+            self._at_dwell[dwell_s] = None if noise is None else AtDwell(noise, self.estimator(noise))
+        return self._at_dwell[dwell_s]
+
     def noise_covariance(self, dwell_s: float | None = None) -> Array | None:
         """Covariance of the station means, (3, n, n), at the planned or another dwell; None for unknown noise."""
-        stations = [s if dwell_s is None else replace(s, record_s=dwell_s) for s in self.stations]
-        return triad_covariance(self.unit.triad(self.triad), windows(stations, self.axes))
+        return triad_covariance(self.unit.triad(self.triad), windows(self.stations, self.axes, dwell_s))
 
     def estimator(self, noise_covariance: Array) -> Estimator:
         """The generalised least squares of this plan. Raises `Undetermined`."""
-        flaws = self.table.of_outputs(self.matrix) if self.weighting == "noise_and_table" else None
+        flaws = self._of_outputs if self.weighting == "noise_and_table" else None
         return estimator(f"the {self.triad} coefficients", self.vectors, noise_covariance, flaws)
 
     def share(self, plan: Estimator) -> TableShare:
         """Contribution of the table's flaws to the coefficients of this plan."""
-        return table_share(plan, self.table.of_outputs(self.matrix), self.table)
+        return table_share(plan, self._of_outputs, self.table)
+
+    @cached_property
+    def _of_outputs(self) -> Array:
+        return self.table.of_outputs(self.matrix)
+
+
+@dataclass(frozen=True)
+class AtDwell:
+    """A plan at one dwell: the covariance of the station means (3, n, n), and the estimator for it."""
+
+    noise_covariance: Array
+    estimator: Estimator
 
 
 @dataclass(frozen=True)
@@ -83,11 +106,19 @@ def triad_plan(
 ) -> TriadPlan:
     """Plan of a triad at stations that all carry table angles."""
     angles = [s.angles for s in stations if s.angles is not None]
-    vectors = reference_vectors(triad, angles, site)
-    table = table_errors(angles, vectors, uncertainty, of_gravity=triad == "accelerometer")
+    vectors, table = _geometry(triad, tuple(angles), site, uncertainty)
     known = unit.known_matrix(triad)
     matrix = np.eye(3) if known is None else known
     return TriadPlan(triad, unit, tuple(stations), tuple(axes), vectors, table, matrix, known is not None, weighting)
+
+
+@lru_cache(maxsize=64)
+def _geometry(
+    triad: str, angles: tuple[TableAngles, ...], site: Site, uncertainty: TableUncertainty
+) -> tuple[Array, TableErrors]:
+    """Input vectors at the stations and the table's flaws there: the same for every dwell and every unit."""
+    vectors = reference_vectors(triad, angles, site)
+    return vectors, table_errors(angles, vectors, uncertainty, of_gravity=triad == "accelerometer")
 
 
 def predicted_parts(plan: TriadPlan) -> tuple[Array, Array] | None:
@@ -95,16 +126,19 @@ def predicted_parts(plan: TriadPlan) -> tuple[Array, Array] | None:
 
     None where the noise is not known. Raises `Undetermined`.
     """
-    noise = plan.noise_covariance()
-    if noise is None:
+    planned = plan.at_dwell()
+    if planned is None:
         estimator(f"the {plan.triad} coefficients", plan.vectors, np.array([np.eye(len(plan.stations))] * 3))
         return None
-    return parts_by_noise(plan, noise)
+    return _parts(plan, planned.estimator)
 
 
 def parts_by_noise(plan: TriadPlan, noise_covariance: Array) -> tuple[Array, Array]:
     """`predicted_parts` for a known covariance of the station means (3, n, n). Raises `Undetermined`."""
-    gls = plan.estimator(noise_covariance)
+    return _parts(plan, plan.estimator(noise_covariance))
+
+
+def _parts(plan: TriadPlan, gls: Estimator) -> tuple[Array, Array]:
     return np.sqrt(np.diagonal(gls.noise_covariance)), np.sqrt(np.diagonal(plan.share(gls).covariance))
 
 
@@ -141,10 +175,10 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
     """
 
     def uncertainty(dwell_s: float | None) -> float:
-        noise = plan.noise_covariance(dwell_s)
-        if noise is None:
+        planned = plan.at_dwell(dwell_s)
+        if planned is None:
             return 0.0
-        gls = plan.estimator(noise)
+        gls = planned.estimator
         pointing = plan.share(gls).standard_uncertainty("pointing")
         columns = list(requirement.columns)
         variance = np.diagonal(gls.noise_covariance)[columns] + pointing[columns] ** 2
@@ -170,11 +204,11 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
 
 def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size: float) -> str | None:
     """Warning where the noise of the dwells alone takes a per-axis figure δ/√3 (thesis 5.1) past its limit [SI]."""
-    noise = plan.noise_covariance()
-    if noise is None:
+    planned = plan.at_dwell()
+    if planned is None:
         return None
     gradient = magnitude_gradient(plan.vectors, np.linalg.inv(plan.matrix))
-    expected = predicted_sd(magnitude_covariance(gradient, noise)) / float(np.sqrt(3.0))
+    expected = predicted_sd(magnitude_covariance(gradient, planned.noise_covariance)) / float(np.sqrt(3.0))
     if expected <= limit:
         return None
     return (

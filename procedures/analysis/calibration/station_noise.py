@@ -6,6 +6,7 @@ diagonal.
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,11 +58,17 @@ def flicker_covariance(noise: NoiseCoefficients, windows: ArrayLike) -> Array:
     of ``τ²(e^(−x/τ) + x/τ − 1)``. The flicker process is their sum with ``s = (B²/π)·d ln τ`` over the band.
     """
     spans = _spans(windows)
-    low, high = np.log(noise.flicker_band_s)
+    low_s, high_s = noise.flicker_band_s
+    return noise.bias_instability**2 * _unit_flicker(low_s, high_s, tuple(spans.ravel().tolist()))
+
+
+@lru_cache(maxsize=16)
+def _unit_flicker(low_s: float, high_s: float, spans: tuple[float, ...]) -> Array:
+    """Flicker covariance of B = 1 over a band of relaxation times [s]: the axes of a triad share it, (n, n)."""
+    low, high = np.log((low_s, high_s))
     half = 0.5 * (high - low)
-    density = noise.bias_instability**2 / np.pi
     relaxations = np.exp(0.5 * (high + low) + half * _NODES)
-    return _double_mean(spans, _gauss_markov(relaxations, density * half * _WEIGHTS))
+    return _double_mean(np.reshape(spans, (-1, 2)), _gauss_markov(relaxations, half * _WEIGHTS / np.pi))
 
 
 def rate_random_walk_covariance(noise: NoiseCoefficients, windows: ArrayLike) -> Array:

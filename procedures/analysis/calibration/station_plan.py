@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy.optimize import brentq
 
 from procedures.core.arrays import Array
 from procedures.core.recording import Station
@@ -35,10 +36,11 @@ def _turn_time_s(degrees: float, rate_deg_s: float, acceleration_deg_s2: float) 
     return distance / rate_deg_s + rate_deg_s / acceleration_deg_s2
 
 
-def windows(stations: Sequence[Station], axes: Sequence[tuple[float, float]]) -> Array:
+def windows(stations: Sequence[Station], axes: Sequence[tuple[float, float]], record_s: float | None = None) -> Array:
     """[start, stop] of each station's record in bench time [s], shape (n, 2), the table starting from its zero.
 
-    `axes` are (rate_deg_s, acceleration_deg_s2) of outer, middle, inner.
+    `record_s`: length of every record; None: each station's own. `axes` are (rate_deg_s, acceleration_deg_s2) of outer,
+    middle, inner.
     """
     now, at = 0.0, TableAngles()
     spans: list[tuple[float, float]] = []
@@ -46,7 +48,7 @@ def windows(stations: Sequence[Station], axes: Sequence[tuple[float, float]]) ->
         to = station.angles or at
         now += move_time_s(at, to, axes) + station.settle_s
         now += station.power_off_s
-        spans.append((now, now + station.record_s))
+        spans.append((now, now + (station.record_s if record_s is None else record_s)))
         now, at = spans[-1][1], to
     return np.array(spans).reshape(-1, 2)
 
@@ -55,8 +57,8 @@ def dwell_for(uncertainty: Callable[[float], float], limit: float, shortest_s: f
     """Shortest dwell [s] of at least `shortest_s` at which an uncertainty comes down to its limit; None where even
     `LONGEST_DWELL_S` is too short.
 
-    The uncertainty is taken to fall with the dwell until slow noise stops it; found to 1 % by bisection of the
-    logarithm, after a coarse search.
+    The uncertainty is taken to fall with the dwell until slow noise stops it; found to 1 % by Brent's method over
+    the logarithms, after a coarse search.
     """
     dwells = np.geomspace(shortest_s, max(LONGEST_DWELL_S, shortest_s), 9)
     reached = next((i for i, dwell in enumerate(dwells) if uncertainty(float(dwell)) <= limit), None)
@@ -64,8 +66,12 @@ def dwell_for(uncertainty: Callable[[float], float], limit: float, shortest_s: f
         return None
     if reached == 0:
         return float(dwells[0])
-    low, high = float(dwells[reached - 1]), float(dwells[reached])
-    while high / low > 1.01:
-        middle = float(np.sqrt(low * high))
-        low, high = (low, middle) if uncertainty(middle) <= limit else (middle, high)
-    return high
+    low, high = np.log(dwells[reached - 1 : reached + 1])
+    excess: dict[float, float] = {}
+
+    def above(logarithm: float) -> float:
+        excess[logarithm] = float(np.log(uncertainty(float(np.exp(logarithm))) / limit))
+        return excess[logarithm]
+
+    brentq(above, low, high, xtol=0.005, rtol=1e-12)
+    return float(np.exp(min(at for at, over in excess.items() if over <= 0.0)))

@@ -1,0 +1,38 @@
+"""Result of `calibration_12_orientations`. Written by `generate_results.py`; do not edit."""
+
+from typing import Literal
+
+from bench_client.results.part import Part, ResultHead
+from bench_client.results.shared import Check, TriadSummary, Verdict
+from bench_client.results.shared_by_two import Form
+
+
+class ThermalShare(Part):
+    """Effect of the thermal correction on a calibration, JSON-ready."""
+
+    form: Form
+    regime: str
+    case_c: tuple[float, ...]
+    converter_c: tuple[float, ...]
+    change_m_s2: tuple[tuple[float, ...], ...]
+    from_correction: dict[str, float]
+    from_sensors: dict[str, float]
+
+
+class Calibration12OrientationsDocument(Part):
+    """Coefficients of both triads, their goodness of fit at the stations, and the verdict."""
+
+    checks: tuple[Check, ...] = ()
+    verdict: Verdict
+    warnings: tuple[str, ...] = ()
+    triads: tuple[TriadSummary, ...]
+    thermal: ThermalShare | None = None
+    """of the accelerometers, where they were corrected"""
+
+
+class Calibration12OrientationsResult(ResultHead):
+    """A result: Calibration in twelve orientations."""
+
+    kind: Literal["procedure"]
+    name: Literal["calibration_12_orientations"]
+    document: Calibration12OrientationsDocument

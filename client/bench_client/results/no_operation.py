@@ -1,0 +1,22 @@
+"""Result of `no_operation`. Written by `generate_results.py`; do not edit."""
+
+from typing import Literal
+
+from bench_client.results.part import Part, ResultHead
+from bench_client.results.shared import Check, Verdict
+
+
+class NoOperationDocument(Part):
+    """Result without any measurement."""
+
+    checks: tuple[Check, ...] = ()
+    verdict: Verdict
+    warnings: tuple[str, ...] = ()
+
+
+class NoOperationResult(ResultHead):
+    """A result: No operation."""
+
+    kind: Literal["procedure"]
+    name: Literal["no_operation"]
+    document: NoOperationDocument

@@ -1,0 +1,26 @@
+"""Result of `noise_analysis`. Written by `generate_results.py`; do not edit."""
+
+from typing import Literal
+
+from bench_client.results.part import Part, ResultHead
+from bench_client.results.shared import Check, Verdict
+from bench_client.results.shared_by_two import ChannelSummary, LaunchNoise
+
+
+class NoiseAnalysisDocument(Part):
+    """Noise of the recordings."""
+
+    checks: tuple[Check, ...] = ()
+    verdict: Verdict
+    warnings: tuple[str, ...] = ()
+    launches: tuple[LaunchNoise, ...]
+    channels: tuple[ChannelSummary, ...]
+    averaging_time_s: float | None
+
+
+class NoiseAnalysisResult(ResultHead):
+    """A result: Noise of recordings at rest."""
+
+    kind: Literal["method"]
+    name: Literal["noise_analysis"]
+    document: NoiseAnalysisDocument

@@ -1,0 +1,120 @@
+"""Parts that three results or more have in common. Written by `generate_results.py`; do not edit."""
+
+from typing import Literal
+
+from bench_client.results.part import Part
+
+
+class Limit(Part):
+    """A requirement on one value, inclusive at both ends, and where it comes from."""
+
+    unit: str
+    maximum: float | None = None
+    minimum: float | None = None
+    source: str = ""
+
+
+class Check(Part):
+    """Check of one value against one limit."""
+
+    name: str
+    value: float
+    limit: Limit
+    passed: bool
+    standard_uncertainty: float | None = None
+    note: str = ""
+
+
+Verdict = Literal["pass", "fail", "error"]
+
+
+class TriadCalibration(Part):
+    """Calibration coefficients of one triad, with the covariance of their estimate.
+
+    Plain tuples, so that the whole is JSON; `array` forms are the properties below. Order in `covariance`,
+    12×12: as `COEFFICIENT_NAMES`. A coefficient that the method fixes (the lower triangle of a scalar
+    calibration) has zero variance. Make one from arrays with `triad_calibration`.
+    """
+
+    triad: str
+    output_unit: str
+    input_unit: str
+    bias: tuple[float, ...]
+    matrix: tuple[tuple[float, ...], ...]
+    covariance: tuple[tuple[float, ...], ...]
+    model: str = "linear"
+
+
+class CalibrationSummaryCoefficient(Part):
+    """Coefficient of ``U = b + K·v`` with its standard uncertainty and the contributions to it."""
+
+    name: str
+    unit: str
+    estimate: float
+    standard_uncertainty: float
+    from_noise: float
+    from_table: float
+    from_table_source: dict[str, float]
+
+
+class StationResidual(Part):
+    """Outputs minus model at one station, channels x, y, z, with their expected standard deviations."""
+
+    label: str
+    residual: tuple[float, ...]
+    expected_sd: tuple[float, ...]
+
+
+class Magnitudes(Part):
+    """|v̂| at n stations before and after correction, in SI; plain tuples, JSON-ready."""
+
+    triad: str
+    unit: str
+    reference: float
+    labels: tuple[str, ...]
+    before: tuple[float, ...] | None
+    after: tuple[float, ...]
+    expected_sd: tuple[float, ...]
+    mean_error_before: float | None
+    sd_before: float | None
+    mean_error_after: float
+    sd_after: float
+    per_axis: float
+    per_axis_sd: float
+
+
+class ScalarParameter(Part):
+    """Cross-check of one of the nine parameters: from magnitudes alone, from the linear fit, and their difference."""
+
+    name: str
+    unit: str
+    scalar: float
+    standard_uncertainty: float
+    linear: float
+    difference_sigmas: float
+
+
+class ScalarCheck(Part):
+    """The scalar calibration of the same stations, which trusts no angle of the table."""
+
+    parameters: tuple[ScalarParameter, ...]
+    condition: float
+    p_value: float | None
+
+
+class TriadSummary(Part):
+    """Complete calibration results of one triad."""
+
+    calibration: TriadCalibration
+    coefficients: tuple[CalibrationSummaryCoefficient, ...]
+    condition: float
+    residuals: tuple[StationResidual, ...]
+    chi_square: float
+    degrees_of_freedom: int
+    p_value: float | None
+    noise_known: bool
+    magnitudes: Magnitudes
+    scalar: ScalarCheck | None = None
+    weighting: Literal["noise_and_table", "noise"] = "noise"
+    misfit: float | None = None
+    worst: str = ""
