@@ -42,11 +42,18 @@ async def record_station(bench: Bench, station: Station) -> Stream:
     if station.power_off_s > 0.0:
         await bench.supply.switch_off()
         await bench.clock.sleep(station.power_off_s)
-    await bench.supply.switch_on()
+    await _switch_on(bench, station)
     if station.angles is not None:
         await bench.turntable.move_to(station.angles)
     await bench.clock.sleep(station.settle_s)
     return bench.imu.record(station.record_s, station)
+
+
+async def _switch_on(bench: Bench, station: Station) -> None:
+    """Switch the unit on at the station's voltage where it names one; no-op where it is on at that."""
+    if station.supply_voltage_v is not None:
+        await bench.supply.set_output(station.supply_voltage_v, bench.supply.limits.nominal_a)
+    await bench.supply.switch_on()
 
 
 async def record_turn(bench: Bench, station: Station) -> Stream:
@@ -62,7 +69,7 @@ async def record_turn(bench: Bench, station: Station) -> Stream:
 
 
 async def _turning(bench: Bench, turn: Turn, blocks: Blocks) -> Blocks:
-    bench.turntable.command_turn(turn)
+    await bench.turntable.command_turn(turn)
     async for block in blocks:
         yield block
     await bench.turntable.settle()
@@ -87,7 +94,7 @@ async def record_profile(bench: Bench, station: Station, request: str) -> Stream
     await bench.operator.set_by_hand(station.angles, request)
     await _command(chamber, profile.legs[0])
     await bench.clock.sleep(station.power_off_s)
-    await bench.supply.switch_on()
+    await _switch_on(bench, station)
     await bench.clock.sleep(station.settle_s)
     stream = bench.imu.record(station.record_s, station)
     columns = _columns(stream.channels)
@@ -108,16 +115,37 @@ async def _command(chamber: Chamber, leg: ProfileLeg) -> None:
     await chamber.command(leg.target_c, leg.ramp_c_min)
 
 
+class _SetPoint:
+    """Set point that moves along the commanded ramp, for a chamber that tells only the final one."""
+
+    def __init__(self, first: ChamberReading) -> None:
+        """Begin at the first reading, where the chamber was led to the first leg's temperature already."""
+        told = first.set_point_c if first.set_point_c is not None else first.target_c
+        self._value_c, self._time_s = first.air_c if told is None else told, first.time_s
+
+    def at(self, reading: ChamberReading, leg: ProfileLeg | None) -> float:
+        """The chamber's own moving set point, else the commanded ramp's at this reading [°C]."""
+        most = 0.0 if leg is None else leg.ramp_c_min / 60.0 * max(0.0, reading.time_s - self._time_s)
+        target = self._value_c if leg is None else leg.target_c
+        self._value_c += min(max(target - self._value_c, -most), most)
+        self._time_s = reading.time_s
+        if reading.set_point_c is not None:
+            self._value_c = reading.set_point_c
+        return self._value_c
+
+
 async def _driven(chamber: Chamber, profile: TemperatureProfile, stream: Stream, columns: list[int]) -> Blocks:
     """The stream's blocks with the chamber's readings appended; each leg is commanded when the one before is done."""
     progress, watch = ProfileProgress(profile), SensorWatch(profile)
     sensors = [stream.channels[c] for c in columns]
     checked = CheckedSamples(stream.rate_hz)
     await _command(chamber, profile.legs[0])
+    moving = _SetPoint(await chamber.read())
     try:
         async for block in stream.blocks:
             reading = await chamber.read()
-            said = [round(value / CHAMBER_SCALE_C) for value in (reading.air_c, reading.set_point_c)]
+            set_point_c = moving.at(reading, progress.leg)
+            said = [round(value / CHAMBER_SCALE_C) for value in (reading.air_c, set_point_c)]
             yield np.column_stack([block, np.broadcast_to(np.array(said, dtype=np.int32), (len(block), 2))])
             _require_working(reading)
             for row, t_s in checked.of_block(len(block)):
@@ -168,7 +196,7 @@ async def record_current(bench: Bench, station: Station) -> Stream:
     chamber, source, profile = bench.chamber, bench.current_source, station.profile
     if chamber is None or source is None or profile is None or station.current_ma is None:
         raise DeviceFault(f"station {station.label!r} needs a thermal chamber, a current source, and a soak")
-    await bench.supply.switch_on()
+    await _switch_on(bench, station)
     await source.set_current(station.current_ma)
     await _soaked(bench, chamber, profile, station)
     await bench.clock.sleep(station.settle_s)

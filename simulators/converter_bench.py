@@ -1,5 +1,7 @@
 """Bench of the converter alone: how source, converter, chamber and supply are wired; knows none of their physics."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from procedures.bench.errors import DeviceFault
@@ -16,12 +18,12 @@ from simulators.truth.thermal import THERMOMETERS
 CONVERTER_SENSOR = THERMOMETERS.index("converter")
 
 
-def current_source(bench: BenchTruth, seed: int) -> SimCurrentSource:
+def current_source(bench: BenchTruth, seed: int, now_s: Callable[[], float]) -> SimCurrentSource:
     """Return the bench's current source. Raises `DeviceFault` where the bench declares none."""
     limits = bench.description.current_source
     if limits is None:
         raise DeviceFault(f"bench {bench.description.id!r} has no current source, and the job wants currents")
-    return SimCurrentSource(bench.current_source, limits, seed)
+    return SimCurrentSource(bench.current_source, limits, seed, now_s)
 
 
 def converter_alone(

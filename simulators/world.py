@@ -108,9 +108,9 @@ def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> S
     """
     clock = SimClock(config.rate_hz, config.real_time_factor, config.wait, config.slice_s)
     table = SimTurntable(config.bench, config.seed, clock)
-    supply = SimSupply()
+    supply = SimSupply(clock.now_s, _load_w(config), config.bench.description.supply)
     chamber = _chamber(config, clock) if config.thermal else None
-    source = current_source(config.bench, config.seed) if config.currents else None
+    source = current_source(config.bench, config.seed, clock.now_s) if config.currents else None
     door = (lambda _is_open: None) if chamber is None else chamber.set_door
     operator = SimOperator(config.bench.operator, config.seed, clock, supply.is_on, door, table.place)
     if source is None:
@@ -131,6 +131,14 @@ def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> S
     if checkpoint is not None:
         _resume(bench, checkpoint)
     return bench
+
+
+def _load_w(config: WorldConfig) -> float:
+    """Power that the unit takes, all of which becomes its heat [W]; of a converter alone, the converter's."""
+    heat = config.unit.thermal.network
+    if config.currents:
+        return heat.converter_w
+    return heat.case_w + heat.converter_w + heat.accelerometer_block_w + 3.0 * heat.gyro_w
 
 
 def _chamber(config: WorldConfig, clock: SimClock) -> SimChamber:

@@ -13,9 +13,13 @@ from numpy.typing import NDArray
 
 from procedures.bench import Bench, Chamber, Imu, Operator, Supply, Turntable
 from procedures.bench.chamber import ChamberLimits, ChamberReading
-from procedures.bench.current_source import CurrentSource, CurrentSourceLimits
+from procedures.bench.current_source import CurrentSource, CurrentSourceLimits, CurrentSourceReading
+from procedures.bench.device import DeviceIdentity, Status
 from procedures.bench.imu import Stream
+from procedures.bench.supply import SupplyLimits, SupplyReading
+from procedures.bench.turntable import TableReading
 from procedures.core.recording import Channel, Station
+from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
 
@@ -66,21 +70,25 @@ class ObservedTurntable(_Seen):
         with self._seen("turntable.move_to", angles_deg=[angles.outer_deg, angles.middle_deg, angles.inner_deg]):
             await self._table.move_to(angles)
 
-    def command_turn(self, turn: Turn) -> None:
+    async def identify(self) -> DeviceIdentity:
+        with self._seen("turntable.identify"):
+            return await self._table.identify()
+
+    async def command_turn(self, turn: Turn) -> None:
         with self._seen("turntable.command_turn", axis=turn.axis, turns=turn.turns, rate_deg_s=turn.rate_deg_s):
-            self._table.command_turn(turn)
+            await self._table.command_turn(turn)
 
     async def settle(self) -> None:
         with self._seen("turntable.settle"):
             await self._table.settle()
 
-    def read_angles(self) -> TableAngles:
-        with self._seen("turntable.read_angles"):
-            return self._table.read_angles()
+    async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
+        with self._seen("turntable.command_sinusoid", **vars(sinusoid)):
+            await self._table.command_sinusoid(sinusoid)
 
-    def is_moving(self) -> bool:
-        with self._seen("turntable.is_moving"):
-            return self._table.is_moving()
+    async def read(self) -> TableReading:
+        with self._seen("turntable.read"):
+            return await self._table.read()
 
     async def make_safe(self) -> None:
         with self._seen("turntable.make_safe"):
@@ -94,6 +102,18 @@ class ObservedSupply(_Seen):
         super().__init__(observer)
         self._supply = supply
 
+    @property
+    def limits(self) -> SupplyLimits:
+        return self._supply.limits
+
+    async def identify(self) -> DeviceIdentity:
+        with self._seen("supply.identify"):
+            return await self._supply.identify()
+
+    async def set_output(self, voltage_v: float, current_a: float) -> None:
+        with self._seen("supply.set_output", voltage_v=voltage_v, current_a=current_a):
+            await self._supply.set_output(voltage_v, current_a)
+
     async def switch_on(self) -> None:
         with self._seen("supply.switch_on"):
             await self._supply.switch_on()
@@ -102,9 +122,9 @@ class ObservedSupply(_Seen):
         with self._seen("supply.switch_off"):
             await self._supply.switch_off()
 
-    def is_on(self) -> bool:
-        with self._seen("supply.is_on"):
-            return self._supply.is_on()
+    async def read(self) -> SupplyReading:
+        with self._seen("supply.read"):
+            return await self._supply.read()
 
     async def make_safe(self) -> None:
         with self._seen("supply.make_safe"):
@@ -121,6 +141,10 @@ class ObservedChamber(_Seen):
     @property
     def limits(self) -> ChamberLimits:
         return self._chamber.limits
+
+    async def identify(self) -> DeviceIdentity:
+        with self._seen("chamber.identify"):
+            return await self._chamber.identify()
 
     async def command(self, temperature_c: float, ramp_c_min: float) -> None:
         with self._seen("chamber.command", temperature_c=temperature_c, ramp_c_min=ramp_c_min):
@@ -145,6 +169,14 @@ class ObservedCurrentSource(_Seen):
     @property
     def limits(self) -> CurrentSourceLimits:
         return self._source.limits
+
+    async def identify(self) -> DeviceIdentity:
+        with self._seen("current_source.identify"):
+            return await self._source.identify()
+
+    async def read(self) -> CurrentSourceReading:
+        with self._seen("current_source.read"):
+            return await self._source.read()
 
     async def set_current(self, current_ma: float) -> None:
         with self._seen("current_source.set_current", current_ma=current_ma):
@@ -181,6 +213,13 @@ class ObservedImu(_Seen):
     @property
     def rate_hz(self) -> float:
         return self._imu.rate_hz
+
+    async def identify(self) -> DeviceIdentity:
+        with self._seen("imu.identify"):
+            return await self._imu.identify()
+
+    def status(self) -> Status:
+        return self._imu.status()
 
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
         with self._seen("imu.record", duration_s=duration_s, station=None if station is None else station.index):

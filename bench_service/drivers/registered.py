@@ -11,7 +11,7 @@ from bench_service.drivers.device_register import DeviceLink, DeviceRegister
 from procedures.bench import SAFE_ORDER, Bench
 from procedures.bench.errors import Disconnected, OutOfRange
 
-READS = frozenset({"turntable.read_angles", "turntable.is_moving", "supply.is_on", "chamber.read"})
+READS = frozenset(f"{device}.{verb}" for device in (*SAFE_ORDER, "imu") for verb in ("read", "identify"))
 """Verbs that change nothing and are not noted."""
 REMEMBERED = ("table", "powered", "chamber_target_c", "current_ma")
 """Fields of the state that change as soon as a demand is made; a refused demand does not change them."""
@@ -59,7 +59,7 @@ class RegisterObserver:
         self._before = self._link.state
         self._arguments[verb] = arguments
         changes: dict[str, Any] = {}
-        if verb in ("turntable.move_to", "turntable.command_turn"):
+        if verb in ("turntable.move_to", "turntable.command_turn", "turntable.command_sinusoid"):
             changes = {"table": MOVING}
         elif verb == "supply.switch_on":
             changes = {"powered": True}

@@ -7,6 +7,7 @@ from procedures.bench.chamber import Chamber
 from procedures.bench.clock import Clock
 from procedures.bench.current_source import CurrentSource
 from procedures.bench.description import BenchDescription
+from procedures.bench.device import Device, DeviceIdentity, StatusWord
 from procedures.bench.imu import Imu
 from procedures.bench.needs import BenchNeeds
 from procedures.bench.operator import Operator
@@ -21,8 +22,11 @@ __all__ = [
     "Chamber",
     "Clock",
     "CurrentSource",
+    "Device",
+    "DeviceIdentity",
     "Imu",
     "Operator",
+    "StatusWord",
     "Supply",
     "Turntable",
 ]

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Protocol
 
+from procedures.bench.device import Device, Status
+
 
 @dataclass(frozen=True)
 class ChamberLimits:
@@ -21,25 +23,32 @@ class ChamberReading:
     """Readings of the chamber at one moment. They are not the regressor: the unit's own sensors are."""
 
     time_s: float
-    """Bench time of the reading [s]."""
+    """Bench time of the reading [s]; its age is the clock's time less this."""
     air_c: float
     """Air temperature at the controller's sensor."""
-    set_point_c: float
-    """Set point of the controller, which moves along the ramp."""
+    set_point_c: float | None
+    """Set point that moves along the ramp; None where the controller tells only the final one, `target_c`."""
     target_c: float | None
-    """Target of the present ramp; None: heater and cooler are off."""
+    """Final set point, where the present ramp ends, read back from the controller; None: the plant is off."""
     door_open: bool
     tripped: bool
     """The over-temperature limiter has cut heater and cooler off, and stays so until a person resets it."""
+    humidity_percent: float | None = None
+    """Relative humidity of the air; None where the chamber does not measure it."""
+    status: Status = ()
+    """Status words and messages of the controller."""
 
 
-class Chamber(Protocol):
-    """Thermal chamber. Each verb returns at once; temperatures change while time passes in `Clock.sleep` or
-    while a recording is read. The *unit's* temperatures decide whether a soak is long enough, not the chamber's.
+class Chamber(Device, Protocol):
+    """Thermal chamber. Each verb returns when the controller has answered; temperatures change while time passes in
+    `Clock.sleep` or while a recording is read. The *unit's* temperatures decide whether a soak is long enough, not the
+    chamber's.
     """
 
     @property
-    def limits(self) -> ChamberLimits: ...
+    def limits(self) -> ChamberLimits:
+        """Limits of demands; asks nothing of the device."""
+        ...
 
     async def command(self, temperature_c: float, ramp_c_min: float) -> None:
         """Go to an air temperature, the set point moving at no more than this ramp.
@@ -54,7 +63,9 @@ class Chamber(Protocol):
         ...
 
     async def make_safe(self) -> None:
-        """Lead the chamber to ambient at its fastest ramp, in any state; where the limiter has tripped or
-        the door is open it is off already. Raises `Disconnected`.
+        """Lead a running chamber to ambient at its fastest ramp; returns once the final set point reads back.
+
+        One that is off is not started: it stays off, also where the limiter has tripped or the door is open. Raises
+        `Disconnected`, `DeviceFault`.
         """
         ...

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Protocol
 
+from procedures.bench.device import Device, Status
+
 
 @dataclass(frozen=True)
 class CurrentSourceLimits:
@@ -16,16 +18,33 @@ class CurrentSourceLimits:
     """Standard uncertainty of its current at zero; constant over a job."""
 
 
-class CurrentSource(Protocol):
-    """Current source outside the chamber; both verbs return at once."""
+@dataclass(frozen=True)
+class CurrentSourceReading:
+    """State of the source at one moment."""
+
+    time_s: float
+    """Bench time of the reading [s]; its age is the clock's time less this."""
+    set_ma: float
+    """Current setting, read back; 0 where the output is off."""
+    status: Status = ()
+
+
+class CurrentSource(Device, Protocol):
+    """Current source outside the chamber; each verb returns when the device has answered."""
 
     @property
-    def limits(self) -> CurrentSourceLimits: ...
+    def limits(self) -> CurrentSourceLimits:
+        """Limits of demands; asks nothing of the device."""
+        ...
 
     async def set_current(self, current_ma: float) -> None:
         """Give this current from now on. Raises `OutOfRange` before anything changes, `Disconnected`."""
         ...
 
+    async def read(self) -> CurrentSourceReading:
+        """Read the present setting. Raises `Disconnected`."""
+        ...
+
     async def make_safe(self) -> None:
-        """Switch the current off."""
+        """Switch the current off; returns once it reads back as off. Raises `Disconnected`."""
         ...

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 from procedures.bench.chamber import ChamberLimits
 from procedures.bench.current_source import CurrentSourceLimits
+from procedures.bench.supply import SupplyLimits
+from procedures.core.sinusoid import PEAK_ACCELERATION, Sinusoid
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.temperature_profile import TemperatureProfile
@@ -52,6 +54,10 @@ class BenchDescription:
     """Limits of the thermal chamber; None: the bench has none."""
     current_source: CurrentSourceLimits | None = None
     """Limits of the precision current source; None: the bench has none."""
+    supply: SupplyLimits | None = None
+    """Limits of the unit's supply; None: its voltage cannot be set, the supply only switches."""
+    sinusoidal: bool = False
+    """True where the table can follow a sinusoid (`Turntable.command_sinusoid`)."""
 
     @property
     def axis_motion(self) -> tuple[tuple[float, float], ...]:
@@ -87,6 +93,25 @@ class BenchDescription:
             return (*found, f"bench {self.id} has no precision current source")
         most = self.current_source.maximum_ma
         return found if abs(current_ma) <= most else (*found, f"{current_ma:g} mA is outside {-most:g} … {most:g} mA")
+
+    def sinusoid_violations(self, angles: TableAngles, sinusoid: Sinusoid) -> tuple[str, ...]:
+        """Violations of the limits by a sinusoid about angles, a sentence each."""
+        if not self.sinusoidal:
+            return (f"the table of bench {self.id} does not follow sinusoids",)
+        limits, axis = self.axis(sinusoid.axis), sinusoid.axis
+        middle = {"outer": angles.outer_deg, "middle": angles.middle_deg, "inner": angles.inner_deg}[axis]
+        low, high = middle - sinusoid.amplitude_deg, middle + sinusoid.amplitude_deg
+        rate, acceleration = sinusoid.rate_deg_s, PEAK_ACCELERATION * sinusoid.acceleration_deg_s2
+        found = list(self.violations(angles))
+        if not limits.continuous and not limits.minimum_deg <= low <= high <= limits.maximum_deg:
+            found.append(
+                f"{axis} axis from {low:g} to {high:g} deg leaves {limits.minimum_deg:g} … {limits.maximum_deg:g}"
+            )
+        if rate > limits.rate_deg_s:
+            found.append(f"{axis} rate of {rate:g} deg/s is above {limits.rate_deg_s:g}")
+        if acceleration > limits.acceleration_deg_s2:
+            found.append(f"{axis} acceleration of {acceleration:g} deg/s^2 is above {limits.acceleration_deg_s2:g}")
+        return tuple(found)
 
     def _profile_violations(self, profile: TemperatureProfile) -> tuple[str, ...]:
         if self.chamber is None:

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from procedures.bench.device import Device, Status
 from procedures.core.recording import Channel, Station
 
 
@@ -23,8 +24,12 @@ class Stream:
     """Bench time at which the unit was switched on for this launch [s]; None where unknown."""
 
 
-class Imu(Protocol):
-    """Data link of the unit, from which recordings are read."""
+class Imu(Device, Protocol):
+    """Data link of the unit, from which recordings are read.
+
+    A unit's link is only listened to. Frames that arrive between two reads are kept by the driver within a bound that
+    it states; a frame that is lost, or one more than the bound, raises `Disconnected` naming its counter.
+    """
 
     @property
     def channels(self) -> tuple[Channel, ...]: ...
@@ -35,6 +40,11 @@ class Imu(Protocol):
     def record(self, duration_s: float, station: Station | None = None) -> Stream:
         """Begin a recording now; time passes while its blocks are read. Exactly round(duration_s·rate_hz) samples.
 
-        Raises `NotPowered`, `Disconnected`.
+        Returns at once and waits on no line: the first block waits for the first sample. Raises `NotPowered`,
+        `Disconnected`, here or from the blocks.
         """
+        ...
+
+    def status(self) -> Status:
+        """Status words of the newest frame, without waiting; empty before the first one, or where there are none."""
         ...

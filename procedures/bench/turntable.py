@@ -1,24 +1,49 @@
 """Port of the three-axis turntable."""
 
+from dataclasses import dataclass
 from typing import Protocol
 
+from procedures.bench.device import Device, Status
+from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
 
 
-class Turntable(Protocol):
-    """Port of the turntable. `move_to` returns when all axes are at rest and locked, `command_turn` and `read_angles`
-    at once.
+@dataclass(frozen=True)
+class TableReading:
+    """State of the table at one moment, as its encoders and its controller have it."""
+
+    time_s: float
+    """Bench time of the reading [s]; its age is the clock's time less this."""
+    angles: TableAngles
+    """Angles of the axes by their encoders, not the demands [deg]."""
+    moving: bool
+    """True while an axis follows a demand, or settles after it."""
+    status: Status = ()
+    """Status words of the controller: interlocks, limiters, faults."""
+
+
+class Turntable(Device, Protocol):
+    """Port of the turntable. `move_to` and `settle` return when all axes are at rest and locked, the other verbs as
+    soon as the table has answered. No verb holds the bench's loop: each awaits the table's answer, with a deadline.
     """
 
     async def move_to(self, angles: TableAngles) -> None:
         """Move all axes, settle, lock. Raises `OutOfRange` before anything moves, `NotSettled`, `DeviceFault`."""
         ...
 
-    def command_turn(self, turn: Turn) -> None:
+    async def command_turn(self, turn: Turn) -> None:
         """Begin whole turns of one axis, the others held; the table does the rest while time passes elsewhere.
 
-        Raises `OutOfRange` before anything moves, `DeviceFault` where the table moves already.
+        Returns when the table has taken the demand. Raises `OutOfRange` before anything moves, `DeviceFault` where the
+        table moves already, `Disconnected`.
+        """
+        ...
+
+    async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
+        """Begin whole cycles of one axis about its present angle, the others held; otherwise as `command_turn`.
+
+        Raises `OutOfRange` before anything moves, also where `BenchDescription.sinusoidal` is False.
         """
         ...
 
@@ -29,14 +54,13 @@ class Turntable(Protocol):
         """
         ...
 
-    def read_angles(self) -> TableAngles:
-        """Read the present angles of the axes from the encoders."""
-        ...
-
-    def is_moving(self) -> bool:
-        """True while the axes follow a demand or settle after it; safe to ask at any time."""
+    async def read(self) -> TableReading:
+        """Read encoders and status words; at any time, during a motion too. Raises `Disconnected`."""
         ...
 
     async def make_safe(self) -> None:
-        """Ramp down to rest and lock, from any motion."""
+        """Ramp down to rest and lock, from any motion; returns once the encoders show rest.
+
+        A table at rest gets no command. Raises `DeviceFault`, `Disconnected`.
+        """
         ...

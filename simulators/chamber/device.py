@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from procedures.bench.chamber import ChamberLimits, ChamberReading
+from procedures.bench.device import DeviceIdentity
 from procedures.bench.errors import DeviceFault, Disconnected, OutOfRange
 from simulators.chamber.behaviour import Response, response
 from simulators.chamber.plant import STEP_S, ChamberPlant
@@ -64,6 +65,11 @@ class SimChamber:
     def limits(self) -> ChamberLimits:
         return self._limits
 
+    async def identify(self) -> DeviceIdentity:
+        """Identity of the simulated chamber. Raises `Disconnected`."""
+        self._need_link()
+        return DeviceIdentity("simulated", "thermal chamber")
+
     async def command(self, temperature_c: float, ramp_c_min: float) -> None:
         """Go to an air temperature; see the port."""
         self._need_link()
@@ -86,9 +92,10 @@ class SimChamber:
         return ChamberReading(self._now_s(), s.control_reading_c, set_point, s.target_c, s.door_open, s.tripped)
 
     async def make_safe(self) -> None:
-        """Lead the chamber to ambient; a chamber that has tripped or stands open stays off."""
+        """Lead the chamber to ambient; one that is off, has tripped or stands open stays off."""
         self._need_link()
-        if not (self.plant.state.tripped or self.plant.state.door_open):
+        s = self.plant.state
+        if s.target_c is not None and not (s.tripped or s.door_open):
             self.plant.command(self._limits.ambient_c, self._limits.ramp_c_min / 60.0)
 
     def unit_power(self, on: bool) -> None:

@@ -1,11 +1,13 @@
 """Precision current source: implements `procedures.bench.current_source.CurrentSource`."""
 
+from collections.abc import Callable
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from procedures.bench.current_source import CurrentSourceLimits
+from procedures.bench.current_source import CurrentSourceLimits, CurrentSourceReading
+from procedures.bench.device import DeviceIdentity
 from procedures.bench.errors import OutOfRange
 from simulators.truth import Array, CurrentSourceTruth, KeyedBlocks
 
@@ -16,15 +18,26 @@ BLOCK_TICKS = 1000
 class SimCurrentSource:
     """Gives ``I·(1 + gain error) + zero error + noise``, the noise anew each tick."""
 
-    def __init__(self, truth: CurrentSourceTruth, limits: CurrentSourceLimits, seed: int) -> None:
+    def __init__(
+        self, truth: CurrentSourceTruth, limits: CurrentSourceLimits, seed: int, now_s: Callable[[], float]
+    ) -> None:
         self.truth = truth
         self._limits = limits
         self._draws = KeyedBlocks(seed, "current source")
+        self._now_s = now_s
         self._set_ma = 0.0
 
     @property
     def limits(self) -> CurrentSourceLimits:
         return self._limits
+
+    async def identify(self) -> DeviceIdentity:
+        """Identity of the simulated source."""
+        return DeviceIdentity("simulated", "current source")
+
+    async def read(self) -> CurrentSourceReading:
+        """Read the present setting; see the port."""
+        return CurrentSourceReading(self._now_s(), self._set_ma)
 
     async def set_current(self, current_ma: float) -> None:
         """Set the current from now on; see the port."""

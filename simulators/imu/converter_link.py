@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from procedures.bench.device import DeviceIdentity, Status
 from procedures.bench.errors import OutOfRange
 from procedures.bench.imu import Stream
 from procedures.core.recording import AXES, Channel, Quantity, Station
@@ -34,6 +35,7 @@ class ConverterLink:
         self._tapes = Tapes(clock, launch)
         thermometer = next(c for c in temperature_channels(truth) if c.name == "temperature_converter")
         self._channels = (*CURRENT_CHANNELS, thermometer)
+        self._serial = truth.serial
         self._ticks = 0
 
     @property
@@ -43,6 +45,14 @@ class ConverterLink:
     @property
     def rate_hz(self) -> float:
         return self._clock.rate_hz
+
+    async def identify(self) -> DeviceIdentity:
+        """Identity of the simulated unit."""
+        return DeviceIdentity("simulated", "signal converter", self._serial)
+
+    def status(self) -> Status:
+        """Status words of the newest frame: a simulated unit sends none."""
+        return ()
 
     def power_up(self, _launch: int) -> None:
         """Begin a new launch at tick zero."""

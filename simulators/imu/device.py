@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from procedures.bench.device import DeviceIdentity, Status
 from procedures.bench.errors import OutOfRange
 from procedures.bench.imu import Stream
 from procedures.core.recording import Channel, Station
@@ -48,6 +49,14 @@ class SimImu:
     @property
     def rate_hz(self) -> float:
         return self._clock.rate_hz
+
+    async def identify(self) -> DeviceIdentity:
+        """Identity of the simulated unit."""
+        return DeviceIdentity("simulated", "inertial unit", self.truth.serial)
+
+    def status(self) -> Status:
+        """Status words of the newest frame: a simulated unit sends none."""
+        return ()
 
     def power_up(self, launch: int) -> None:
         """Begin a new launch: new run-to-run coefficients, noise from time zero."""

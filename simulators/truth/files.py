@@ -9,6 +9,7 @@ from typing import Any
 from procedures.bench.chamber import ChamberLimits
 from procedures.bench.current_source import CurrentSourceLimits
 from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
+from procedures.bench.supply import SupplyLimits
 from procedures.core import units
 from procedures.core.site import Site
 from simulators.truth.ranges import TruthError, within
@@ -119,7 +120,7 @@ def _description(table: Table) -> BenchDescription:
     check_keys(
         "description",
         table,
-        {"id", "title", "site", "accuracy", "chamber", "current_source", *axes},
+        {"id", "title", "site", "accuracy", "chamber", "current_source", "supply", "sinusoidal", *axes},
         {"id", "site", *axes},
     )
     outer, middle, inner = (_axis(f"description.{axis}", table[axis]) for axis in ("outer", "middle", "inner"))
@@ -133,6 +134,10 @@ def _description(table: Table) -> BenchDescription:
     source = None
     if "current_source" in table:
         source = read_record(CurrentSourceLimits, "description.current_source", table["current_source"], {"maximum_ma"})
+    supply = None
+    if "supply" in table:
+        needed = {f.name for f in fields(SupplyLimits)}
+        supply = read_record(SupplyLimits, "description.supply", table["supply"], needed)
     return BenchDescription(
         str(table["id"]),
         site,
@@ -144,17 +149,25 @@ def _description(table: Table) -> BenchDescription:
         title=title,
         chamber=chamber,
         current_source=source,
+        supply=supply,
+        sinusoidal=_flag("description", "sinusoidal", table),
     )
 
 
 def _axis(where: str, table: Any) -> AxisLimits:
     """Read an axis: four numbers, and whether it has slip rings; it has none where the key is absent."""
-    continuous = table.get("continuous", False) if isinstance(table, dict) else False
-    if not isinstance(continuous, bool):
-        raise TruthError(f"{where}.continuous = {continuous!r} must be true or false")
+    continuous = _flag(where, "continuous", table) if isinstance(table, dict) else False
     numbers = {k: v for k, v in table.items() if k != "continuous"} if isinstance(table, dict) else table
     needed = {f.name for f in fields(AxisLimits)} - {"continuous"}
     return replace(read_record(AxisLimits, where, numbers, needed), continuous=continuous)
+
+
+def _flag(where: str, key: str, table: Table) -> bool:
+    """Read a key that is true or false; false where it is absent."""
+    value = table.get(key, False)
+    if not isinstance(value, bool):
+        raise TruthError(f"{where}.{key} = {value!r} must be true or false")
+    return value
 
 
 def parse_bench(text: str) -> BenchTruth:
@@ -229,6 +242,7 @@ def save_bench(truth: BenchTruth, path: Path) -> None:
     """Write a bench's truth; `load_bench` reads back the same."""
     described = truth.description
     lines = ["[description]", f"id = {dumps(described.id)}", f"title = {dumps(described.title)}"]
+    lines.append(f"sinusoidal = {str(described.sinusoidal).lower()}")
     sections: dict[str, Any] = {
         "description.site": described.site,
         "description.outer": described.outer,
@@ -237,6 +251,7 @@ def save_bench(truth: BenchTruth, path: Path) -> None:
         "description.accuracy": described.accuracy,
         **({} if described.chamber is None else {"description.chamber": described.chamber}),
         **({} if described.current_source is None else {"description.current_source": described.current_source}),
+        **({} if described.supply is None else {"description.supply": described.supply}),
         "site_truth": truth.site,
         "table_truth": truth.table,
         "chamber_truth": truth.chamber,

@@ -12,15 +12,18 @@ from typing import Any
 import numpy as np
 
 from procedures.bench.description import BenchDescription
+from procedures.bench.device import DeviceIdentity
 from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
+from procedures.bench.turntable import TableReading
 from procedures.core import units
+from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
 from simulators.clock import Motion, SimClock
 from simulators.truth import Array, BenchTruth, TableTruth, keyed_generator
 from simulators.turntable.kinematics import at_rest, attitude, path_increments, small_turn
 from simulators.turntable.plant import Plant
-from simulators.turntable.profile import Profile, Quintic, RampDown, Spin, deceleration_rad_s2, move_ticks
+from simulators.turntable.profile import Profile, Quintic, RampDown, Sine, Spin, deceleration_rad_s2, move_ticks
 
 AXES = ("outer", "middle", "inner")
 SLICE_S = 0.25
@@ -78,7 +81,7 @@ class SimTurntable:
         duration = move_ticks((end - start) / units.DEG, self._limits, self._clock.rate_hz) / self._clock.rate_hz
         await self._follow(Quintic(start, end, duration))
 
-    def command_turn(self, turn: Turn) -> None:
+    async def command_turn(self, turn: Turn) -> None:
         """Begin whole turns of one axis; see the port. The axis that turns stops with a new pointing error."""
         self._need_leave(self._description.violations(self.read_angles(), turn))
         axis = AXES.index(turn.axis)
@@ -88,6 +91,13 @@ class SimTurntable:
         self._pointing[axis] = pointing
         self._turned[axis] = self._description.axis(turn.axis).continuous
         self._begin(Spin(self._plant.angles_rad, axis, angle, turn.duration_s, turn.ramp_s))
+
+    async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
+        """Begin whole cycles of one axis; see the port."""
+        self._need_leave(self._description.sinusoid_violations(self.read_angles(), sinusoid))
+        amplitude = units.DEG * sinusoid.amplitude_deg
+        axis = AXES.index(sinusoid.axis)
+        self._begin(Sine(self._plant.angles_rad, axis, amplitude, sinusoid.frequency_hz, sinusoid.cycles))
 
     async def settle(self) -> None:
         """Let time pass until what was commanded is over and the axes rest; see the port."""
@@ -116,15 +126,19 @@ class SimTurntable:
         if not self.locked:
             raise DeviceFault("the table is moving: one demand at a time")
 
+    async def identify(self) -> DeviceIdentity:
+        """Identity of the simulated table."""
+        return DeviceIdentity("simulated", "three-axis table", self._description.id)
+
+    async def read(self) -> TableReading:
+        """Read encoders and status; see the port."""
+        return TableReading(self._clock.now_s(), self.read_angles(), not self.locked)
+
     def read_angles(self) -> TableAngles:
-        """Read the axis angles from the encoders."""
+        """Read the axis angles from the encoders at this moment."""
         encoders = (self._plant.angles_rad - self._pointing + 2.0 * np.pi * self._turns) / units.DEG
         outer, middle, inner = encoders.tolist()
         return TableAngles(outer, middle, inner)
-
-    def is_moving(self) -> bool:
-        """Return whether the axes are moving or not held; see the port."""
-        return not self.locked
 
     def read_rates_deg_s(self) -> Array:
         """Rates of the axes [deg/s], (3,): for tests; a procedure has no use for them."""

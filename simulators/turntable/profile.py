@@ -98,6 +98,43 @@ def _covered(s: Array) -> Array:
     return s**3 * (1.0 - 0.5 * s)
 
 
+@dataclass(frozen=True)
+class Sine:
+    """One axis in whole cycles about its start, as `procedures.core.sinusoid.Sinusoid` describes it."""
+
+    start_rad: Array
+    axis: int
+    amplitude_rad: float
+    frequency_hz: float
+    cycles: int
+
+    @property
+    def duration_s(self) -> float:
+        """Duration from rest to rest [s]."""
+        return self.cycles / self.frequency_hz
+
+    def at(self, time_s: Array) -> tuple[Array, Array]:
+        """Positions and rates, see `Profile`; at rest after the end."""
+        cycle = np.clip(time_s * self.frequency_hz, 0.0, self.cycles)
+        up, down = np.minimum(cycle, 1.0), np.minimum(self.cycles - cycle, 1.0)
+        size, turn = _grown(up) * _grown(down), 2.0 * np.pi
+        slope = _growth(up) * _grown(down) - _grown(up) * _growth(down)
+        position, rate = np.tile(self.start_rad, (len(cycle), 1)), np.zeros((len(cycle), 3))
+        wave = np.sin(turn * cycle)
+        position[:, self.axis] += self.amplitude_rad * size * wave
+        per_cycle = slope * wave + turn * size * np.cos(turn * cycle)
+        rate[:, self.axis] = self.amplitude_rad * self.frequency_hz * per_cycle
+        return position, rate
+
+
+def _grown(s: Array) -> Array:
+    return s**3 * (10.0 + s * (6.0 * s - 15.0))
+
+
+def _growth(s: Array) -> Array:
+    return 30.0 * (s * (1.0 - s)) ** 2
+
+
 def move_ticks(distance_deg: Array, limits: tuple[AxisLimits, ...], rate_hz: float) -> int:
     """Whole ticks that a quintic move of all axes together needs within every axis' rate and acceleration."""
     longest = 0.0

@@ -186,11 +186,11 @@ def test_verbs_become_states_and_a_refused_demand_changes_nothing(tmp_path: Path
     found = register.read()
     assert found is not None
     assert found.angles_deg == (0.0, 10.0, 0.0)
-    bench.turntable.command_turn(Turn("inner", 1, 60.0, 2.0))
+    asyncio.run(bench.turntable.command_turn(Turn("inner", 1, 60.0, 2.0)))
     assert state() == (MOVING, True)
     asyncio.run(bench.turntable.settle())
     assert state() == (AT_REST, True)
-    bench.turntable.command_turn(Turn("inner", -1, 60.0, 2.0))
+    asyncio.run(bench.turntable.command_turn(Turn("inner", -1, 60.0, 2.0)))
     asyncio.run(bench.make_safe())
     assert state() == (AT_REST, False)
     bench.close()

@@ -76,7 +76,7 @@ def cosine_time(turn: Turn, seconds: float) -> float:
 def test_a_turn_beyond_a_limit_moves_nothing(quiet_config, turn: Turn, words: str) -> None:
     bench = build(quiet_config())
     with pytest.raises(OutOfRange, match=words.replace("^", r"\^")):
-        bench.turntable.command_turn(turn)
+        asyncio.run(bench.turntable.command_turn(turn))
     assert bench.turntable.locked
     assert bench.turntable.read_angles() == TableAngles()
 
@@ -170,13 +170,17 @@ def test_an_axis_without_slip_rings_counts_its_turn(quiet_config) -> None:
     integrals(bench, Turn("inner", 1, 60.0, 1.0))
     assert bench.turntable.read_angles().inner_deg == pytest.approx(360.0, abs=1e-6)
     with pytest.raises(OutOfRange, match="inner axis from 360 deg end outside"):
-        bench.turntable.command_turn(Turn("inner", 1, 60.0, 1.0))
+        asyncio.run(bench.turntable.command_turn(Turn("inner", 1, 60.0, 1.0)))
 
 
 def test_one_demand_at_a_time(quiet_config) -> None:
     bench = build(quiet_config())
-    bench.turntable.command_turn(TURN)
-    for demand in (lambda: bench.turntable.command_turn(TURN), bench.turntable.checkpoint, bench.checkpoint):
+    asyncio.run(bench.turntable.command_turn(TURN))
+    for demand in (
+        lambda: asyncio.run(bench.turntable.command_turn(TURN)),
+        bench.turntable.checkpoint,
+        bench.checkpoint,
+    ):
         with pytest.raises(DeviceFault, match=r"moving"):
             demand()
     with pytest.raises(DeviceFault, match="moving"):
@@ -223,7 +227,7 @@ def test_make_safe_ramps_a_turning_table_down(quiet_config, cancel: bool) -> Non
 
 def test_whoever_waits_for_a_turn_learns_that_it_was_stopped(quiet_config) -> None:
     async def stopped(bench: SimulatedBench) -> None:
-        bench.turntable.command_turn(TURN)
+        await bench.turntable.command_turn(TURN)
         waiting = asyncio.create_task(bench.turntable.settle())
         await asyncio.sleep(0)
         await bench.turntable.make_safe()

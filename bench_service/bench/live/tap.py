@@ -90,14 +90,14 @@ class LiveTap:
     async def _devices(self) -> LiveDevices | None:
         bench = self._bench
         try:
-            angles = bench.turntable.read_angles()
+            table, supply = await bench.turntable.read(), await bench.supply.read()
             chamber = None if bench.chamber is None else await bench.chamber.read()
             return LiveDevices(
-                angles.outer_deg,
-                angles.middle_deg,
-                angles.inner_deg,
-                bench.turntable.is_moving(),
-                bench.supply.is_on(),
+                table.angles.outer_deg,
+                table.angles.middle_deg,
+                table.angles.inner_deg,
+                table.moving,
+                supply.on,
                 chamber,
             )
         except BenchError:  # the procedure raises it where it matters
