@@ -8,11 +8,11 @@ status are asked first.
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from bench_service import wall_clock
 from bench_service.drivers.answers import BadAnswer, shown
-from bench_service.drivers.link.address import Address
+from bench_service.drivers.interface.address import Address
 from bench_service.drivers.link.framing import NoFrame
 from bench_service.drivers.link.transport import LineCut, Transport, open_transport
 from procedures.bench.errors import DeviceBusy, Disconnected
@@ -59,11 +59,11 @@ class Greeting(Protocol):
     """First words on each new connection: identity, then status."""
 
     @property
-    def identity(self) -> Question[str]:
+    def identity(self) -> Question[Any]:
         """Question of the identity; its `read` refuses the answer to any other question."""
         ...
 
-    def check(self, identity: str, ask: "Ask") -> None:
+    def check(self, identity: Any, ask: "Ask") -> None:
         """Ask for status, compare the identity with the former one. Raises `BenchError` where it may not go on."""
         ...
 
@@ -100,6 +100,7 @@ class Exchange:
         self._buffer = bytearray()
         self._stale = False
         self._not_before = 0.0
+        self._closing = False
         self.counts = LineCounts()
 
     def ask(self, question: Question[T], until: float) -> T:
@@ -129,12 +130,19 @@ class Exchange:
         self._transport = None
         self._buffer.clear()
 
+    def stop(self) -> None:
+        """End the question under way, from another thread: it raises `Disconnected`, and no new line is opened."""
+        self._closing = True
+        transport = self._transport
+        if transport is not None:
+            transport.cut()
+
     def _named(self) -> str:
-        return f"the {self.device} at {self.address.text}"
+        return f"the {self.device} at {self.address}"
 
     def _give_up(self) -> None:
         """Leave a line that is out of step. A serial one stays open and is brought into step by its identity."""
-        if self._transport is not None and not self.address.droppable:
+        if self._transport is not None and self.address.scheme == "serial":
             self._stale = True
             self._buffer.clear()
         else:
@@ -145,6 +153,8 @@ class Exchange:
         if self._transport is not None and not self._stale and self._in_step():
             return
         left = until - wall_clock.monotonic_s()
+        if self._closing:
+            raise Disconnected(f"the line of {self._named()} was closed by its bench")
         if left <= 0.0:
             raise Disconnected(f"{self._named()} does not answer in time")
         if self._transport is None:

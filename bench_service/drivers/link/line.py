@@ -7,7 +7,7 @@ from concurrent.futures import Future
 from typing import Any, NamedTuple, TypeVar
 
 from bench_service import wall_clock
-from bench_service.drivers.link.address import Address
+from bench_service.drivers.interface.address import Address
 from bench_service.drivers.link.exchange import Exchange, Framer, Greeting, LineCounts, Patience, Question
 from procedures.bench.errors import Disconnected
 
@@ -31,7 +31,7 @@ class DeviceLine:
 
     def __init__(self, device: str, address: Address, framer: Framer, greeting: Greeting, patience: Patience) -> None:
         self._exchange = Exchange(device, address, framer, greeting, patience)
-        self._named = f"the {device} at {address.text}"
+        self._named = f"the {device} at {address}"
         self._queue: queue.Queue[_Asked | None] = queue.Queue(WAITING)
         self._thread: threading.Thread | None = None
         self._begin = threading.Lock()
@@ -82,12 +82,11 @@ class DeviceLine:
         self._exchange.close()
 
     def close(self) -> None:
-        """Close the line when the question under way has ended; idempotent. Questions that wait are not sent."""
+        """Close the line without waiting; idempotent. The question under way and those that wait raise."""
         with self._begin:
             if self._closed:
                 return
             self._closed = True
-            thread = self._thread
             while True:
                 try:
                     waiting = self._queue.get_nowait()
@@ -96,5 +95,10 @@ class DeviceLine:
                 if waiting is not None and waiting.answer.set_running_or_notify_cancel():
                     waiting.answer.set_exception(Disconnected(f"the line of {self._named} was closed by its bench"))
             self._queue.put_nowait(None)
-        if thread is not None:
-            thread.join(self._exchange.patience.deadline_s)
+        self._exchange.stop()
+
+    def ended(self, within_s: float) -> bool:
+        """Wait for the thread after `close`; True if it has ended."""
+        if self._thread is not None:
+            self._thread.join(within_s)
+        return self._thread is None or not self._thread.is_alive()

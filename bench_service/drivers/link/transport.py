@@ -2,9 +2,10 @@
 
 import select
 import socket
+from contextlib import suppress
 from typing import Any, Protocol, cast
 
-from bench_service.drivers.link.address import Address
+from bench_service.drivers.interface.address import Address
 
 CHUNK = 65536
 
@@ -22,6 +23,10 @@ class Transport(Protocol):
 
     def receive(self, timeout_s: float) -> bytes:
         """Return what has arrived, at the latest after a time; empty: nothing. Raises `LineCut`."""
+        ...
+
+    def cut(self) -> None:
+        """Break the line from another thread, so that a `receive` under way ends."""
         ...
 
     def close(self) -> None: ...
@@ -53,12 +58,17 @@ class SocketTransport:
             raise LineCut("the other end closed it")
         return data
 
+    def cut(self) -> None:
+        """Break the line, see `Transport`."""
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
+
     def close(self) -> None:
         self._socket.close()
 
 
 class SerialTransport:
-    """Transport over a serial port by pyserial, 8N1, one master."""
+    """Transport over a serial port by pyserial, with one master."""
 
     def __init__(self, port: Any) -> None:
         self._port = port
@@ -80,6 +90,11 @@ class SerialTransport:
         except OSError as error:
             raise LineCut(reason(error)) from error
 
+    def cut(self) -> None:
+        """Break the line, see `Transport`."""
+        with suppress(OSError):
+            self._port.cancel_read()
+
     def close(self) -> None:
         self._port.close()
 
@@ -87,12 +102,12 @@ class SerialTransport:
 def open_transport(address: Address, timeout_s: float) -> Transport:
     """Open the line at an address. Raises `LineCut` with the reason in words."""
     try:
-        if address.kind == "tcp":
+        if address.scheme == "tcp":
             line = socket.create_connection((address.host, address.port), timeout=timeout_s)
             line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             line.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
             return SocketTransport(line, stream=True)
-        if address.kind == "udp":
+        if address.scheme == "udp":
             return SocketTransport(_listening(address), stream=False)
         return SerialTransport(_serial_port(address, timeout_s))
     except OSError as error:
@@ -114,7 +129,17 @@ def _listening(address: Address) -> socket.socket:
 def _serial_port(address: Address, timeout_s: float) -> Any:
     import serial  # a bench without serial lines begins without it
 
-    return serial.Serial(address.path, address.baud, timeout=timeout_s, write_timeout=timeout_s, exclusive=True)
+    bits, parity, stops = address.format
+    return serial.Serial(
+        address.path,
+        address.baud,
+        int(bits),
+        parity,
+        int(stops),
+        timeout=timeout_s,
+        write_timeout=timeout_s,
+        exclusive=True,
+    )
 
 
 def reason(error: OSError) -> str:

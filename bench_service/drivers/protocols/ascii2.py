@@ -63,11 +63,6 @@ def read_request(layout: Layout) -> bytes:
     return f"${layout.address:02d}I".encode("ascii") + ENDING
 
 
-def help_request(layout: Layout) -> bytes:
-    """Bytes that ask for the machine's own help text."""
-    return f"${layout.address:02d}?".encode("ascii") + ENDING
-
-
 def field(value: float) -> str:
     """Field of an analogue value, six characters. Raises `ValueError` where it does not fit."""
     if not isfinite(value) or not LOWEST <= round(value, 1) <= HIGHEST:
@@ -120,14 +115,6 @@ def acknowledged(answer: bytes) -> None:
     """Check that an answer is none to a read: what follows a write is not established. Raises `BadAnswer`."""
     if len(answer) > 16 or len(answer.split()) > 1:
         raise BadAnswer(f"{shown(answer)} is no acknowledgement of a write")
-
-
-def help_text(answer: bytes) -> str:
-    """Help of the machine, its first line. Raises `BadAnswer`."""
-    found = answer.decode("latin-1").strip()
-    if not found or not found.isprintable():
-        raise BadAnswer(f"{shown(answer)} is no help text")
-    return found
 
 
 def _number(part: str) -> float:

@@ -33,6 +33,10 @@ class IxcomDecoder:
         self.others: list[Frame] = []
         """Frames of other messages, the newest sixteen."""
 
+    def begin_with(self, data: bytes) -> None:
+        """Take up bytes that came before the stream was listened to; the next `feed` decodes them."""
+        self._buffer += data
+
     @property
     def held(self) -> int:
         """Number of bytes that wait for the rest of their frame: fewer than the longest frame has."""
