@@ -90,10 +90,14 @@ class SimClock:
         await _let_others_run()
         while ticks > 0:
             step = min(ticks, longest_ticks)
-            self._advance(step)
-            self.ticks += step
+            self.advance_world(step)
             ticks -= step
             if self._factor is not None and self._wait is not None:
                 await self._wait(step / self.rate_hz / self._factor)
             else:
                 await _let_others_run()
+
+    def advance_world(self, ticks: int) -> None:
+        """Move the world by whole ticks, now."""
+        self._advance(ticks)
+        self.ticks += ticks

@@ -3,7 +3,7 @@
 Knows how clock, table, supply, unit, chamber and operator are wired; knows none of their physics.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -101,26 +101,33 @@ class SimulatedBench(Bench):
         return launch_truth(self.config, max(1, self.supply.launches))
 
 
-def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> SimulatedBench:
+def build(
+    config: WorldConfig,
+    checkpoint: Mapping[str, Any] | None = None,
+    clock: SimClock | None = None,
+    table: Callable[[BenchTruth, int, SimClock], SimTurntable] = SimTurntable,
+) -> SimulatedBench:
     """Build a bench with the table at zero and the unit off, or as a checkpoint of the same seed and rate left it.
 
+    `clock`: another one than the configuration's; `table`: makes the table.
     Raises `DeviceFault` where a chamber is wanted and the bench has none, `OtherVersion` for another's checkpoint.
     """
-    clock = SimClock(config.rate_hz, config.real_time_factor, config.wait, config.slice_s)
-    table = SimTurntable(config.bench, config.seed, clock)
+    if clock is None:
+        clock = SimClock(config.rate_hz, config.real_time_factor, config.wait, config.slice_s)
+    turntable = table(config.bench, config.seed, clock)
     supply = SimSupply(clock.now_s, _load_w(config), config.bench.description.supply)
     chamber = _chamber(config, clock) if config.thermal else None
     source = current_source(config.bench, config.seed, clock.now_s) if config.currents else None
     door = (lambda _is_open: None) if chamber is None else chamber.set_door
-    operator = SimOperator(config.bench.operator, config.seed, clock, supply.is_on, door, table.place)
+    operator = SimOperator(config.bench.operator, config.seed, clock, supply.is_on, door, turntable.place)
     if source is None:
-        imu = _unit(config, clock, table, supply, chamber)
+        imu = _unit(config, clock, turntable, supply, chamber)
     else:
         imu = converter_alone(config.unit, clock, supply, chamber, source)
     bench = SimulatedBench(
         config.bench.description,
         clock,
-        table,
+        turntable,
         imu,
         supply,
         chamber,

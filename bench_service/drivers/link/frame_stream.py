@@ -37,6 +37,8 @@ class Tape:
     blocks: deque[NDArray[np.int32]] = field(default_factory=deque[NDArray[np.int32]])
     held: int = 0
     failure: BenchError | None = None
+    begun: bool = False
+    """True once it has got a frame: what was lost before that is not lost to it."""
 
     def take(self, count: int) -> NDArray[np.int32]:
         """Take the oldest frames, at most `count`."""
@@ -70,6 +72,7 @@ class FrameStream:
         self._decoder: StreamDecoder | None = None
         self._line: Transport | None = None
         self._problem = "nothing was heard yet"
+        self._spoiled = 0
         self.frames = 0
         """Number of frames that have come over all lines."""
         self.last_frame_s = 0.0
@@ -155,20 +158,18 @@ class FrameStream:
 
     def _put(self, decoded: Decoded, decoder: StreamDecoder, continuity: Continuity) -> None:
         """Give frames to the recordings. One before which something is missing ends them."""
+        self._spoiled += decoded.spoiled
         if len(decoded.counters) == 0:
-            if decoded.spoiled and self._tapes:
-                self._fail(Disconnected(f"{self.named}: a frame after counter {continuity.last} was spoiled"))
             return
         gap = continuity.check(decoded.counters)
         self.frames += len(decoded.counters)
         self.last_frame_s = wall_clock.monotonic_s()
         self._newest = decoder.words(decoded.status[-1])
-        if gap is not None or decoded.spoiled:
-            why = str(gap) if gap is not None else f"a frame before counter {decoded.counters[0]} was spoiled"
-            if decoded.spoiled and gap is not None:
-                why += " (its checksum was wrong)"
+        if gap is not None:
+            why = f"{gap} (a frame in between was spoiled)" if self._spoiled else str(gap)
             self._note("imu.frames_lost", {"why": why})
-            self._fail(Disconnected(f"{self.named}: {why}"))
+            self._fail(Disconnected(f"{self.named}: {why}"), begun_only=gap.at == 0)
+        self._spoiled = 0
         invalid = np.flatnonzero(decoder.invalid(decoded.status))
         if len(invalid):
             at = int(invalid[0])
@@ -183,6 +184,7 @@ class FrameStream:
             for tape in self._tapes:
                 if tape.failure is not None:
                     continue
+                tape.begun = True
                 tape.blocks.append(decoded.counts)
                 tape.held += len(decoded.counts)
                 if tape.held > tape.most:
@@ -191,7 +193,8 @@ class FrameStream:
                         f"has counter {decoded.counters[-1]}"
                     )
 
-    def _fail(self, failure: BenchError) -> None:
+    def _fail(self, failure: BenchError, begun_only: bool = False) -> None:
         with self._lock:
             for tape in self._tapes:
-                tape.failure = tape.failure or failure
+                if tape.begun or not begun_only:
+                    tape.failure = tape.failure or failure

@@ -63,6 +63,8 @@ class Gap:
     """Number of missing frames, up to whole rounds of the counter."""
 
     def __str__(self) -> str:
+        if self.found == self.last:
+            return f"a frame came twice: counter {self.found}"
         number = "at least one frame was" if self.missing == 0 else f"{self.missing} frames were"
         return f"{number} lost: after counter {self.last} came {self.found}"
 
