@@ -211,7 +211,11 @@ class AcutrolTurntable:
         return still and (end is None or self._away(states, end) <= self._section.tolerance_deg)
 
     def _away(self, states: tuple[AxisState, ...], end: list[float]) -> float:
-        return max(abs(state.position_deg - angle) for state, angle in zip(states, end, strict=True))
+        """Largest distance of an axis from its end; one with slip rings may read a turn more or less [deg]."""
+        return max(
+            abs(wrapped(state.position_deg - angle) if axis.continuous else state.position_deg - angle)
+            for state, angle, axis in zip(states, end, self._axes(), strict=True)
+        )
 
     async def _rests(self) -> bool:
         """True if some readings in a row show rest; false at the first that does not."""

@@ -131,14 +131,10 @@ class ScpiSupply:
         return await accepted(self._line.ask(Question(data, words, read)), "supply", words)
 
     async def _set(self, statement: str, name: str) -> None:
-        """Send a set, then ask for its error. The queue forgets what it has told, so neither is asked twice."""
-        data = scpi.line(self._dialect, statement)
-        await self._line.ask(Question(data, name, _nothing, demand=True, answered=False))
-        error = Question(scpi.line(self._dialect, scpi.ERROR_QUERY), f"{name} (its error)", scpi.no_error, demand=True)
-        try:
-            await self._line.ask(error)
-        except Refusal as refusal:
-            raise DeviceFault(f"the supply refuses {name}: {refusal}") from None
+        """Send a set and the query of its error in one piece, so that they share a line; neither is sent twice."""
+        data = scpi.line(self._dialect, statement) + scpi.line(self._dialect, scpi.ERROR_QUERY)
+        question = Question(data, name, scpi.no_error, demand=True)
+        await accepted(self._line.ask(question), "supply", name)
 
     def _empty_errors(self, ask: Ask) -> None:
         """Read old errors away at a new line, so that none is taken for that of a later set."""
@@ -151,10 +147,6 @@ class ScpiSupply:
 
 def _identity(answer: bytes) -> DeviceIdentity:
     return DeviceIdentity(*scpi.identity(answer))
-
-
-def _nothing(_answer: bytes) -> None:
-    return
 
 
 DRIVER = DeviceDriver("supply", "scpi", ScpiSection, ScpiSupply)

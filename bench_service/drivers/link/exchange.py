@@ -19,6 +19,8 @@ from procedures.bench.errors import DeviceBusy, Disconnected
 
 T = TypeVar("T")
 log = logging.getLogger(__name__)
+AGAIN_S = 0.1
+"""Pause before a line that was given up is made again where the device still holds it [s]."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,7 @@ class Exchange:
         self._stale = False
         self._not_before = 0.0
         self._closing = False
+        self._greeted = False
         self.counts = LineCounts()
 
     def ask(self, question: Question[T], until: float) -> T:
@@ -149,9 +152,25 @@ class Exchange:
             self.close()
 
     def _connect(self, until: float) -> None:
-        """Have a line in step: nothing in it that was not asked for, the device greeted."""
+        """Have a line in step: nothing in it that was not asked for, the device greeted.
+
+        A controller may hold the former line for a while after it was given up: then it is tried again until the time
+        is over. A device that was never reached is tried once.
+        """
         if self._transport is not None and not self._stale and self._in_step():
             return
+        while True:
+            try:
+                self._open(until)
+                self._greet(until)
+                self._greeted = True
+                return
+            except DeviceBusy:
+                if not self._greeted or until - wall_clock.monotonic_s() < 2.0 * AGAIN_S:
+                    raise
+                wall_clock.pause(AGAIN_S)
+
+    def _open(self, until: float) -> None:
         left = until - wall_clock.monotonic_s()
         if self._closing:
             raise Disconnected(f"the line of {self._named()} was closed by its bench")
@@ -163,7 +182,6 @@ class Exchange:
             except LineCut as cut:
                 raise Disconnected(f"{self._named()} cannot be reached: {cut}") from None
             self.counts.connections += 1
-        self._greet(until)
 
     def _in_step(self) -> bool:
         """Check that nothing stands in the line before a question; else leave it."""
