@@ -24,6 +24,8 @@ AGAIN_S = 0.5
 """Time between two tries to open a line [s]."""
 LISTEN_S = 0.01
 """Pause in which frames gather, so that they are decoded many at a time [s]."""
+MOST_AT_ONCE = 1 << 18
+"""Bytes after which they are decoded, whatever else has come."""
 Opening = Callable[[Transport], StreamDecoder]
 """Opens the conversation on a new line and returns a decoder. Raises `LineCut`, `BadAnswer`, `Refusal`."""
 
@@ -150,11 +152,7 @@ class FrameStream:
         waiting = decoder.feed(b"")
         while not self._closing.is_set():
             self._put(waiting, decoder, continuity)
-            data = line.receive(0.2)
-            if data:
-                wall_clock.pause(LISTEN_S)
-                data += line.receive(0.0)
-            waiting = decoder.feed(data)
+            waiting = decoder.feed(_gathered(line))
 
     def _put(self, decoded: Decoded, decoder: StreamDecoder, continuity: Continuity) -> None:
         """Give frames to the recordings. One before which something is missing ends them."""
@@ -198,3 +196,16 @@ class FrameStream:
             for tape in self._tapes:
                 if tape.begun or not begun_only:
                     tape.failure = tape.failure or failure
+
+
+def _gathered(line: Transport) -> bytes:
+    """Bytes that have come, with those that come shortly after: frames are decoded many at a time."""
+    first = line.receive(0.2)
+    if not first:
+        return b""
+    wall_clock.pause(LISTEN_S)
+    parts, length = [first], len(first)
+    while length < MOST_AT_ONCE and (more := line.receive(0.0)):
+        parts.append(more)
+        length += len(more)
+    return b"".join(parts)
