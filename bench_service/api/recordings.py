@@ -20,6 +20,7 @@ from bench_service.mapping import copied
 from bench_service.model.records import RecordingState, StoredRecording
 from bench_service.service import BenchService
 from procedures.core.errors import BadParameter
+from procedures.core.measured import Measured
 from procedures.core.recording import Channel, Station
 
 router = APIRouter(prefix="/api/v1/recordings", tags=["recordings"])
@@ -40,6 +41,7 @@ class RecordingView(BaseModel):
     duration_s: float
     start_s: float
     launched_s: float | None = Field(description="Bench time at which the unit was switched on; null: not known")
+    measured: Measured | None = Field(description="Means of encoders and supply meanwhile; null: they were not read")
     content_hash: str = Field(description="SHA-256 of samples and channel description, whatever the chunks")
     simulated: bool
     stored_bytes: int

@@ -9,6 +9,7 @@ from contextlib import aclosing
 from typing import Any, TypeVar
 
 from bench_service.background import NonBlockingQuery
+from bench_service.bench.device_log import DeviceLog
 from bench_service.bench.live.tap import LiveTap
 from bench_service.bench.live.values import PUBLISH_S
 from bench_service.bench.observed import ObservedBench
@@ -240,16 +241,18 @@ class BenchSession:
             )
         )
         tap, begins_s = self._tap, stream.start_s
+        devices = DeviceLog(self._bench, station)
         if tap is not None:
             tap.stream(stream)
         try:
             async for block in stream.blocks:
                 writer.write(block)
+                await devices.look()
                 if tap is not None:
                     tap.block(begins_s, block)
                     begins_s += len(block) / stream.rate_hz
                 await asyncio.sleep(0)  # noqa: TID251  lets a cancel land; no time passes
-            return writer.seal(self._bench.checkpoint())
+            return writer.seal(self._bench.checkpoint(), devices.measured())
         except BaseException:
             writer.abandon()
             raise
