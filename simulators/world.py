@@ -3,7 +3,7 @@
 Knows how clock, table, supply, unit, chamber and operator are wired; knows none of their physics.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -34,6 +34,9 @@ CHECKPOINT_VERSION = 3
 WARM_SLICE_S = 60.0
 """Length of slices and blocks of a world with a chamber: a thermal run is half a day, at few samples a second."""
 
+FOLLOWING_BLOCK_S = 0.5
+"""Length of blocks of a world that follows another clock: shorter than anyone waits for a real unit."""
+
 
 @dataclass(frozen=True)
 class WorldConfig:
@@ -51,7 +54,9 @@ class WorldConfig:
     real_time_factor: float | None = None
     """Number of bench seconds per real second; None: as fast as it can."""
     wait: Wait | None = field(default=None, repr=False)
-    """Function that waits real seconds; needed with a real-time factor."""
+    """Function that waits real seconds; needed with a real-time factor, and to follow a clock."""
+    follows: Callable[[], float] | None = field(default=None, repr=False)
+    """Bench time of the clock that the world follows, as beside real devices; None: it has a clock of its own."""
 
     @property
     def rate_hz(self) -> float:
@@ -61,6 +66,8 @@ class WorldConfig:
     @property
     def slice_s(self) -> float | None:
         """Longest slice of time and longest block [s]; None: the clock's own."""
+        if self.follows is not None:
+            return FOLLOWING_BLOCK_S
         return WARM_SLICE_S if self.thermal and self.real_time_factor is None else None
 
 
@@ -106,9 +113,12 @@ def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> S
 
     Raises `DeviceFault` where a chamber is wanted and the bench has none, `OtherVersion` for another's checkpoint.
     """
-    clock = SimClock(config.rate_hz, config.real_time_factor, config.wait, config.slice_s)
+    clock = SimClock(config.rate_hz, config.real_time_factor, config.wait, config.slice_s, config.follows)
     table = SimTurntable(config.bench, config.seed, clock)
-    supply = SimSupply(clock.now_s, _load_w(config), config.bench.description.supply)
+    heat = config.unit.thermal.network
+    supply = SimSupply(
+        clock.now_s, heat.converter_w if config.currents else heat.power_w, config.bench.description.supply
+    )
     chamber = _chamber(config, clock) if config.thermal else None
     source = current_source(config.bench, config.seed, clock.now_s) if config.currents else None
     door = (lambda _is_open: None) if chamber is None else chamber.set_door
@@ -131,14 +141,6 @@ def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> S
     if checkpoint is not None:
         _resume(bench, checkpoint)
     return bench
-
-
-def _load_w(config: WorldConfig) -> float:
-    """Power that the unit takes, all of which becomes its heat [W]; of a converter alone, the converter's."""
-    heat = config.unit.thermal.network
-    if config.currents:
-        return heat.converter_w
-    return heat.case_w + heat.converter_w + heat.accelerometer_block_w + 3.0 * heat.gyro_w
 
 
 def _chamber(config: WorldConfig, clock: SimClock) -> SimChamber:

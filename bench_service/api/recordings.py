@@ -47,7 +47,10 @@ class RecordingView(BaseModel):
     stored_bytes: int
     chunks: int
     created_at: datetime
-    source: dict[str, Any] = Field(description="Of an import: files, description, and `clock`, what its stamps say")
+    source: dict[str, Any] = Field(
+        description="Of an import: files, description, and `clock`, what its stamps say. Of a bench with a bench file: "
+        "`origin` (real, mixed or simulated) and `devices`, with identities and certificates"
+    )
     warnings: list[str] = Field(description="Of an import: what was found in the file that a person should know")
     results: list[str] | None = Field(None, description="Results that used it; only where one recording is asked for")
 

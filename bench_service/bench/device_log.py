@@ -4,10 +4,12 @@ The encoders are compared with what was commanded at each reading.
 """
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from math import inf, sqrt
+from typing import Any
 
 from procedures.analysis.measured_stations import angle_difference_deg
-from procedures.bench import Bench
+from procedures.bench import Bench, BenchDescription
 from procedures.bench.description import TableAccuracy
 from procedures.bench.device import Status
 from procedures.bench.errors import DeviceFault
@@ -103,6 +105,19 @@ class DeviceLog:
         for word in map(str, status):
             if len(self._status) < STATUS_WORDS:
                 self._status[word] = None
+
+
+def made_by(description: BenchDescription) -> dict[str, Any]:
+    """Source of a recording: real, mixed or simulated, and device by device; empty where all are simulated."""
+    if not description.devices:
+        return {}
+    return {
+        "origin": description.origin,
+        "devices": {
+            device.name: {name: value for name, value in asdict(device).items() if name != "name"}
+            for device in description.devices
+        },
+    }
 
 
 def tolerance_deg(accuracy: TableAccuracy) -> float:
