@@ -14,9 +14,10 @@ from bench_service.api import audit, health, metrics, procedures, recordings, re
 from bench_service.api.benches import routes as benches
 from bench_service.api.campaigns import routes as campaigns
 from bench_service.api.campaigns import schedules
-from bench_service.api.http import bodies, door, errors, headers, request_id
+from bench_service.api.http import bodies, door, errors, headers, queries, request_id, transfer
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs import routes as jobs
+from bench_service.api.openapi import document
 from bench_service.api.units import routes as units
 from bench_service.bench.devices import BenchDevices
 from bench_service.bench.directory import BenchDirectory
@@ -172,7 +173,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         version=version("bench-service"),
         lifespan=lifespan,
         generate_unique_id_function=lambda route: route.name,
-        dependencies=[Depends(bodies.only_plain_json)],
+        dependencies=[Depends(queries.only_known_names), Depends(bodies.only_plain_json)],
         docs_url=None,  # the framework's own pages load scripts from another host
         redoc_url=None,
     )
@@ -184,6 +185,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         app.include_router(module.router)
     for page in (static_files, docs, images, pages, campaign_pages):
         app.include_router(page.router)
+    transfer.install(app)
     app.add_middleware(bodies.Bounded)
     errors.install(app)
     app.add_middleware(door.Doorkeeper, door=rules)
@@ -192,21 +194,5 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
     app.add_middleware(headers.SecurityHeaders)
     app.add_middleware(request_id.RequestId)
     service.traces.instrument(app)
-    _declare_problem(app)
+    document.install(app, lambda: service.catalogue)
     return app
-
-
-def _declare_problem(app: FastAPI) -> None:
-    """Put the problem document into the OpenAPI components, where every route's errors point."""
-    made = app.openapi
-
-    def openapi() -> dict[str, object]:
-        if app.openapi_schema is None:
-            schema = made()
-            components = errors.Problem.model_json_schema(ref_template="#/components/schemas/{model}")
-            schemas = schema["components"]["schemas"]
-            schemas.update(components.pop("$defs"))
-            schemas["Problem"] = components
-        return app.openapi_schema or {}
-
-    app.openapi = openapi

@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 from bench_service.api.http.bodies import refuse_unfit
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.http.errors import made, problems
+from bench_service.api.http.queries import Searched
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.export import ExportFormat, export, extract
 from bench_service.formats.import_file import ImportFile
@@ -67,10 +68,13 @@ class RecordingPage(BaseModel):
     next: str | None
 
 
+BYTES = {"type": "string", "format": "binary"}
 DATA: dict[int | str, dict[str, object]] = {
     200: {
         "description": "The raw samples; scale, offset and unit of each channel travel with them",
-        "content": {form.media_type.split(";")[0]: {"schema": {"type": "string"}} for form in ExportFormat},
+        "content": {
+            form.media_type.split(";")[0]: {"schema": {"type": "string", "format": "binary"}} for form in ExportFormat
+        },
     }
 }
 
@@ -78,13 +82,17 @@ DATA: dict[int | str, dict[str, object]] = {
 @router.get("", responses=problems())
 def list_recordings(
     service: Service,
+    search: Searched,
     job: Annotated[str | None, Query(max_length=100)] = None,
     unit: Annotated[str | None, Query(max_length=100)] = None,
+    simulated: bool | None = None,
     after: After = None,
     limit: Limit = 50,
 ) -> RecordingPage:
     """List the recordings, newest first."""
-    page = service.stores.recordings.list(job_id=job, unit=unit, after=after, limit=limit)
+    page = service.stores.recordings.list(
+        job_id=job, unit=unit, simulated=simulated, search=search, after=after, limit=limit
+    )
     return RecordingPage(items=[RecordingView.of(r) for r in page.items], next=page.next)
 
 
