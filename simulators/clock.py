@@ -97,8 +97,7 @@ class SimClock:
         await _let_others_run()
         while ticks > 0:
             step = min(ticks, longest_ticks)
-            self._advance(step)
-            self.ticks += step
+            self.advance_world(step)
             ticks -= step
             if self._factor is not None and self._wait is not None:
                 await self._wait(step / self.rate_hz / self._factor)
@@ -117,7 +116,10 @@ class SimClock:
         behind = 0 if self._follows is None else int((self._follows() - self.now_s()) * self.rate_hz)
         longest = max(1, int(SLICE_S * self.rate_hz))
         while behind > 0:
-            step = min(behind, longest)
-            self._advance(step)
-            self.ticks += step
-            behind -= step
+            self.advance_world(min(behind, longest))
+            behind -= longest
+
+    def advance_world(self, ticks: int) -> None:
+        """Move the world by whole ticks, now."""
+        self._advance(ticks)
+        self.ticks += ticks

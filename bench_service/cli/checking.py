@@ -65,6 +65,6 @@ def _refusals(file: BenchFile, description: BenchDescription, found: Survey, uni
         sentences += description.overdue(now().date().isoformat())
     if description.no_thermal_jobs:
         sentences.append(f"jobs that read temperatures: {description.no_thermal_jobs}")
-    if not units and not file.simulated("unit_link"):
+    if not units and not file.within("unit_link"):
         sentences.append(f"every job: no unit is declared in {file.folder / 'units'}")
     return sentences

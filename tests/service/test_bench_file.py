@@ -10,6 +10,7 @@ from bench_service.drivers.bench_file.lines import line_of
 from bench_service.drivers.bench_file.unit_files import read_unit, read_units
 from bench_service.drivers.interface import registry
 from bench_service.drivers.interface.driver import Bound, Found
+from bench_service.drivers.interface.registry import SHIPPED
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.model.errors import Misconfigured
 from bench_service.settings import Settings
@@ -130,6 +131,19 @@ def test_a_certificate_is_overdue_after_its_day(tmp_path: Path, day: str, overdu
     assert found.overdue(day) == (
         ("the certificate AT-117 of the turntable expired after 2027-03-02",) if overdue else ()
     )
+
+
+def test_a_time_factor_belongs_to_served_simulators_alone(tmp_path: Path) -> None:
+    with pytest.raises(Misconfigured, match="the unit_link is simulated in the driving process, which keeps real time"):
+        read_bench_file(_file(tmp_path, TEXT + "[simulation]\ntime_factor = 60\n"))
+    link = '[unit_link]\ndriver = "framed"\naddress = "tcp://127.0.0.1:7000"\nframe = "gl017.toml"\n'
+    shipped = {**line_devices.SHIPPED, ("unit_link", "framed"): SHIPPED["unit_link", "framed"]}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry, "SHIPPED", shipped)
+        file = read_bench_file(_file(tmp_path, TEXT + link + "[simulation]\ntime_factor = 60\n"))
+        found = described(file, None)
+        assert (found.origin, found.no_thermal_jobs) == ("simulated", "")
+        assert described(read_bench_file(_file(tmp_path, TEXT + link)), None).origin == "real"
 
 
 def test_the_settings_take_the_benchs_id_from_its_file(tmp_path: Path) -> None:

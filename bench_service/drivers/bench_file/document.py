@@ -70,7 +70,10 @@ class Simulation(Section):
     bench_truth: Path | None = None
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
     time_factor: Annotated[float, Field(gt=0.0, le=10_000.0)] = 1.0
-    """Bench seconds per real second of a served simulation (`bench simulate`); a mixed bench has real time."""
+    """Bench seconds per real second of served simulators behind the addresses; 1 with any real device.
+
+    Other than 1, every device counts as simulated.
+    """
 
 
 class Rest(Section):
@@ -106,10 +109,19 @@ class BenchFile:
         """Sections of the devices that are on wires."""
         return {kind: section for kind, section in self.devices.items() if isinstance(section, Wire)}
 
-    def simulated(self, kind: Kind) -> bool:
-        """Return whether the bench has this device, and it is simulated."""
+    @property
+    def time_factor(self) -> float:
+        """Bench seconds per real second."""
+        return self.rest.simulation.time_factor
+
+    def within(self, kind: Kind) -> bool:
+        """Return whether the bench has this device, and it is simulated within the driving process."""
         section = self.devices.get(kind)
         return section is not None and section.driver == SIMULATED
+
+    def simulated(self, kind: Kind) -> bool:
+        """Return whether the bench has this device, and it is simulated, in this process or behind its address."""
+        return self.within(kind) or (kind in self.devices and self.time_factor != 1.0)
 
 
 def read_bench_file(path: Path) -> BenchFile:
@@ -122,10 +134,17 @@ def read_bench_file(path: Path) -> BenchFile:
     for kind in KINDS:
         if kind in given:
             found[kind] = _section(kind, given[kind], path, text)
+    file = BenchFile(path, rest, found)
+    if file.time_factor != 1.0 and (mine := next((kind for kind in found if file.within(kind)), None)) is not None:
+        at = place(path, text, ("simulation", "time_factor"))
+        raise Misconfigured(
+            f"{at}: simulation.time_factor = {file.time_factor:g}: the {mine} is simulated in the driving process, "
+            "which keeps real time"
+        )
     if rest.operator.driver not in (SIMULATED, "asked"):
         at = place(path, text, ("operator", "driver"))
         raise Misconfigured(f'{at}: operator.driver = {rest.operator.driver!r} must be "asked" or "simulated"')
-    return BenchFile(path, rest, found)
+    return file
 
 
 def _section(kind: Kind, given: Any, path: Path, text: str) -> DeviceSection:

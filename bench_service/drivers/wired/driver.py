@@ -80,7 +80,7 @@ class BenchFileDriver:
 
     def mounted(self, serial: str | None = None) -> tuple[Unit, ...]:
         """The units that have a file; those of the simulation where the unit is simulated."""
-        return self._simulated.mounted(serial) if self._file.simulated("unit_link") else self._units
+        return self._simulated.mounted(serial) if self._file.within("unit_link") else self._units
 
     def open(
         self,
@@ -137,7 +137,7 @@ class BenchFileDriver:
         return found.failures
 
     def _opened(self, unit: Unit, seed: int, needs: BenchNeeds, job: str | None, link: DeviceLink) -> Bench:
-        wall, file, description = WallBenchClock(), self._file, self._description
+        wall, file, description = WallBenchClock(factor=self._file.time_factor), self._file, self._description
         context = DriverContext(
             file.id, wall, file.folder, unit, lambda: link.state.powered, lambda e, more: self._note(job, e, more)
         )
@@ -145,7 +145,7 @@ class BenchFileDriver:
         devices = opened(file, kinds, context)
         bench = Bench(description, wall, *(devices.get(kind) for kind in ("turntable", "unit_link", "supply")))  # pyright: ignore[reportArgumentType]
         bench.chamber, bench.current_source = devices.get("chamber"), devices.get("current_source")
-        if any(file.simulated(kind) for kind in ("turntable", "unit_link", "supply", "chamber", "current_source")):
+        if any(file.within(kind) for kind in ("turntable", "unit_link", "supply", "chamber", "current_source")):
             self._add_simulated(bench, unit.serial, seed, needs, wall)
         bench.operator = self._operator(bench.operator, job)
         bench.safe_s = {k: s.safe_s for k, s in file.real().items() if isinstance(s, Wire)}
@@ -162,13 +162,13 @@ class BenchFileDriver:
         world = self._simulated.world(unit, seed, needs, description, wall)
         seen = ObservedBench(world, CatchUp(world.clock))
         bench.clock = MixedClock(wall, world.clock)
-        simulated_unit = self._file.simulated("unit_link")
+        simulated_unit = self._file.within("unit_link")
         bench.turntable = _or_twin(bench.turntable, seen.turntable, world.turntable, simulated_unit, TwinTurntable)
         bench.supply = _or_twin(bench.supply, seen.supply, world.supply, simulated_unit, TwinSupply)
         bench.imu = bench.imu or seen.imu
-        if self._file.simulated("chamber"):
+        if self._file.within("chamber"):
             bench.chamber = seen.chamber
-        if self._file.simulated("current_source"):
+        if self._file.within("current_source"):
             bench.current_source = seen.current_source
         bench.operator = seen.operator
 

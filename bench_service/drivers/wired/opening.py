@@ -35,7 +35,7 @@ def _opened(kind: Kind, section: DeviceSection, context: DriverContext) -> Any:
 
 def context_of(file: BenchFile) -> DriverContext:
     """Surroundings of devices that are asked outside a job."""
-    return DriverContext(file.id, WallBenchClock(), Path(file.folder))
+    return DriverContext(file.id, WallBenchClock(factor=file.time_factor), Path(file.folder))
 
 
 @dataclass(frozen=True)

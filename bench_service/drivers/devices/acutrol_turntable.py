@@ -1,0 +1,287 @@
+"""Driver of a three-axis table with an ACUTROL controller: implements `procedures.bench.turntable.Turntable`.
+
+Not confirmed on a device. Limits go out before a demand, a demand before its mode; the servo holds the axes at rest.
+"""
+
+import asyncio
+from math import sqrt
+
+from bench_service.drivers.devices.acutrol_link import AcutrolLink, AcutrolSection
+from bench_service.drivers.devices.table_axes import AXES, TurnCount, angles_of, declared, steps, wrapped
+from bench_service.drivers.interface.driver import DeviceDriver, DriverContext, Found, narrowed
+from bench_service.drivers.protocols.acutrol import AxisState
+from procedures.bench.description import AxisLimits
+from procedures.bench.device import DeviceIdentity
+from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
+from procedures.bench.turntable import TableReading
+from procedures.core.sinusoid import Sinusoid
+from procedures.core.table_angles import TableAngles
+from procedures.core.turn import Turn
+
+POLL_S = 0.05
+"""Time between two readings of a moving table [s]."""
+AT_REST = 3
+"""Number of readings in a row that make rest."""
+STATUS_EVERY = 20
+"""Number of readings of a motion after which the interlocks are read again."""
+STOPPED = "the table was stopped by another demand"
+
+
+class AcutrolTurntable:
+    """Table whose every motion is watched by its encoders. A motion that is cancelled goes on to its end by itself."""
+
+    def __init__(self, section: AcutrolSection, context: DriverContext) -> None:
+        self._section, self._clock = section, context.clock
+        self._link = AcutrolLink(section, context.note)
+        self._counts = [
+            TurnCount(section.encoder == "single_turn" and not getattr(section, name).continuous) for name in AXES
+        ]
+        self._demand = 0
+        self._busy = False
+        self._turning: asyncio.Task[None] | None = None
+
+    async def connect(self) -> Found:
+        """Make the line, identify, read status and factory limits; see `WireDevice`."""
+        identity = await self.identify()
+        await self._states()
+        return Found(identity, await self._link.status(), self._link.own)
+
+    async def identify(self) -> DeviceIdentity:
+        """Ask for the identity; see the port."""
+        return await self._link.identify()
+
+    async def read(self) -> TableReading:
+        """Read encoders and status words; see the port."""
+        states, status = await self._states(), await self._link.status()
+        moving = self._under_way() or any(abs(s.rate_deg_s) > self._section.rest_rate_deg_s for s in states)
+        return TableReading(self._clock.now_s(), angles_of([s.position_deg for s in states]), moving, status)
+
+    async def move_to(self, angles: TableAngles) -> None:
+        """Move all axes, settle; see the port."""
+        self._require_allowed(declared(self._section).violations(angles))
+        demand = self._begin()
+        try:
+            start = await self._require_ready()
+            self._require_allowed(declared(narrowed(self._section, self._link.own)).violations(angles))
+            end = [angles.outer_deg, angles.middle_deg, angles.inner_deg]
+            positions = [state.position_deg for state in start]
+            for step in steps(positions, end, [count.counts for count in self._counts]):
+                await self._go(positions, step, demand)
+                positions = step
+        finally:
+            self._end(demand)
+
+    async def command_turn(self, turn: Turn) -> None:
+        """Begin whole turns of one axis; see the port. They are followed from here on, while time passes elsewhere."""
+        index = AXES.index(turn.axis)
+        demand = self._begin()
+        try:
+            states = await self._require_ready()
+            here = angles_of([state.position_deg for state in states])
+            self._require_allowed(declared(narrowed(self._section, self._link.own)).violations(here, turn))
+            rate = turn.rate_deg_s if turn.turns > 0 else -turn.rate_deg_s
+            await self._link.limit("rate", index, turn.rate_deg_s, turn.rate_deg_s / turn.ramp_s)
+            await self._link.demand("rate", index, rate)
+            await self._link.mode("rate", [index])
+        except BaseException:
+            self._end(demand)
+            raise
+        self._turning = asyncio.create_task(self._follow(turn, index, states[index].position_deg, demand))
+
+    async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
+        """Refuse; see the port: how this controller begins a sinusoid is not known. Raises `OutOfRange`."""
+        raise OutOfRange(f"{sinusoid.axis}: the driver of this table demands no sinusoid")
+
+    async def settle(self) -> None:
+        """Wait for the end of the commanded turns; see the port."""
+        if (turning := self._turning) is not None:
+            await asyncio.wait([turning])
+            if self._turning is turning:
+                self._turning = None
+            if turning.cancelled():
+                raise Stopped(STOPPED)
+            turning.result()
+        elif not await self._rests():
+            raise NotSettled("the table moves, and no motion of it was commanded here")
+
+    async def make_safe(self) -> None:
+        """Ramp down to rest and hold, or with the servo off as `on_safe` says; see the port."""
+        self._demand += 1
+        if self._turning is not None:
+            self._turning.cancel()
+        self._busy = False
+        if await self._rests():
+            return
+        for index, axis in enumerate(self._axes()):
+            await self._link.limit("rate", index, axis.rate_deg_s, axis.acceleration_deg_s2)
+            await self._link.demand("rate", index, 0.0)
+        await self._link.mode("rate")
+        longest = max(axis.rate_deg_s / axis.acceleration_deg_s2 for axis in self._axes())
+        await self._wait_for_rest(None, longest, self._demand)
+        if self._section.on_safe == "off":
+            await self._link.mode("off")
+            return
+        for index, state in enumerate(await self._link.states()):
+            await self._link.demand("position", index, state.position_deg)
+        await self._link.mode("position")
+
+    def close(self) -> None:
+        """Drop the line; see `WireDevice`."""
+        self._link.close()
+
+    def restore(self, angles: TableAngles) -> None:
+        """Take up the unwrapped angles that were remembered, before the first reading of an encoder of one turn."""
+        for count, angle in zip(self._counts, (angles.outer_deg, angles.middle_deg, angles.inner_deg), strict=True):
+            count.restore(angle)
+
+    def _axes(self) -> tuple[AxisLimits, AxisLimits, AxisLimits]:
+        description = declared(narrowed(self._section, self._link.own))
+        return description.outer, description.middle, description.inner
+
+    def _under_way(self) -> bool:
+        return self._busy or (self._turning is not None and not self._turning.done())
+
+    def _begin(self) -> int:
+        """Begin a demand. Raises `DeviceFault` while another is under way."""
+        if self._under_way():
+            raise DeviceFault("the table is moving: one demand at a time")
+        self._busy, self._turning = True, None
+        self._demand += 1
+        return self._demand
+
+    def _end(self, demand: int) -> None:
+        if demand == self._demand:
+            self._busy = False
+
+    def _require_allowed(self, violations: tuple[str, ...]) -> None:
+        if violations:
+            raise OutOfRange("; ".join(violations))
+
+    async def _require_ready(self) -> tuple[AxisState, ...]:
+        """Read interlocks and states. Raises `DeviceFault` where an interlock is not closed or an axis moves."""
+        await self._link.require_closed()
+        states = await self._states()
+        for name, state in zip(AXES, states, strict=True):
+            if abs(state.rate_deg_s) > self._section.rest_rate_deg_s:
+                raise DeviceFault(f"the table is moving: its {name} axis turns at {state.rate_deg_s:g} deg/s")
+        return states
+
+    async def _states(self) -> tuple[AxisState, ...]:
+        """States of the axes with unwrapped positions."""
+        states = await self._link.states()
+        return tuple(
+            AxisState(count.read(state.position_deg), state.rate_deg_s)
+            for count, state in zip(self._counts, states, strict=True)
+        )
+
+    async def _go(self, start: list[float], end: list[float], demand: int) -> None:
+        """Set limits, then demands, then the mode; wait until the axes rest where they were asked."""
+        longest = 0.0
+        for index, axis in enumerate(self._axes()):
+            await self._link.limit("position", index, axis.rate_deg_s, axis.acceleration_deg_s2)
+            distance = abs(end[index] - start[index])
+            longest = max(longest, _duration_s(distance, axis.rate_deg_s, axis.acceleration_deg_s2))
+        for index, count in enumerate(self._counts):
+            await self._link.demand("position", index, wrapped(end[index]) if count.counts else end[index])
+        await self._link.mode("position")
+        await self._wait_for_rest(end, longest, demand)
+
+    async def _wait_for_rest(self, end: list[float] | None, longest_s: float, demand: int) -> None:
+        """Wait for readings in a row at rest, and at the end where one is given. Raises `NotSettled`, `DeviceFault`."""
+        deadline = self._clock.now_s() + longest_s + self._section.settle_s
+        resting = readings = 0
+        while resting < AT_REST:
+            await self._clock.sleep(POLL_S)
+            if demand != self._demand:
+                raise Stopped(STOPPED)
+            states, late = await self._states(), self._clock.now_s() > deadline
+            resting = resting + 1 if self._at_rest(states, end) else 0
+            readings += 1
+            if late and resting == 0:
+                await self._link.require_closed()
+                away = "" if end is None else f", {self._away(states, end):g} deg from its demand"
+                raise NotSettled(
+                    f"the table did not come to rest within {self._section.settle_s:g} s of its move{away}"
+                )
+            if readings % STATUS_EVERY == 0:
+                await self._link.require_closed()
+
+    def _at_rest(self, states: tuple[AxisState, ...], end: list[float] | None) -> bool:
+        still = all(abs(state.rate_deg_s) <= self._section.rest_rate_deg_s for state in states)
+        return still and (end is None or self._away(states, end) <= self._section.tolerance_deg)
+
+    def _away(self, states: tuple[AxisState, ...], end: list[float]) -> float:
+        """Largest distance of an axis from its end; one with slip rings may read a turn more or less [deg]."""
+        return max(
+            abs(wrapped(state.position_deg - angle) if axis.continuous else state.position_deg - angle)
+            for state, angle, axis in zip(states, end, self._axes(), strict=True)
+        )
+
+    async def _rests(self) -> bool:
+        """True if some readings in a row show rest; false at the first that does not."""
+        for _ in range(AT_REST):
+            if not self._at_rest(await self._states(), None):
+                return False
+            await self._clock.sleep(POLL_S)
+        return True
+
+    async def _follow(self, turn: Turn, index: int, start_deg: float, demand: int) -> None:
+        """Count the turns of an axis in rate mode, stop it before their end, and lead it to the angle of the start."""
+        try:
+            count, sign = TurnCount(True), 1.0 if turn.turns > 0 else -1.0
+            count.restore(start_deg)
+            until_stop = abs(turn.angle_deg) - 0.5 * turn.rate_deg_s * turn.ramp_s
+            last = self._clock.now_s()
+            while True:
+                states, now = await self._link.states(), self._clock.now_s()
+                if (now - last) * turn.rate_deg_s > 170.0:
+                    raise DeviceFault(
+                        f"the {turn.axis} axis was not read for {now - last:.1f} s: its turns are not known"
+                    )
+                last = now
+                left_s = (until_stop - sign * (count.read(states[index].position_deg) - start_deg)) / turn.rate_deg_s
+                if left_s <= POLL_S:
+                    break
+                await self._clock.sleep(min(POLL_S, left_s))
+            await self._clock.sleep(max(0.0, left_s))
+            await self._link.demand("rate", index, 0.0)
+            await self._wait_for_rest(None, turn.ramp_s, demand)
+            await self._return(turn, index, start_deg, demand)
+        except BaseException:
+            await self._stop_axis(index)
+            raise
+        finally:
+            self._end(demand)
+
+    async def _return(self, turn: Turn, index: int, start_deg: float, demand: int) -> None:
+        """Lead the axis that has turned to its start: with slip rings the nearest turn of it, else the counted one."""
+        axis, state = self._axes()[index], (await self._states())[index]
+        continuous = getattr(self._section, turn.axis).continuous
+        nearest = state.position_deg + wrapped(start_deg - state.position_deg)
+        end = nearest if continuous else start_deg + turn.angle_deg
+        away = abs(end - state.position_deg)
+        if away > 10.0 + 0.5 * turn.rate_deg_s:
+            raise DeviceFault(f"the {turn.axis} axis stopped {away:g} deg from the end of its turns")
+        await self._link.limit("position", index, axis.rate_deg_s, axis.acceleration_deg_s2)
+        await self._link.demand("position", index, wrapped(end) if self._counts[index].counts else end)
+        await self._link.mode("position", [index])
+        positions = [s.position_deg for s in await self._states()]
+        positions[index] = end
+        await self._wait_for_rest(positions, _duration_s(away, axis.rate_deg_s, axis.acceleration_deg_s2), demand)
+
+    async def _stop_axis(self, index: int) -> None:
+        """Take the rate away from an axis whose turns are not followed any more; quiet where that fails as well."""
+        try:
+            await asyncio.shield(self._link.demand("rate", index, 0.0))
+        except Exception:
+            return
+
+
+def _duration_s(distance_deg: float, rate_deg_s: float, acceleration_deg_s2: float) -> float:
+    """Time from rest to rest over a distance within rate and acceleration [s]."""
+    if distance_deg * acceleration_deg_s2 < rate_deg_s**2:
+        return 2.0 * sqrt(distance_deg / acceleration_deg_s2)
+    return distance_deg / rate_deg_s + rate_deg_s / acceleration_deg_s2
+
+
+DRIVER = DeviceDriver("turntable", "acutrol", AcutrolSection, AcutrolTurntable)
