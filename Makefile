@@ -3,10 +3,11 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
 VALIDATIONS := calibration allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
+FOREIGN := basil edie instro ixcom visa
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test bench chaos format check validate lock clean
+.PHONY: help run test bench chaos format check validate lock clean foreign
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -43,5 +44,13 @@ bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 lock: $(VENV)/.ready  ## compile requirements.lock anew
 	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev pyproject.toml -o requirements.lock
 
+foreign: $(addprefix .foreign/,$(addsuffix /.ready,$(FOREIGN)))  ## environments of the programs by others that the tests talk to
+
+.foreign/%/.ready: tests/foreign/%.lock
+	@test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	@test -x .foreign/$*/bin/python || $(PYTHON) -m venv --without-pip .foreign/$*
+	@VIRTUAL_ENV=$(CURDIR)/.foreign/$* $(BIN)/uv pip install --quiet --require-hashes -r $<
+	@touch $@
+
 clean:  ## remove the environment and the demo's data
-	rm -rf $(VENV) .bench
+	rm -rf $(VENV) .foreign .bench

@@ -7,7 +7,8 @@ from typing import Any, Literal, Protocol
 
 from simulators.imu.device import SimImu
 from simulators.served.acutrol import AcutrolLanguage
-from simulators.served.chamber import ChamberTalker, Controller
+from simulators.served.at_once import at_once
+from simulators.served.chamber import TYPE, ChamberTalker, Controller
 from simulators.served.faults import Fault, FaultPlan
 from simulators.served.pace import Pace, PacedClock
 from simulators.served.ports import LinePort, Lines
@@ -40,7 +41,7 @@ class ServedDevice:
     datagrams: bool = False
     """True for a unit that sends datagrams to the place instead of listening there."""
     options: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    """Of a table: numbers, prefix_bytes, ending. Of a framed unit: columns."""
+    """Of a table: numbers, prefix_bytes, ending. Of a chamber: type."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +96,7 @@ class ServedBench:
 
     async def open(self) -> dict[str, int]:
         """Open all ports and let time pass; the number of each device's port."""
+        self._make_slow_things()
         numbers: dict[str, int] = {}
         for name, device in self.config.devices.items():
             self.ports[name] = self._port(name, device)
@@ -132,6 +134,12 @@ class ServedBench:
             for axis in range(3):
                 self.table.open_interlock(axis, FAULT)
 
+    def _make_slow_things(self) -> None:
+        """Have the first launch of the process before a port is open: it takes seconds, and no supply is so slow."""
+        other = build(self.config.world)
+        at_once(other.supply.switch_on())
+        other.clock.advance_world(1)
+
     async def _break_in_time(self) -> None:
         while True:
             for fault in self.plan.due(self.clock.now_s()):
@@ -139,15 +147,16 @@ class ServedBench:
             await asyncio.sleep(LOOK_S)  # noqa: TID251  the served world's own pace
 
     def _port(self, name: str, device: ServedDevice) -> Port:
+        options = device.options
         if name == "unit_link":
             return self._unit_port(device)
         if name == "supply":
             return LinePort(name, Lines(b"\n", ScpiLanguage(self.bench.supply).answer), self.plan)
         if name == "chamber":
+            kind = str(options.get("type", TYPE))
             if self.bench.chamber is None:
                 raise ValueError("chamber: the world has none; it needs thermal = True")
-            return LinePort(name, ChamberTalker(Controller(self.bench.chamber)), self.plan, masters=5)
-        options = device.options
+            return LinePort(name, ChamberTalker(Controller(self.bench.chamber), kind), self.plan, masters=5)
         language = AcutrolLanguage(
             self.table,
             options.get("numbers", (1, 2, 3)),

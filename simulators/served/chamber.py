@@ -11,6 +11,8 @@ from simulators.served.at_once import at_once
 PILCROW = b"\xb6"
 TYPE, SERIAL, SOFTWARE = "Simulated chamber", "0000000001", "1.0"
 DOOR = "Door open"
+OUTPUTS = ("Condensation protection", "Spare 2", "Spare 3", "Compressed air", "Dryer", "Spare 6")
+"""Names of the digital outputs after the start switch, from 1; the switch of each has the index after it."""
 
 
 class Controller:
@@ -70,8 +72,10 @@ class Controller:
 class SimservLanguage:
     """Numbered commands, one reply each; arguments that are not needed are let pass."""
 
-    def __init__(self, controller: Controller) -> None:
-        self._c = controller
+    def __init__(self, controller: Controller, kind: str) -> None:
+        """Set up; `kind`: type that the chamber says of itself."""
+        self._c, self._type = controller, kind
+        self._outputs = [False] * len(OUTPUTS)
         first = self._first
         self._verbs: dict[int, Callable[[list[str]], tuple[str, ...] | int]] = {
             99997: self._information,
@@ -88,8 +92,9 @@ class SimservLanguage:
             11070: lambda _a: (f"{self._c.gradients[1]:.2f}",),
             11072: lambda a: self._done(self._c.set_gradient(1, float(a[1]))) if first(a) else -6,
             14001: self._switch,
-            14003: lambda a: (str(int(self._c.running)) if a[0] == "1" else "0",),
-            14007: lambda _a: ("2",),
+            14003: lambda a: (str(int(self._c.running if a[0] == "1" else self._outputs[int(a[0]) - 2])),),
+            14007: lambda _a: (str(len(OUTPUTS)),),
+            14010: lambda a: (OUTPUTS[int(a[0]) - 1],),
             15002: lambda _a: (str(int(self._c.reading().door_open)),),
             15004: lambda _a: ("1",),
             15005: lambda _a: (DOOR,),
@@ -122,12 +127,15 @@ class SimservLanguage:
         return (3 if reading.target_c is not None else 1) + (8 if reading.tripped else 0)
 
     def _information(self, arguments: list[str]) -> tuple[str, ...]:
-        known = {"1": TYPE, "2": "2026", "3": SERIAL, "4": "0", "8": SOFTWARE}
+        known = {"1": self._type, "2": "2026", "3": SERIAL, "4": "0", "8": SOFTWARE}
         return (known.get(arguments[0] if arguments else "1", "0"),)
 
     def _switch(self, arguments: list[str]) -> int:
         on = float(arguments[1]) != 0.0
-        return self._done(self._c.run(on)) if arguments[0] == "1" else 1
+        if arguments[0] == "1":
+            return self._done(self._c.run(on))
+        self._outputs[int(arguments[0]) - 2] = on
+        return 1
 
 
 class Ascii2Language:
@@ -176,8 +184,9 @@ class Ascii2Language:
 class ChamberTalker:
     """Both languages on one port: a dollar sign begins ASCII-2, a digit SIMSERV; anything else is no request."""
 
-    def __init__(self, controller: Controller) -> None:
-        self._simserv, self._ascii2 = SimservLanguage(controller), Ascii2Language(controller)
+    def __init__(self, controller: Controller, kind: str = TYPE) -> None:
+        """Set up; `kind`: type that the chamber says of itself."""
+        self._simserv, self._ascii2 = SimservLanguage(controller, kind), Ascii2Language(controller)
 
     def take(self, buffer: bytearray) -> bytes | None:
         """Take one request, see `Talker`."""
