@@ -24,7 +24,7 @@ run: $(VENV)/.ready  ## calibrate and verify the simulated unit, then keep servi
 	@$(BIN)/bench demo --port $(PORT) $(if $(ONCE),--once)
 
 test: $(VENV)/.ready  ## the whole test suite
-	@$(BIN)/python -m pytest -n 2 --dist worksteal
+	@$(BIN)/python -m pytest -n 2 --dist worksteal --durations=40 --durations-min=1
 
 chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books; press stop while something is in its way
 	@kept=0; $(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both || kept=1; $(BIN)/python -m tests.chaos.stop_matrix --runs 5 || kept=1; exit $$kept

@@ -14,23 +14,22 @@ from bench_service.api import audit, health, metrics, procedures, recordings, re
 from bench_service.api.benches import routes as benches
 from bench_service.api.campaigns import routes as campaigns
 from bench_service.api.campaigns import schedules
-from bench_service.api.http import bodies, door, errors, headers, request_id
+from bench_service.api.http import bodies, door, errors, headers, queries, request_id, transfer
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs import routes as jobs
+from bench_service.api.openapi import document
 from bench_service.api.units import routes as units
 from bench_service.bench.devices import BenchDevices
 from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.live.values import Heartbeat, LiveBoard
-from bench_service.bench.prompts import AskedOperator, Asking
+from bench_service.bench.prompts import AskedOperator
 from bench_service.bench.safety import SafetyService
 from bench_service.bench.stop.elsewhere import StopAddresses
 from bench_service.bench.stop.road import StopRoads
 from bench_service.bench_files import BenchFiles
 from bench_service.campaigns.stores import Stores
-from bench_service.drivers.device_faults import FaultPlan
-from bench_service.drivers.device_register import DeviceRegister
-from bench_service.drivers.registered import RegisteredDevices
-from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
+from bench_service.drivers.composition import devices_of, driver_of, own_devices
+from bench_service.drivers.simulated import drawn_unit
 from bench_service.evidence.catalogue import Catalogue
 from bench_service.evidence.work_processes import WorkProcesses
 from bench_service.jobs.dispatcher import Dispatcher, JobEngine
@@ -85,7 +84,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     threadpool_limits(1)  # the matrices have at most 72 rows: BLAS threads would only spin against the bench's own
     stores, database = open_stores(settings.database_url)
     closing.callback(database.dispose)
-    driver = _driver(settings, partial(AskedOperator, stores.prompts)) if drive else None
+    driver = driver_of(settings, partial(AskedOperator, stores.prompts)) if drive else None
     holder = partial(lease_holder, database, settings.database_url)
     planner = Planner(
         stores.units,
@@ -136,17 +135,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
 
 
 def _devices(settings: Settings, bench_id: str) -> BenchDevices:
-    """A bench's devices on this host, known by their register, without driving them."""
-    return RegisteredDevices(DeviceRegister(settings.devices_in(), bench_id))
-
-
-def _driver(settings: Settings, asking: Asking) -> SimulatedDriver:
-    """The simulated bench's driver, with the state that its devices have kept."""
-    register = DeviceRegister(settings.devices_in(), settings.bench_id)
-    faults = None if settings.device_faults is None else FaultPlan.parse(settings.device_faults)
-    truths = settings.unit_truth, settings.bench_truth
-    asked = asking if settings.ask_operator else None
-    return SimulatedDriver(settings.bench_id, *truths, settings.real_time_factor, register, faults, asked)
+    """A bench's devices on this host, without driving them; of this process's own bench by its bench file."""
+    return own_devices(settings) if bench_id == settings.bench_id else devices_of(settings.devices_in(), bench_id)
 
 
 def _engine(settings: Settings, runner: JobRunner) -> JobEngine:
@@ -183,7 +173,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         version=version("bench-service"),
         lifespan=lifespan,
         generate_unique_id_function=lambda route: route.name,
-        dependencies=[Depends(bodies.only_plain_json)],
+        dependencies=[Depends(queries.only_known_names), Depends(bodies.only_plain_json)],
         docs_url=None,  # the framework's own pages load scripts from another host
         redoc_url=None,
     )
@@ -195,6 +185,7 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         app.include_router(module.router)
     for page in (static_files, docs, images, pages, campaign_pages):
         app.include_router(page.router)
+    transfer.install(app)
     app.add_middleware(bodies.Bounded)
     errors.install(app)
     app.add_middleware(door.Doorkeeper, door=rules)
@@ -203,21 +194,5 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
     app.add_middleware(headers.SecurityHeaders)
     app.add_middleware(request_id.RequestId)
     service.traces.instrument(app)
-    _declare_problem(app)
+    document.install(app, lambda: service.catalogue)
     return app
-
-
-def _declare_problem(app: FastAPI) -> None:
-    """Put the problem document into the OpenAPI components, where every route's errors point."""
-    made = app.openapi
-
-    def openapi() -> dict[str, object]:
-        if app.openapi_schema is None:
-            schema = made()
-            components = errors.Problem.model_json_schema(ref_template="#/components/schemas/{model}")
-            schemas = schema["components"]["schemas"]
-            schemas.update(components.pop("$defs"))
-            schemas["Problem"] = components
-        return app.openapi_schema or {}
-
-    app.openapi = openapi

@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 from bench_service.api.http.bodies import refuse_unfit
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.http.errors import made, problems
+from bench_service.api.http.queries import Searched
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.export import ExportFormat, export, extract
 from bench_service.formats.import_file import ImportFile
@@ -20,6 +21,7 @@ from bench_service.mapping import copied
 from bench_service.model.records import RecordingState, StoredRecording
 from bench_service.service import BenchService
 from procedures.core.errors import BadParameter
+from procedures.core.measured import Measured
 from procedures.core.recording import Channel, Station
 
 router = APIRouter(prefix="/api/v1/recordings", tags=["recordings"])
@@ -40,12 +42,16 @@ class RecordingView(BaseModel):
     duration_s: float
     start_s: float
     launched_s: float | None = Field(description="Bench time at which the unit was switched on; null: not known")
+    measured: Measured | None = Field(description="Means of encoders and supply meanwhile; null: they were not read")
     content_hash: str = Field(description="SHA-256 of samples and channel description, whatever the chunks")
     simulated: bool
     stored_bytes: int
     chunks: int
     created_at: datetime
-    source: dict[str, Any] = Field(description="Of an import: files, description, and `clock`, what its stamps say")
+    source: dict[str, Any] = Field(
+        description="Of an import: files, description, and `clock`, what its stamps say. Of a bench with a bench file: "
+        "`origin` (real, mixed or simulated) and `devices`, with identities and certificates"
+    )
     warnings: list[str] = Field(description="Of an import: what was found in the file that a person should know")
     results: list[str] | None = Field(None, description="Results that used it; only where one recording is asked for")
 
@@ -62,10 +68,13 @@ class RecordingPage(BaseModel):
     next: str | None
 
 
+BYTES = {"type": "string", "format": "binary"}
 DATA: dict[int | str, dict[str, object]] = {
     200: {
         "description": "The raw samples; scale, offset and unit of each channel travel with them",
-        "content": {form.media_type.split(";")[0]: {"schema": {"type": "string"}} for form in ExportFormat},
+        "content": {
+            form.media_type.split(";")[0]: {"schema": {"type": "string", "format": "binary"}} for form in ExportFormat
+        },
     }
 }
 
@@ -73,13 +82,17 @@ DATA: dict[int | str, dict[str, object]] = {
 @router.get("", responses=problems())
 def list_recordings(
     service: Service,
+    search: Searched,
     job: Annotated[str | None, Query(max_length=100)] = None,
     unit: Annotated[str | None, Query(max_length=100)] = None,
+    simulated: bool | None = None,
     after: After = None,
     limit: Limit = 50,
 ) -> RecordingPage:
     """List the recordings, newest first."""
-    page = service.stores.recordings.list(job_id=job, unit=unit, after=after, limit=limit)
+    page = service.stores.recordings.list(
+        job_id=job, unit=unit, simulated=simulated, search=search, after=after, limit=limit
+    )
     return RecordingPage(items=[RecordingView.of(r) for r in page.items], next=page.next)
 
 

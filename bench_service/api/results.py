@@ -9,6 +9,7 @@ from pydantic import BaseModel, Field
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.fields import NAME, Request
+from bench_service.api.http.queries import Searched
 from bench_service.evidence.analyses import AnalysisRequest
 from bench_service.mapping import copied
 from bench_service.model.records import StoredResult
@@ -89,10 +90,15 @@ def run_method(
 
 @router.get("/results", responses=problems())
 def list_results(
-    service: Service, unit: Annotated[str | None, Query(max_length=100)] = None, after: After = None, limit: Limit = 50
+    service: Service,
+    search: Searched,
+    unit: Annotated[str | None, Query(max_length=100)] = None,
+    name: Annotated[str | None, Query(max_length=100, description="Of the procedure or method")] = None,
+    after: After = None,
+    limit: Limit = 50,
 ) -> ResultPage:
     """List the results, newest first."""
-    page = service.stores.results.list(unit=unit, after=after, limit=limit)
+    page = service.stores.results.list(unit=unit, name=name, search=search, after=after, limit=limit)
     return ResultPage(items=[ResultView.of(result) for result in page.items], next=page.next)
 
 

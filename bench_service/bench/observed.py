@@ -11,7 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.bench import Bench, Chamber, Imu, Operator, Supply, Turntable
+from bench_service.bench.together import make_safe_together
+from procedures.bench import SAFE_ORDER, Bench, Chamber, Imu, Operator, Supply, Turntable
 from procedures.bench.chamber import ChamberLimits, ChamberReading
 from procedures.bench.current_source import CurrentSource, CurrentSourceLimits, CurrentSourceReading
 from procedures.bench.device import DeviceIdentity, Status
@@ -258,6 +259,14 @@ class ObservedBench(Bench):
             None if bench.current_source is None else ObservedCurrentSource(bench.current_source, observer),
         )
         self.inner = bench
+        self.safe_s = bench.safe_s
+
+    async def make_safe(self) -> None:
+        """Make the devices safe as `Bench.make_safe` does: at the same time where they have deadlines of their own."""
+        if self.safe_s:
+            await make_safe_together({d: t for d in SAFE_ORDER if (t := getattr(self, d)) is not None}, self.safe_s)
+        else:
+            await super().make_safe()
 
     def checkpoint(self) -> dict[str, Any] | None:
         return self.inner.checkpoint()

@@ -1,23 +1,29 @@
 """The commands of a bench's own host: drive it, watch over it, stop it."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 from pydantic import ValidationError
 
-from bench_service.cli.options import announce
+from bench_service.cli.options import announce, console
 from bench_service.cli.refusal import Refused
 from bench_service.settings import Settings
+
+BenchFileOption = Annotated[
+    Path | None, typer.Option("--bench-file", dir_okay=False, help="Bench file of the bench; else that of the settings")
+]
 
 
 def worker(
     context: typer.Context,
     bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
+    bench_file: BenchFileOption = None,
 ) -> None:
     """Run the jobs of a bench, without HTTP, until SIGTERM or SIGINT. Its running job is left for the next start."""
     from bench_service.cli.working import work
 
-    settings = of_bench(context.obj, bench)
+    settings = of_bench(context.obj, bench, bench_file)
     work(settings, announce)
 
 
@@ -25,6 +31,7 @@ def supervise(
     context: typer.Context,
     bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
     companion: Annotated[bool, typer.Option(help="End with the process that drives the bench")] = False,
+    bench_file: BenchFileOption = None,
 ) -> int:
     """Watch a bench on its own host, and make it safe where the process that drives it is gone or hangs.
 
@@ -32,7 +39,7 @@ def supervise(
     """
     from bench_service.cli.supervising import supervise as watch_over
 
-    settings = of_bench(context.obj, bench)
+    settings = of_bench(context.obj, bench, bench_file)
     return watch_over(settings, companion, announce)
 
 
@@ -52,9 +59,28 @@ def stop(
     return stop_here(settings.bench_id, settings.devices_in(), reason, wait, announce)
 
 
-def of_bench(settings: Settings, bench: str | None) -> Settings:
-    """Return the settings of another bench. Raises `Refused` for a name that no bench can have."""
+def check_file(
+    context: typer.Context,
+    bench_file: Annotated[Path, typer.Argument(dir_okay=False, help="The bench file")],
+    ask: Annotated[bool, typer.Option("--connect", help="Ask the devices; nothing is commanded")] = False,
+) -> int:
+    """Check a bench file, its units and drivers; with --connect the devices too. Exit code 1: something is refused."""
+    from bench_service.cli.checking import check_bench_file
+
+    return check_bench_file(bench_file, ask, console)
+
+
+def of_bench(settings: Settings, bench: str | None, bench_file: Path | None = None) -> Settings:
+    """Return the settings of another bench, or of the bench of a file.
+
+    Raises `Refused` for a name that no bench can have.
+    """
+    given = settings.model_dump()
+    if bench_file is not None:
+        given = {name: value for name, value in given.items() if name != "bench_id"} | {"bench_file": bench_file}
+    if bench is not None:
+        given["bench_id"] = bench
     try:
-        return Settings.model_validate({**settings.model_dump(), "bench_id": bench or settings.bench_id})
+        return Settings.model_validate(given)
     except ValidationError as error:
         raise Refused(f"--bench {bench}: {error.errors()[0]['msg']}") from error

@@ -69,12 +69,13 @@ def serve(
     host: Annotated[str | None, typer.Option(help="Address to listen on")] = None,
     port: Annotated[int | None, typer.Option(help="Port to listen on")] = None,
     no_worker: Annotated[bool, typer.Option("--no-worker", help="Drive no bench: workers of the database do")] = False,
+    bench_file: bench_commands.BenchFileOption = None,
 ) -> None:
     """Serve the API and the pages, and run jobs on the bench, until interrupted."""
     from bench_service.cli.companion import accompanied
     from bench_service.cli.serving import check_port, ready
 
-    settings = _with(context.obj, host=host, port=port)
+    settings = bench_commands.of_bench(_with(context.obj, host=host, port=port), None, bench_file)
     check_port(settings)
     if no_worker or not settings.drive:
         with ready(settings, drive=False, level="info") as server:
@@ -91,6 +92,7 @@ def serve(
 
 for _command in (bench_commands.worker, bench_commands.supervise, bench_commands.stop):
     app.command()(_command)
+app.command("check-file")(bench_commands.check_file)
 
 
 @app.command()

@@ -126,6 +126,7 @@ def _spawn(settings: Settings) -> Process:
         "BENCH_DATABASE_URL": settings.database_url,
         "BENCH_ID": settings.bench_id,
         "BENCH_DEVICE_FOLDER": str(folder),
+        **({} if settings.bench_file is None else {"BENCH_FILE": str(settings.bench_file)}),
     }
     with log_of(settings).open("ab") as log_file:
         return subprocess.Popen(

@@ -50,6 +50,9 @@ def analysed(
     context = context_of(job)
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
     outcome = analyse_procedure(procedure, recordings, params, context)
+    overdue = context.bench.overdue(job.created_at.date().isoformat())
+    if overdue:
+        outcome = outcome.model_copy(update={"warnings": (*overdue, *outcome.warnings)})
     used = context.unit.calibration_id if procedure.uses_calibration else None
     corrections = (context.unit.correction_id(kind) for kind in procedure.uses_corrections(params))
     stored = StoredResult(

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench_service.model.records import NewRecording, Page, StoredRecording
+from bench_service.model.search import EVERYTHING, Search
+from procedures.core.measured import Measured
 from procedures.core.recording import RawArray, Recording, RecordingInfo
 
 
@@ -21,8 +23,11 @@ class RecordingWriter(Protocol):
         """Append samples, shape (n, channels), in the order of the channels. Raises `StorageFull`."""
         ...
 
-    def seal(self, checkpoint: dict[str, Any] | None = None) -> RecordingInfo:
-        """Write the rest, the count and the content hash, with the world's checkpoint. Raises `StorageFull`."""
+    def seal(self, checkpoint: dict[str, Any] | None = None, measured: Measured | None = None) -> RecordingInfo:
+        """Write the rest, the count and the content hash, with the world's checkpoint and what devices read meanwhile.
+
+        Raises `StorageFull`.
+        """
         ...
 
     def abandon(self) -> None:
@@ -43,7 +48,14 @@ class RecordingStore(Protocol):
         ...
 
     def list(
-        self, *, job_id: str | None = None, unit: str | None = None, after: str | None = None, limit: int = 50
+        self,
+        *,
+        job_id: str | None = None,
+        unit: str | None = None,
+        simulated: bool | None = None,
+        search: Search = EVERYTHING,
+        after: str | None = None,
+        limit: int = 50,
     ) -> Page[StoredRecording]: ...
 
     def of_job(self, job_id: str) -> tuple[StoredRecording, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from bench_service.model.records import Idempotency, Page, ResultValue, StoredCalibration, StoredResult
+from bench_service.model.search import EVERYTHING, Search
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.unit_correction import UnitCorrection
 
@@ -34,7 +35,14 @@ class ResultStore(Protocol):
         ...
 
     def list(
-        self, *, job_id: str | None = None, unit: str | None = None, after: str | None = None, limit: int = 50
+        self,
+        *,
+        job_id: str | None = None,
+        unit: str | None = None,
+        name: str | None = None,
+        search: Search = EVERYTHING,
+        after: str | None = None,
+        limit: int = 50,
     ) -> Page[StoredResult]: ...
 
     def newest_verdict(self, unit: str, procedure: str, *, simulated: bool) -> StoredResult | None:

@@ -13,6 +13,7 @@ from bench_service.jobs.queue import QueueStore
 from bench_service.jobs.reservation import ReservationStore
 from bench_service.model.job import Event, Failure, Job, JobState
 from bench_service.model.records import Idempotency, Page
+from bench_service.model.search import EVERYTHING, Search
 from procedures.core.limits import Verdict
 
 
@@ -38,6 +39,8 @@ class JobStore(Protocol):
         state: JobState | None = None,
         procedure: str | None = None,
         unit: str | None = None,
+        bench: str | None = None,
+        search: Search = EVERYTHING,
         after: str | None = None,
         limit: int = 50,
     ) -> Page[Job]: ...

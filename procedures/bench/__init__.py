@@ -1,6 +1,6 @@
 """PORTS, the interfaces of a bench. A driver or a simulator implements them; a procedure sees only these."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from procedures.bench.chamber import Chamber
@@ -47,6 +47,8 @@ class Bench:
     chamber: Chamber | None = None
     operator: Operator | None = None
     current_source: CurrentSource | None = None
+    safe_s: dict[str, float] = field(default_factory=dict[str, float])
+    """Time within which each real device must be safe [s]; empty: devices are made safe one after the other."""
 
     async def make_safe(self) -> None:
         """Stop the table, lead the chamber to ambient, take the current away, switch the unit off.

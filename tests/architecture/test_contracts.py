@@ -52,6 +52,17 @@ def test_migrations_import_nothing_of_the_product() -> None:
     assert not imports, f"copy what the migration needs into it, as it is today: {imports}"
 
 
+def test_what_tests_share_lives_in_the_kit() -> None:
+    """An import of another test module runs its tests' set-up, and ties two subjects that have nothing in common."""
+    imports = {
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in (ROOT / "tests").rglob("test_*.py")
+        for name in _imported(path)
+        if name.startswith("tests.") and name.rsplit(".", 1)[-1].startswith("test_")
+    }
+    assert not imports, f"move what is shared into tests/kit: {imports}"
+
+
 def _imported(path: Path) -> Iterator[str]:
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom):

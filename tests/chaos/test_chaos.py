@@ -1,4 +1,4 @@
-"""A small chaos run on each database, and proof that its checkers see what they are there to see."""
+"""A small chaos run on Postgres, and proof that its checkers see what they are there to see."""
 
 import json
 import shutil
@@ -34,10 +34,10 @@ def undisturbed(folder: Path) -> Twins:
     return twins(folder)
 
 
-@pytest.mark.parametrize("kind", ["sqlite", "postgres"])
-def test_every_promise_is_kept_while_processes_are_killed(kind: str, tmp_path: Path, undisturbed: Twins) -> None:
-    finding = storm(kind, tmp_path / kind, KILLS, 3, undisturbed)
-    print(f"\n{kind}", *finding.figures, sep="\n")
+def test_every_promise_is_kept_while_processes_are_killed(tmp_path: Path, undisturbed: Twins) -> None:
+    """On Postgres, where the database ends too; `make chaos` has both databases and twenty times the kills."""
+    finding = storm("postgres", tmp_path / "postgres", KILLS, 3, undisturbed)
+    print("", *finding.figures, sep="\n")
     assert not finding.violations, "\n".join(finding.violations)
     assert finding.kills >= KILLS
 

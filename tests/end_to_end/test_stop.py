@@ -22,7 +22,7 @@ from bench_service.wall_clock import pause
 from tests.chaos.stop_hindrances import NotHere, recording_of
 from tests.chaos.stop_matrix import MATRIX, press
 from tests.end_to_end.bench_process import BenchProcess
-from tests.service.test_safety import abandoned
+from tests.kit.abandoned_bench import abandoned
 
 
 @pytest.mark.parametrize(

@@ -3,11 +3,13 @@
 from typing import Any
 
 from bench_service.wall_clock import monotonic_s, pause
+from tests.kit.thermal_plan import SHORT as THERMAL
 from tests.service.client import Client
 
 SHORT = {"dwell_s": 2.0, "settle_s": 0.5}
 SCALED_DOWN: dict[str, dict[str, Any]] = {
     "static": {"launches": 1, "duration_s": 600.0, "off_time_s": 10.0, "wavelet_levels": 4},
+    "thermal": THERMAL,
     "calibration_1": SHORT,
     "calibration_2": SHORT,
     "calibration_3": SHORT,

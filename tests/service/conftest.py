@@ -1,6 +1,8 @@
 """A real service over a real HTTP client, on SQLite and on Postgres."""
 
-from collections.abc import Generator
+import subprocess
+import sys
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import pytest
@@ -30,3 +32,11 @@ def sqlite_client(tmp_path_factory: pytest.TempPathFactory) -> Generator[Client]
     url = f"sqlite:///{Path(tmp_path_factory.mktemp('service')) / 'bench.sqlite'}"
     with connect(Settings(database_url=url), None, drive=True) as http:
         yield Client(http)
+
+
+@pytest.fixture
+def worker() -> Iterator[subprocess.Popen[bytes]]:
+    """A process that does nothing, until it is killed."""
+    with subprocess.Popen([sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE) as made:
+        yield made
+        made.kill()

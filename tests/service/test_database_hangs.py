@@ -26,13 +26,11 @@ from bench_service.wall_clock import monotonic_s, pause
 from procedures.bench import Bench
 from tests.chaos.databases import OwnPostgres, database
 from tests.database_away import hung
+from tests.kit.abandoned_bench import abandoned
+from tests.kit.begun_job import prepared
+from tests.kit.failing_driver import IMPATIENT, FailingDriver
+from tests.kit.supervised_bench import GONE, Watch, identity, state
 from tests.service.client import Client
-from tests.service.test_runner import prepared
-from tests.service.test_safety import abandoned
-from tests.service.test_supervisor import GONE, Watch, identity, state, worker
-from tests.service.test_watchdog import IMPATIENT, FailingDriver
-
-__all__ = ["worker"]
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ import pytest
 from bench_service.cli import logs
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
+from tests.kit.logged_service import process
 from tests.service.campaigns import add, named, start
-from tests.service.test_logs_and_traces import process
 
 FORGED = (
     "smoke\r\n2031-05-06T07:08:09.123Z INFO    bench_service.jobs: ended as succeeded \x1b[2J\x07\x9b31m\u2028x\u202ey"

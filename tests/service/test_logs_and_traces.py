@@ -1,9 +1,6 @@
 """What a real process tells the outside: lines as JSON with what they are about, and a trace of every job."""
 
 import json
-import os
-import subprocess
-import sys
 import threading
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -11,13 +8,13 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from uuid import UUID
 
-import httpx
 import pytest
 from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTraceServiceRequest
 
-from bench_service.wall_clock import monotonic_s, pause
+from bench_service.wall_clock import monotonic_s
+from tests.kit.logged_service import process
 from tests.service.campaigns import add, ended, named, start
-from tests.service.client import FAST, Client
+from tests.service.client import FAST
 
 
 class Collector(ThreadingHTTPServer):
@@ -58,32 +55,6 @@ def collector(broken: bool = False) -> Generator[Collector]:
         finally:
             server.shutdown()
             thread.join()
-
-
-@contextmanager
-def process(folder: Path, port: int, **environment: str) -> Generator[tuple[Client, Path]]:
-    """The service as a process of its own; its lines are in the file."""
-    lines = folder / "lines"
-    settings = {"BENCH_DATABASE_URL": f"sqlite:///{folder}/bench.sqlite", "BENCH_PORT": str(port), **environment}
-    with lines.open("wb") as sink:
-        running = subprocess.Popen(
-            [sys.executable, "-m", "bench_service", "serve"], env={**os.environ, **settings}, stderr=sink
-        )
-    with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60) as http:
-        try:
-            deadline = monotonic_s() + 60
-            while True:
-                try:
-                    http.get("/readyz")
-                    break
-                except httpx.TransportError:
-                    assert running.poll() is None, lines.read_text()
-                    assert monotonic_s() < deadline
-                    pause(0.05)
-            yield Client(http), lines
-        finally:
-            running.terminate()
-            running.wait(30)
 
 
 def attributes(span) -> dict:

@@ -23,9 +23,12 @@ from bench_service.wall_clock import monotonic_s, now, pause
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import Disconnected
 from procedures.core.table_angles import TableAngles
+from tests.kit.abandoned_bench import abandoned
+from tests.kit.thermal_plan import SHORT
 from tests.service.client import Client
-from tests.service.test_safety import BENCH, RELEASE, abandoned
-from tests.service.test_thermal_cycle import SHORT
+
+RELEASE, BENCH = "/api/v1/benches/sim/release", "/api/v1/benches/sim"
+
 
 CHAMBER = "the chamber cannot be reached: its link is lost"
 

@@ -148,3 +148,78 @@ def test_the_service_keeps_to_its_document_whatever_it_is_sent(address: str, tmp
     arguments += ["--phases", "coverage,fuzzing,stateful", "--max-examples", "15", "--seed", "1"]
     done = subprocess.run([command, *arguments], capture_output=True, text=True, timeout=220, cwd=tmp_path, check=False)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
+
+
+def schemas_in(node: Any) -> Iterator[dict[str, Any]]:
+    """Every schema of a document: of the components, and of parameters, bodies and answers, with what they contain."""
+    if isinstance(node, list):
+        for child in node:
+            yield from schemas_in(child)
+    if isinstance(node, dict):
+        if node.keys() & {"type", "$ref", "anyOf", "oneOf", "allOf", "enum", "const"} and not isinstance(
+            node.get("type"), dict
+        ):
+            yield node
+        for key, child in node.items():
+            if key not in ("default", "example", "examples", "const", "enum", "discriminator"):
+                yield from schemas_in(child)
+
+
+def test_each_schema_has_one_name_that_is_its_only_title(document: dict[str, Any]) -> None:
+    components = document["components"]["schemas"]
+    assert [name for name in components if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", name)] == []
+    assert {name: schema["title"] for name, schema in components.items()} == {name: name for name in components}
+    titles = [schema["title"] for schema in schemas_in(document) if isinstance(schema.get("title"), str)]
+    assert sorted(titles) == sorted(components), "a title below the components would name a second type"
+
+
+def test_every_list_says_what_is_in_it(document: dict[str, Any]) -> None:
+    lists = [schema for schema in schemas_in(document) if schema.get("type") == "array"]
+    assert len(lists) > 100
+    assert [schema for schema in lists if not isinstance(schema.get("items"), dict)] == []
+
+
+def test_the_document_says_where_it_is_served_who_may_ask_and_what_its_tags_are(document: dict[str, Any]) -> None:
+    assert [server["url"] for server in document["servers"]] == ["/"]
+    assert document["info"]["license"]["identifier"] == "MIT"
+    assert document["info"]["contact"]
+    used = {tag for _, operation in operations(document) for tag in operation["tags"]}
+    assert used == {tag["name"] for tag in document["tags"] if tag["description"]}
+    named = {name for way in document["security"] for name in way}
+    assert named == set(document["components"]["securitySchemes"]) != set()
+
+
+def test_each_schema_is_used(document: dict[str, Any]) -> None:
+    found = {reference.rpartition("/")[2] for reference in references(document)}
+    by_themselves = {"EventView", "BenchLive"}
+    assert set(document["components"]["schemas"]) - found <= by_themselves
+
+
+def test_files_and_samples_are_binary_and_the_description_of_files_is_a_schema(document: dict[str, Any]) -> None:
+    form = document["paths"]["/api/v1/recordings"]["post"]["requestBody"]["content"]["multipart/form-data"]
+    upload = document["components"]["schemas"][form["schema"]["$ref"].rpartition("/")[2]]["properties"]
+    assert upload["files"]["items"] == {"type": "string", "format": "binary"}
+    assert upload["description"] == {"$ref": "#/components/schemas/ImportDescription"}
+    assert form["encoding"]["description"]["contentType"] == "application/json"
+    data = document["paths"]["/api/v1/recordings/{recording_id}/data"]["get"]["responses"]["200"]["content"]
+    assert len(data) == 3
+    assert all(body["schema"] == {"type": "string", "format": "binary"} for body in data.values())
+    assert "contentMediaType" not in str(document)
+
+
+def test_each_procedure_and_method_has_a_schema_of_its_result(document: dict[str, Any], address: str) -> None:
+    catalogue = {
+        (kind, entry["name"]): entry
+        for kind, path in (("procedure", "procedures"), ("method", "methods"))
+        for entry in httpx.get(f"{address}/api/v1/{path}", timeout=60).json()
+    }
+    schemas = document["components"]["schemas"]
+    mapping: dict[str, str] = schemas["ResultView"]["discriminator"]["mapping"]
+    assert [one["$ref"] for one in schemas["ResultView"]["oneOf"]] == list(mapping.values())
+    assert set(mapping) == {name for _, name in catalogue}
+    for (kind, name), entry in catalogue.items():
+        properties = schemas[mapping[name].rpartition("/")[2]]["properties"]
+        assert (properties["kind"]["const"], properties["name"]["const"]) == (kind, name)
+        body = schemas[properties["document"]["$ref"].rpartition("/")[2]]
+        assert set(body["properties"]) == set(entry["result"]["properties"])
+        assert body["required"] == entry["result"]["required"]

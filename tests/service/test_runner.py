@@ -1,6 +1,6 @@
 """Steps of a job that end badly: the lease is lost, the bench cannot be made safe, the engine does not start."""
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -9,53 +9,22 @@ from typing import Any
 
 import pytest
 
-from bench_service.bench.directory import BenchDirectory
-from bench_service.bench.safety import SafetyService
 from bench_service.bench.session import ShuttingDown
 from bench_service.campaigns.stores import Stores
 from bench_service.drivers.device_register import DeviceRegister
-from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
-from bench_service.evidence.catalogue import Catalogue
+from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs.dispatcher import Dispatcher, Unfinished
-from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.runner import JobRunner, StepOutcome
 from bench_service.jobs.worker import Worker
 from bench_service.model.errors import NotReady
-from bench_service.model.job import Failure, Job, JobState
-from bench_service.model.request import JobRequest
+from bench_service.model.job import Failure, JobState
 from bench_service.persistence import open_stores
 from bench_service.service import BenchService
 from bench_service.wall_clock import new_id, now, pause
 from procedures.bench import Bench, BenchNeeds
 from procedures.bench.errors import DeviceFault
-from tests.service.client import FAST
-
-
-class IdleEngine:
-    """An engine that runs nothing: here the test takes the steps."""
-
-    def launch(self) -> None: ...
-
-    def run(self, job: Job) -> None: ...
-
-    def unfinished(self, job: QueueEntry) -> Unfinished:
-        return Unfinished()
-
-    def shut_down(self) -> None: ...
-
-
-class IdleDispatcher:
-    """A dispatcher that claims nothing."""
-
-    def begin(self) -> None: ...
-
-    def wake(self) -> None: ...
-
-    def lease_held(self) -> bool:
-        return True
-
-    def shut_down(self) -> None: ...
+from tests.kit.begun_job import IdleDispatcher, IdleEngine, planner_of, prepared, safety_of
 
 
 class SureLease:
@@ -68,14 +37,6 @@ class SureLease:
         return True
 
     def release(self) -> None: ...
-
-
-class NoWatch:
-    """A host on which nobody says who drives the bench."""
-
-    def driving(self) -> None: ...
-
-    def supervisor(self) -> None: ...
 
 
 class JammedDriver(SimulatedDriver):
@@ -103,33 +64,6 @@ def stores(sqlite_url: str) -> Generator[Stores]:
     made, database = open_stores(sqlite_url)
     yield made
     database.dispose()
-
-
-def planner_of(stores: Stores, driver: SimulatedDriver) -> Planner:
-    benches = BenchDirectory(stores.benches, stores.units, driver, "sim", drawn_unit, lambda _: "this process")
-    return Planner(stores.units, benches, Catalogue())
-
-
-def safety_of(stores: Stores, driver: SimulatedDriver) -> SafetyService:
-    return SafetyService(stores.benches, lambda _: driver, lambda _: NoWatch(), stores.jobs.note)
-
-
-def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], bool]) -> tuple[JobRunner, Job]:
-    """A runner, and a job of its that has begun."""
-    planner = planner_of(stores, driver)
-    runner = JobRunner(stores, planner, driver, "test", lease_held)
-    worker = Worker(runner, lambda _: IdleEngine(), lambda *_: IdleDispatcher())
-    service = BenchService(stores, driver, planner, worker, "test", safety_of(stores, driver))
-    service.register()
-    service.begin()
-    job = service.jobs.submit(
-        JobRequest(procedure="calibration_12_orientations", unit="SIM-0001", parameters=FAST, seed=1)
-    )
-    entry = stores.queue.look("sim", now()).next()
-    assert entry is not None
-    assert runner.claim(entry) is not None
-    assert runner.stations(job.id, 1) == 12
-    return runner, job
 
 
 def test_without_the_lease_no_station_is_begun(stores: Stores) -> None:

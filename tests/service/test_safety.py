@@ -1,6 +1,5 @@
 """What a stop and a release say, over HTTP: with the worker alive, dead, elsewhere; and who sees to the bench."""
 
-import os
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
@@ -11,12 +10,12 @@ import pytest
 from bench_service.bench import safety
 from bench_service.bench.processes import ProcessIdentity
 from bench_service.cli.client import connect
-from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.persistence import open_stores
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.settings import Settings
 from bench_service.wall_clock import now
+from tests.kit.abandoned_bench import abandoned
 from tests.service.client import Client
 
 STOP, RELEASE, BENCH = ("/api/v1/benches/sim/stop", "/api/v1/benches/sim/release", "/api/v1/benches/sim")
@@ -35,18 +34,6 @@ def reader(url: str) -> Generator[httpx.Client]:
     database.dispose()
     with connect(Settings(database_url=url), None, drive=False) as http:
         yield http
-
-
-def abandoned(folder: Path, job: str | None = None) -> DeviceRegister:
-    """What a process leaves that was killed in a move."""
-    register = DeviceRegister(folder, "sim")
-    link = register.open(by="process 4711 on bench-host", job=job)
-    link.note("supply.switch_on", {}, powered=True)
-    link.note("turntable.move_to", {}, table="moving")
-    assert link._file is not None
-    os.close(link._file)  # its death closes the file, and writes nothing
-    link._file = None
-    return register
 
 
 def test_a_stop_with_worker_and_supervisor_dead_says_so_and_makes_the_bench_safe(

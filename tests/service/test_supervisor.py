@@ -3,117 +3,21 @@ jump. Real files and real processes; `tests/end_to_end/test_supervisor.py` has i
 """
 
 import subprocess
-import sys
-from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from bench_service import wall_clock
-from bench_service.bench.devices import BenchDevices, DeviceState
-from bench_service.bench.heartbeat import HeartbeatFile
-from bench_service.bench.processes import Driving, ProcessIdentity
-from bench_service.bench.stop.channel import StopChannel
-from bench_service.bench.stop.word import StopWord
+from bench_service.bench.devices import DeviceState
+from bench_service.bench.processes import Driving
 from bench_service.bench.supervisor import Supervisor
-from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.model.errors import BenchBusy, StorageFailure
-from bench_service.model.records import BenchStop
 from bench_service.wall_clock import monotonic_s, pause
 from procedures.bench.errors import DeviceFault
-from tests.service.test_safety import abandoned
-
-GONE = Driving(ProcessIdentity("nowhere", 1, "never"))
-
-
-class Books:
-    """A database that can be switched off."""
-
-    def __init__(self) -> None:
-        self.answers = True
-        self.is_stopped = False
-        self.by_hand = BenchStop("sim", wall_clock.now(), "a test")
-        self.entered: dict[str, BenchStop] = {}
-        self.said: list[str] = []
-        self.confirmed = ""
-
-    def _ask(self) -> None:
-        if not self.answers:
-            raise StorageFailure("the database failed: it is restarted")
-
-    def standing(self) -> tuple[BenchStop, ...]:
-        self._ask()
-        by_hand = (self.by_hand,) if self.is_stopped else ()
-        return (*by_hand, *self.entered.values())
-
-    def enter(self, word: StopWord) -> None:
-        self._ask()
-        self.entered[word.id] = BenchStop("sim", word.at, word.reason, by=word.by, id=word.id)
-
-    def confirm_safe(self, by: str) -> None:
-        self._ask()
-        self.confirmed = by
-
-    def stop(self, reason: str, by: str) -> None:
-        self._ask()
-        self.is_stopped = True
-        self.said.append(f"stopped: {reason}")
-
-    def note(self, by: str, text: str, job: str | None) -> None:
-        self._ask()
-        self.said.append(f"{job}: {text}")
-
-
-class Watch:
-    """What the files of the host would say."""
-
-    def __init__(self, driving: Driving | None) -> None:
-        self.now = driving
-
-    def driving(self) -> Driving | None:
-        return self.now
-
-    def supervisor(self) -> ProcessIdentity | None:
-        return None
-
-
-class Lease:
-    def __init__(self) -> None:
-        self.taken = self.given_back = 0
-
-    def take(self) -> "Lease":
-        self.taken += 1
-        return self
-
-    def release(self) -> None:
-        self.given_back += 1
-
-
-@pytest.fixture
-def worker() -> Iterator[subprocess.Popen[bytes]]:
-    """A process that does nothing, until it is killed."""
-    with subprocess.Popen([sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE) as made:
-        yield made
-        made.kill()
-
-
-def identity(worker: subprocess.Popen[bytes]) -> ProcessIdentity:
-    return ProcessIdentity(ProcessIdentity.own().host, worker.pid, started(worker.pid))
-
-
-def started(pid: int) -> str:
-    from bench_service.bench import processes
-
-    return processes._started(pid)
-
-
-def state(folder: Path) -> DeviceState:
-    found = DeviceRegister(folder, "sim").read()
-    assert found is not None
-    return found
+from tests.kit.abandoned_bench import abandoned
+from tests.kit.supervised_bench import GONE, Books, Lease, Watch, identity, state, supervised
 
 
 def test_the_lease_is_taken_the_bench_made_safe_the_lease_given_back_and_all_of_it_noted(tmp_path: Path) -> None:
@@ -222,15 +126,6 @@ def test_devices_that_do_not_obey_stop_the_bench_once_and_are_tried_again(tmp_pa
         "stopped: could not be made safe: the brake does not close"
     ]
     assert books.is_stopped, "a person must look, though it obeyed in the end"
-
-
-def supervised(
-    folder: Path, devices: BenchDevices, watch: Watch, books: Books, take_lease: Any, **how: float
-) -> Supervisor:
-    """A supervisor with the channel and the heartbeat of a folder."""
-    channel = StopChannel(folder, "sim")
-    channel.prepare()
-    return Supervisor("sim", devices, watch, books, take_lease, channel, HeartbeatFile(folder, "sim"), **how)
 
 
 def until_safe(supervisor: Supervisor, folder: Path) -> None:

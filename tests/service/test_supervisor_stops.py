@@ -13,10 +13,8 @@ from bench_service.bench.supervisor import Supervisor
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.wall_clock import monotonic_s, pause
-from tests.service.test_safety import abandoned
-from tests.service.test_supervisor import GONE, Books, Lease, Watch, identity, state, supervised, worker
-
-__all__ = ["worker"]
+from tests.kit.abandoned_bench import abandoned
+from tests.kit.supervised_bench import GONE, Books, Lease, Watch, identity, state, supervised
 
 
 def look_for(supervisor: Supervisor, seconds: float) -> None:

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.domain.test_table_program import APPENDIX, HOME
 from tests.kit.forward_model import B_ACCELEROMETER, K_ACCELEROMETER, turn
+from tests.kit.table_programs import APPENDIX, HOME
 from tests.service.client import Client
 
 G = 9.810553

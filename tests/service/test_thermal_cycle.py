@@ -12,20 +12,9 @@ import pytest
 from bench_service.cli.client import connect
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
+from tests.kit.thermal_plan import SHORT, leg
 from tests.service.client import ENDED, Client
 from tests.service.page import drawn
-
-
-def leg(target_c: float) -> dict[str, float]:
-    return {"target_c": target_c, "ramp_c_min": 5.0, "least_soak_s": 1200.0, "longest_s": 14_400.0}
-
-
-SHORT = {
-    "legs": [leg(20.0), leg(-20.0), leg(50.0)],
-    "soak": {"slope_c_min": 0.3},
-    "power_off_s": 1800.0,
-    "sample_rate_hz": 1.0,
-}
 
 
 @pytest.fixture(scope="module")

@@ -22,30 +22,9 @@ from bench_service.model.job import Job, JobState
 from bench_service.persistence import open_stores
 from bench_service.wall_clock import monotonic_s
 from procedures.bench import Bench, BenchNeeds
-from procedures.bench.errors import BenchError
 from procedures.bench.imu import Stream
-from tests.service.test_runner import prepared
-
-IMPATIENT = Patience(0.4, 0.4, 0.8, 0.4)
-
-
-class FailingDriver(SimulatedDriver):
-    """A simulated bench, and something that is done to it once it is open."""
-
-    def __init__(self, folder: Path, change: Callable[[Bench], None] = lambda _: None, **given: Any) -> None:
-        super().__init__("sim", register=DeviceRegister(folder, "sim"), **given)
-        self.change = change
-        self.unreachable = False
-
-    def open(self, unit: str, seed: int | None, checkpoint: Any, needs: BenchNeeds, job: str | None = None) -> Bench:
-        bench = super().open(unit, seed, checkpoint, needs, job)
-        self.change(bench)
-        return bench
-
-    def make_safe(self, by: str) -> Any:
-        if self.unreachable:
-            raise BenchError("nothing answers on the table's line")
-        return super().make_safe(by)
+from tests.kit.begun_job import prepared
+from tests.kit.failing_driver import IMPATIENT, FailingDriver
 
 
 async def never(*_: object) -> None:

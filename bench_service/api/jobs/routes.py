@@ -8,6 +8,7 @@ from fastapi.responses import JSONResponse, StreamingResponse
 
 from bench_service.api.http.dependencies import After, Hub, IdempotencyKey, Limit, RequestedBy, Service
 from bench_service.api.http.errors import made, problems
+from bench_service.api.http.queries import Searched
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs.schemas import (
     ForeignJob,
@@ -74,14 +75,18 @@ def _view(service: BenchService, job: Job) -> JobView:
 @router.get("", responses=problems())
 def list_jobs(
     service: Service,
+    search: Searched,
     state: JobState | None = None,
     procedure: Annotated[str | None, Query(max_length=100)] = None,
     unit: Annotated[str | None, Query(max_length=100)] = None,
+    bench: Annotated[str | None, Query(max_length=100)] = None,
     after: After = None,
     limit: Limit = 50,
 ) -> JobPage:
     """List the jobs, newest first."""
-    page = service.stores.jobs.list(state=state, procedure=procedure, unit=unit, after=after, limit=limit)
+    page = service.stores.jobs.list(
+        state=state, procedure=procedure, unit=unit, bench=bench, search=search, after=after, limit=limit
+    )
     standing = service.queues.standing(page.items)
     items = [JobView.of(job, standing[job.id], service.live.of_job(job)) for job in page.items]
     return JobPage(items=items, next=page.next)

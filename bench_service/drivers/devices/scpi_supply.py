@@ -106,10 +106,7 @@ class ScpiSupply:
         return SupplyReading(self._clock.now_s(), on, voltage, current, mode == "CC", tripped, set_v, set_a, status)
 
     async def make_safe(self) -> None:
-        """Switch the output off, unless the section says that the unit keeps its power; see the port."""
-        if self._section.on_safe == "hold":
-            await self._query("OUTP?", scpi.switch)
-            return
+        """Switch the output off; see the port."""
         await self.switch_off()
 
     def close(self) -> None:

@@ -158,8 +158,7 @@ class SupplySection(DeviceSection):
     """Section ``[supply]``."""
 
     limits: SupplyBounds | None = None
-    on_safe: Literal["off", "hold"] = "off"
-    """"hold": the unit keeps its power when the bench is made safe, for a unit that must not be switched off."""
+    on_safe: Literal["off"] = "off"
 
 
 class WireSupply(SupplySection, Wire):

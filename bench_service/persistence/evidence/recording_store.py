@@ -15,11 +15,13 @@ from bench_service.formats.chunk import sample_type
 from bench_service.formats.content_hash import ContentHash
 from bench_service.model.errors import DamagedRecording, NotFound
 from bench_service.model.records import NewRecording, Page, RecordingState, StoredRecording
+from bench_service.model.search import EVERYTHING, Search
 from bench_service.persistence.database import Database
 from bench_service.persistence.evidence.chunk_reader import ChunkReader
 from bench_service.persistence.evidence.recording_rows import info_of_row, stored_of_row
 from bench_service.persistence.evidence.recording_writer import SqlRecordingWriter
 from bench_service.persistence.pages import page
+from bench_service.persistence.searching import find_recordings
 from bench_service.persistence.tables.evidence import ChunkRow, RecordingRow
 from procedures.core.recording import RawArray, RecordingInfo
 
@@ -60,13 +62,22 @@ class SqlRecordingStore:
             return stored_of_row(_found(session, recording_id))
 
     def list(
-        self, *, job_id: str | None = None, unit: str | None = None, after: str | None = None, limit: int = 50
+        self,
+        *,
+        job_id: str | None = None,
+        unit: str | None = None,
+        simulated: bool | None = None,
+        search: Search = EVERYTHING,
+        after: str | None = None,
+        limit: int = 50,
     ) -> Page[StoredRecording]:
-        query = select(RecordingRow).where(RecordingRow.state != _OPEN)
+        query = find_recordings(select(RecordingRow).where(RecordingRow.state != _OPEN), search)
         if job_id is not None:
             query = query.where(RecordingRow.job_id == job_id)
         if unit is not None:
             query = query.where(RecordingRow.unit == unit)
+        if simulated is not None:
+            query = query.where(RecordingRow.simulated == simulated)
         with self._database.read() as session:
             return page(session, query, RecordingRow.id, after, limit, stored_of_row)
 

@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session
 from bench_service import wall_clock
 from bench_service.model.errors import NotFound
 from bench_service.model.records import Idempotency, Page, ResultValue, StoredCalibration, StoredResult
+from bench_service.model.search import EVERYTHING, Search
 from bench_service.persistence.database import Database
 from bench_service.persistence.evidence.correction_rows import add_corrections, check_corrections, correction_lineage
 from bench_service.persistence.evidence.result_rows import (
@@ -24,6 +25,7 @@ from bench_service.persistence.evidence.result_rows import (
 from bench_service.persistence.evidence.result_values import newest_first, of_verdicts, value_of_row, values_query
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.pages import page
+from bench_service.persistence.searching import find_results
 from bench_service.persistence.tables.evidence import (
     CalibrationRow,
     RecordingRow,
@@ -77,13 +79,22 @@ class SqlResultStore:
             return _results(session, [_found(session, result_id)])[0]
 
     def list(
-        self, *, job_id: str | None = None, unit: str | None = None, after: str | None = None, limit: int = 50
+        self,
+        *,
+        job_id: str | None = None,
+        unit: str | None = None,
+        name: str | None = None,
+        search: Search = EVERYTHING,
+        after: str | None = None,
+        limit: int = 50,
     ) -> Page[StoredResult]:
-        query = select(ResultRow)
+        query = find_results(select(ResultRow), search)
         if job_id is not None:
             query = query.where(ResultRow.job_id == job_id)
         if unit is not None:
             query = query.where(ResultRow.unit == unit)
+        if name is not None:
+            query = query.where(ResultRow.name == name)
         with self._database.read() as session:
             rows = page(session, query, ResultRow.id, after, limit, _itself)
             return Page(_results(session, rows.items), rows.next)

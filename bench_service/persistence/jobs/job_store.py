@@ -14,11 +14,13 @@ from sqlalchemy import func, select
 from bench_service.model.errors import IllegalTransition, NotFound, NotUnderstood
 from bench_service.model.job import FINAL, Event, Failure, Job, JobState
 from bench_service.model.records import Idempotency, Page
+from bench_service.model.search import EVERYTHING, Search
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.jobs.job_changes import append_event, found_job, move_job
 from bench_service.persistence.jobs.job_rows import event_of_row, job_of_row, row_of_job, state_of_row
 from bench_service.persistence.pages import page
+from bench_service.persistence.searching import find_jobs
 from bench_service.persistence.tables.jobs import EventRow, JobRow
 from procedures.core.limits import Verdict
 
@@ -57,16 +59,20 @@ class SqlJobStore:
         state: JobState | None = None,
         procedure: str | None = None,
         unit: str | None = None,
+        bench: str | None = None,
+        search: Search = EVERYTHING,
         after: str | None = None,
         limit: int = 50,
     ) -> Page[Job]:
-        query = select(JobRow)
+        query = find_jobs(select(JobRow), search)
         if state is not None:
             query = query.where(JobRow.state == state.value)
         if procedure is not None:
             query = query.where(JobRow.procedure == procedure)
         if unit is not None:
             query = query.where(JobRow.unit == unit)
+        if bench is not None:
+            query = query.where(JobRow.bench == bench)
         with self._database.read() as session:
             return page(session, query, JobRow.id, after, limit, self._understood)
 

@@ -17,6 +17,8 @@ from procedures.core.arrays import Array
 
 SPAN = 32
 """Ratio of a transform's length to the longest lag; large, so that little is spent on padding."""
+TOGETHER = 4
+"""Fewest windows that are transformed at once: the rows share the processor's wide registers."""
 
 
 class LaggedProducts:
@@ -41,9 +43,12 @@ class LaggedProducts:
     def add(self, y: Array) -> None:
         """Add the next samples, (n,)."""
         self._rest = np.concatenate([self._rest, y])
+        self._take_whole(TOGETHER)
+
+    def _take_whole(self, least: int) -> None:
         step = self._window - self._reach
         rows = (len(self._rest) - self._window) // step + 1
-        if rows > 0:
+        if rows >= least:
             stride = self._rest.strides[0]
             shape, strides = (rows, self._window), (step * stride, stride)
             self._take(as_strided(self._rest, shape, strides, writeable=False), step)
@@ -51,6 +56,7 @@ class LaggedProducts:
 
     def finish(self) -> Array:
         """The lagged products R, (reach,), after the last piece."""
+        self._take_whole(1)
         if len(self._rest):
             self._take(self._rest[None, :], len(self._rest))
         products = np.fft.irfft(_paired(self._power), self._length)[: self._reach]

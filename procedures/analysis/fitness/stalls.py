@@ -118,19 +118,20 @@ class Stalls:
         return np.where(np.isnan(self._part), LEAST_PART, self._part)
 
     def _runs(self, group: Group, rows: Mask, start: int, part: Array) -> None:
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
-        begins, ends = edges[::2], edges[1::2]
-        lengths = ends - begins
         carried, group.open = group.open, 0
-        if carried and not (len(begins) and begins[0] == 0):
-            self._keep(group, start - carried, carried, part)
-        elif carried:
-            lengths[0] += carried
-        if len(ends) and ends[-1] == len(rows):
-            group.open = int(lengths[-1])
-            begins, ends, lengths = begins[:-1], ends[:-1], lengths[:-1]
-        for i in np.flatnonzero(lengths >= self._shortest(group, part)).tolist():
-            self._keep(group, start + int(ends[i]) - int(lengths[i]), int(lengths[i]), part)
+        if rows.all():
+            group.open = carried + len(rows)
+            return
+        first, group.open = int(np.argmin(rows)), int(np.argmin(rows[::-1]))
+        self._keep(group, start - carried, carried + first, part)
+        inner = rows[first : len(rows) - group.open]
+        shortest = self._shortest(group, part)
+        if not _has_run_of(inner, shortest):
+            return
+        edges = np.flatnonzero(inner[1:] != inner[:-1]) + 1
+        begins, ends = edges[::2], edges[1::2]
+        for i in np.flatnonzero(ends - begins >= shortest).tolist():
+            self._keep(group, start + first + int(begins[i]), int(ends[i] - begins[i]), part)
 
     def _keep(self, group: Group, first: int, length: int, part: Array, shift: int = 0) -> None:
         if length < self._shortest(group, part):
@@ -159,6 +160,18 @@ def _has_run(same: Mask, zeros: NDArray[np.int64]) -> NDArray[np.bool_]:
         return zeros >= min(SHORTEST, same.shape[1])
     two = same[:, 1:] & same[:, :-1]
     return np.asarray((two[:, 3:] & two[:, :-3] & same[:, 2:-2]).any(axis=1))
+
+
+def _has_run_of(row: Mask, length: float) -> bool:
+    """Whether `row`, (n,), holds `length` consecutive repeats, found by doubling: a few passes over bytes."""
+    if length > len(row):
+        return False
+    needed, spanned = int(np.ceil(length)), 1
+    while spanned < needed:
+        step = min(spanned, needed - spanned)
+        row = row[step:] & row[:-step]
+        spanned += step
+    return bool(row.any())
 
 
 def _trailing(same: Mask) -> NDArray[np.int64]:

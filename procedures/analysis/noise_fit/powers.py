@@ -39,6 +39,8 @@ _CUT, _ROUNDS = 1e-5, 6
 VARIANCES = range(4)
 _EDGE = 8
 """The taper rises over this fraction, 1/8, of a segment."""
+_TOGETHER = 4
+"""Segments that are transformed at once."""
 
 
 @dataclass(frozen=True)
@@ -164,9 +166,11 @@ class FastPowers:
         self._segment = np.empty(self._length)
         self._filled, self._count = 0, 0
         self._sum = np.zeros(self._length // 2 + 1)
-        # Kept from segment to segment: fresh memory would cost more time than the transform.
-        self._tapered, self._square = np.empty(self._length), np.empty(len(self._sum))
-        self._modes = np.empty(len(self._sum), dtype=np.complex128)
+        # Several segments are transformed at once: their rows share the processor's wide registers. The memory is kept
+        # from one to the next: fresh memory would cost more time than the transform.
+        self._tapered = np.empty((_TOGETHER, self._length))
+        self._waiting = 0
+        self._modes = np.empty((_TOGETHER, len(self._sum)), dtype=np.complex128)
         self.segments = 0
         """Segments taken so far; `finish` needs one."""
 
@@ -184,21 +188,31 @@ class FastPowers:
                 self._take()
 
     def _take(self) -> None:
-        np.multiply(self._weights, self._segment, out=self._tapered)  # not np.dot: BLAS would start its threads
-        np.subtract(self._segment, np.sum(self._tapered), out=self._tapered)
-        self._tapered *= self._taper
-        np.fft.rfft(self._tapered, out=self._modes)
-        for part in (self._modes.real, self._modes.imag):
-            np.square(part, out=self._square)
-            self._sum += self._square
+        tapered = self._tapered[self._waiting]
+        np.multiply(self._weights, self._segment, out=tapered)  # not np.dot: BLAS would start its threads
+        np.subtract(self._segment, np.sum(tapered), out=tapered)
+        tapered *= self._taper
+        self._waiting += 1
+        if self._waiting == _TOGETHER:
+            self._transform()
         self.segments += 1
         self._filled = self._edge
         self._segment[: self._edge] = self._segment[-self._edge :].copy()
+
+    def _transform(self) -> None:
+        modes = self._modes[: self._waiting]
+        np.fft.rfft(self._tapered[: self._waiting], out=modes)
+        parts = modes.view(np.float64)
+        squares = np.square(parts, out=parts).sum(axis=0)
+        self._sum += squares[0::2] + squares[1::2]
+        self._waiting = 0
 
     def finish(self) -> Powers:
         """The spectrum from the crossover up, without its lines. Raises `UnfitRecording` where no segment was whole."""
         if self.segments == 0:
             raise UnfitRecording(f"{self._count} samples are less than one segment of {self._length}")
+        if self._waiting:
+            self._transform()
         length, hop = self._length, self._length - self._edge
         power = self._sum[:-1] / self.segments
         # The squared tapers of all segments add to 1 over the record but at its ends: (∫W)²/∫W² of white noise.
