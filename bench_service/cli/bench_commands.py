@@ -70,6 +70,20 @@ def check_file(
     return check_bench_file(bench_file, ask, console)
 
 
+def simulate(
+    bench_file: Annotated[Path, typer.Option("--bench-file", dir_okay=False, help="Bench file with the addresses")],
+    faults: Annotated[Path | None, typer.Option(dir_okay=False, help="Plan of faults, tables [[fault]]")] = None,
+) -> None:
+    """Serve the devices of a bench file as simulators on its addresses, in the makers' bytes, until SIGTERM or SIGINT.
+
+    One world stands behind them, at the file's [simulation] seed and time_factor. A device that the file calls
+    "simulated" is not served.
+    """
+    from bench_service.cli.simulating import simulate as serve_simulators
+
+    serve_simulators(bench_file, faults, announce)
+
+
 def of_bench(settings: Settings, bench: str | None, bench_file: Path | None = None) -> Settings:
     """Return the settings of another bench, or of the bench of a file.
 

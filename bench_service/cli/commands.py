@@ -90,7 +90,7 @@ def serve(
         server.run()
 
 
-for _command in (bench_commands.worker, bench_commands.supervise, bench_commands.stop):
+for _command in (bench_commands.worker, bench_commands.supervise, bench_commands.stop, bench_commands.simulate):
     app.command()(_command)
 app.command("check-file")(bench_commands.check_file)
 

@@ -112,9 +112,11 @@ class ServedBench:
         for port in self.ports.values():
             await port.close()
 
-    async def failed(self) -> None:
-        """Wait until the world cannot go on, and raise why."""
-        await asyncio.gather(*self._tasks)
+    def check(self) -> None:
+        """Raise why the world does not go on, where it does not."""
+        for task in self._tasks:
+            if task.done() and not task.cancelled():
+                task.result()
 
     def break_now(self, fault: Fault) -> None:
         """Let a fault of a device come true now."""
@@ -165,20 +167,24 @@ class ServedBench:
         )
         return LinePort(name, Lines(b"\r\n", language.answer), self.plan)
 
-    def _unit_port(self, device: ServedDevice) -> Port:
+    def frames_of(self, name: str) -> CountFrames | IxcomFrames:
+        """Frames that the unit sends on this bench. Raises `ValueError` where it sends none."""
         imu, unit = self.bench.imu, self.config.world.unit
         if not isinstance(imu, SimImu):
-            raise ValueError("unit_link: a converter alone is not served")
-        rate, channels = imu.rate_hz, (*unit_channels(unit), *temperature_channels(unit))
-        if device.language == "ixcom":
-            frames: IxcomFrames | CountFrames = IxcomFrames(channels, rate)
-        else:
-            frames = CountFrames(channels, rate, 11 if self.config.world.thermal else 6)
-        stream = Stream(frames, rate, lambda: imu.since_launch_s, self.config.valid_after_s)
+            raise ValueError(f"{name}: a converter alone is not served")
+        channels = (*unit_channels(unit), *temperature_channels(unit))
+        if self.config.devices[name].language == "ixcom":
+            return IxcomFrames(channels, imu.rate_hz)
+        return CountFrames(channels, imu.rate_hz, 11 if self.config.world.thermal else 6)
+
+    def _unit_port(self, device: ServedDevice) -> Port:
+        frames, imu = self.frames_of("unit_link"), self.bench.imu
+        assert isinstance(imu, SimImu)
+        stream = Stream(frames, imu.rate_hz, lambda: imu.since_launch_s, self.config.valid_after_s)
         stream.plan, self.frames = self.plan, frames
         imu.listen(stream)
         if isinstance(frames, IxcomFrames):
-            return IxcomPort(stream, unit.serial, rate)
+            return IxcomPort(stream, self.config.world.unit.serial, imu.rate_hz)
         if device.datagrams:
             return DatagramPort(stream, frames.length)
         return FramePort(stream)
