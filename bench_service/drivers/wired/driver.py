@@ -19,6 +19,7 @@ from bench_service.drivers.registered import RegisteredBench
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.drivers.wall_bench_clock import WallBenchClock
 from bench_service.drivers.wired.devices import WiredDevices, safe_state
+from bench_service.drivers.wired.guarded import LaunchedUnit, LaunchingSupply
 from bench_service.drivers.wired.mixed import CatchUp, MixedClock, TwinSupply, TwinTurntable
 from bench_service.drivers.wired.opening import opened, survey
 from bench_service.drivers.wired.parallel import named
@@ -147,6 +148,9 @@ class BenchFileDriver:
         bench.chamber, bench.current_source = devices.get("chamber"), devices.get("current_source")
         if any(file.within(kind) for kind in ("turntable", "unit_link", "supply", "chamber", "current_source")):
             self._add_simulated(bench, unit.serial, seed, needs, wall)
+        if not file.within("unit_link"):
+            supply = LaunchingSupply(bench.supply, bench.clock.now_s)
+            bench.supply, bench.imu = supply, LaunchedUnit(bench.imu, supply)  # pyright: ignore[reportAttributeAccessIssue]
         bench.operator = self._operator(bench.operator, job)
         bench.safe_s = {k: s.safe_s for k, s in file.real().items() if isinstance(s, Wire)}
         chamber = description.chamber

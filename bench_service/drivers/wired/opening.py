@@ -34,8 +34,9 @@ def _opened(kind: Kind, section: DeviceSection, context: DriverContext) -> Any:
 
 
 def context_of(file: BenchFile) -> DriverContext:
-    """Surroundings of devices that are asked outside a job."""
-    return DriverContext(file.id, WallBenchClock(factor=file.time_factor), Path(file.folder))
+    """Surroundings of devices that are asked outside a job: a unit that sends nothing is taken as switched off."""
+    clock = WallBenchClock(factor=file.time_factor)
+    return DriverContext(file.id, clock, Path(file.folder), powered=lambda: False)
 
 
 @dataclass(frozen=True)
