@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := calibration allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
+VALIDATIONS := wires calibration allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
 FOREIGN := basil edie instro ixcom visa
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners)
 

@@ -127,13 +127,13 @@ def text(dialect: Dialect, answer: bytes) -> str:
     """Text of an answer after its prefix. Raises `BadAnswer`."""
     rest = answer[dialect.reply_prefix_bytes :]
     if len(answer) < dialect.reply_prefix_bytes:
-        raise BadAnswer(f"{shown(answer)} is shorter than its prefix of {dialect.reply_prefix_bytes} bytes")
+        raise BadAnswer(f"{shown(answer)} is shorter than reply_prefix_bytes = {dialect.reply_prefix_bytes}")
     try:
         found = rest.decode("ascii").strip()
     except UnicodeDecodeError:
-        raise BadAnswer(f"{shown(answer)} is no text after {dialect.reply_prefix_bytes} bytes") from None
+        raise BadAnswer(f"{shown(answer)} is no text after reply_prefix_bytes = {dialect.reply_prefix_bytes}") from None
     if not found or not found.isprintable():
-        raise BadAnswer(f"{shown(answer)} has no printable text after {dialect.reply_prefix_bytes} bytes")
+        raise BadAnswer(f"{shown(answer)} has no printable text after reply_prefix_bytes = {dialect.reply_prefix_bytes}")
     return found
 
 
