@@ -133,7 +133,9 @@ def text(dialect: Dialect, answer: bytes) -> str:
     except UnicodeDecodeError:
         raise BadAnswer(f"{shown(answer)} is no text after reply_prefix_bytes = {dialect.reply_prefix_bytes}") from None
     if not found or not found.isprintable():
-        raise BadAnswer(f"{shown(answer)} has no printable text after reply_prefix_bytes = {dialect.reply_prefix_bytes}")
+        raise BadAnswer(
+            f"{shown(answer)} has no printable text after reply_prefix_bytes = {dialect.reply_prefix_bytes}"
+        )
     return found
 
 
