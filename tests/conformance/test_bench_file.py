@@ -20,7 +20,7 @@ sample_rate_hz = 400
 """
 
 
-def _file(folder: Path, behind: Served) -> Path:
+def bench_file(folder: Path, behind: Served, factor: float = FACTOR) -> Path:
     """The bench file, the unit's file and the file of its frames."""
     frames = behind.bench.frames
     assert isinstance(frames, CountFrames)
@@ -56,7 +56,7 @@ driver = "framed"
 address = "tcp://127.0.0.1:{numbers["unit_link"]}"
 frame = "frame.toml"
 [simulation]
-time_factor = {FACTOR}
+time_factor = {factor}
 """)
     return path
 
@@ -65,7 +65,7 @@ time_factor = {FACTOR}
 def job(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     folder = tmp_path_factory.mktemp("east")
     with served(LANGUAGES) as behind:
-        settings = Settings(database_url=f"sqlite:///{folder / 'bench.sqlite'}", bench_file=_file(folder, behind))
+        settings = Settings(database_url=f"sqlite:///{folder / 'bench.sqlite'}", bench_file=bench_file(folder, behind))
         with connect(settings, None, drive=True) as http:
             client = Client(http)
             found = client.wait(client.submit("table_program", unit="GL017", parameters=PLAN)["id"])
