@@ -1,71 +1,26 @@
 """A bench file whose every device is a served simulator: a job through the service, over TCP at a time factor."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
-from simulators.served.unit_frames import CountFrames
-from tests.conformance.served import FACTOR, Served, served
+from tests.conformance.served import FACTOR, served
+from tests.kit.wired_bench import LANGUAGES, bench_file
 from tests.service.client import Client
 
-LANGUAGES = {"turntable": "acutrol", "supply": "scpi", "unit_link": "framed"}
 PLAN = {"positions": [[0, 90, 0, 2], [45, 0, -30, 2]], "delay_from": "rest", "settle_s": 1.0}
-UNIT = """
-serial = "GL017"
-sample_rate_hz = 400
-"""
-
-
-def bench_file(folder: Path, behind: Served, factor: float = FACTOR) -> Path:
-    """The bench file, the unit's file and the file of its frames."""
-    frames = behind.bench.frames
-    assert isinstance(frames, CountFrames)
-    (folder / "frame.toml").write_text(frames.description())
-    channels = "".join(
-        f'[[channels]]\nname = "{c.name}"\nquantity = "{c.quantity.value}"\nunit = "{c.unit}"\nscale = {c.scale!r}\n'
-        for c in behind.bench.bench.imu.channels
-    )
-    (folder / "units").mkdir()
-    (folder / "units" / "GL017.toml").write_text(UNIT + channels)
-    axis = "minimum_deg = -400, maximum_deg = 400, rate_deg_s = 60, acceleration_deg_s2 = 100"
-    numbers = behind.numbers
-    path = folder / "east.toml"
-    path.write_text(f"""
-[bench]
-id = "east"
-[site]
-latitude_deg = 50.45
-gravity_m_s2 = 9.810553
-[turntable]
-driver = "acutrol"
-address = "tcp://127.0.0.1:{numbers["turntable"]}"
-outer = {{ number = 3, {axis}, continuous = true }}
-middle = {{ number = 2, {axis} }}
-inner = {{ number = 1, {axis} }}
-accuracy = {{ pointing_sd_arcsec = 2 }}
-[supply]
-driver = "scpi"
-address = "tcp://127.0.0.1:{numbers["supply"]}"
-limits = {{ maximum_v = 36.0, maximum_a = 5.0, nominal_v = 28.0, nominal_a = 3.0 }}
-[unit_link]
-driver = "framed"
-address = "tcp://127.0.0.1:{numbers["unit_link"]}"
-frame = "frame.toml"
-[simulation]
-time_factor = {factor}
-""")
-    return path
 
 
 @pytest.fixture(scope="module")
 def job(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     folder = tmp_path_factory.mktemp("east")
     with served(LANGUAGES) as behind:
-        settings = Settings(database_url=f"sqlite:///{folder / 'bench.sqlite'}", bench_file=bench_file(folder, behind))
+        settings = Settings(
+            database_url=f"sqlite:///{folder / 'bench.sqlite'}", bench_file=bench_file(folder, behind, FACTOR)
+        )
         with connect(settings, None, drive=True) as http:
             client = Client(http)
             found = client.wait(client.submit("table_program", unit="GL017", parameters=PLAN)["id"])

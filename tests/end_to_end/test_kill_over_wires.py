@@ -13,8 +13,8 @@ from bench_service.drivers.device_register import DeviceRegister
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.wall_clock import monotonic_s
 from tests.conformance.served import Served, served
-from tests.conformance.test_bench_file import LANGUAGES, bench_file
 from tests.end_to_end.bench_process import BenchProcess
+from tests.kit.wired_bench import LANGUAGES, bench_file
 
 pytestmark = pytest.mark.timeout(240)
 FACTOR = 4.0
