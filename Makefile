@@ -2,12 +2,12 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := wires calibration allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
+VALIDATIONS := wires calibration multi_position allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
 FOREIGN := basil edie instro ixcom visa
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners)
 
 .DEFAULT_GOAL := help
-.PHONY: help run test bench chaos format check validate lock clean foreign
+.PHONY: help run test bench chaos format check validate rights lock clean foreign
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -40,6 +40,9 @@ validate: $(VENV)/.ready  ## Monte Carlo against theory over 1000 simulated unit
 
 bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 	@kept=0; for part in $(BENCHMARKS); do $(BIN)/python -m $$part || kept=1; done; exit $$kept
+
+rights: $(VENV)/.ready  ## write docs/rights.md anew, from the routes and their rights
+	@$(BIN)/python -m tests.kit.rights_page
 
 lock: $(VENV)/.ready  ## compile requirements.lock anew
 	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev pyproject.toml -o requirements.lock

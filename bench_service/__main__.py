@@ -7,7 +7,7 @@ import sys
 def main() -> None:
     """Run the command line and exit with its code."""
     if sys.argv[1:2] == ["stop"]:  # it loads no more than it needs, and reads no setting that it does not need
-        from bench_service.cli.stopping import stop_command
+        from bench_service.cli.processes.stopping import stop_command
 
         sys.exit(stop_command(sys.argv[2:], os.environ))
     from bench_service.cli.commands import run_command_line

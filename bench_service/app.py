@@ -10,7 +10,9 @@ from fastapi import Depends, FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
-from bench_service.api import audit, health, metrics, procedures, recordings, reservations, results, trends
+from bench_service.api import audit, audit_chain, health, metrics, procedures, recordings, reservations, results, trends
+from bench_service.api.access import guard, identify
+from bench_service.api.access import routes as access
 from bench_service.api.benches import routes as benches
 from bench_service.api.campaigns import routes as campaigns
 from bench_service.api.campaigns import schedules
@@ -18,6 +20,7 @@ from bench_service.api.http import bodies, door, errors, headers, queries, reque
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs import routes as jobs
 from bench_service.api.openapi import document
+from bench_service.api.units import calibrations
 from bench_service.api.units import routes as units
 from bench_service.bench.devices import BenchDevices
 from bench_service.bench.directory import BenchDirectory
@@ -38,7 +41,7 @@ from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.worker import Worker
-from bench_service.pages import campaign_pages, docs, figures, images, static_files
+from bench_service.pages import access_pages, campaign_pages, docs, figures, images, static_files
 from bench_service.pages import routes as pages
 from bench_service.pages.drawing_process import open_drawing
 from bench_service.persistence import BenchLease, acquire_lease, engine_database, lease_holder, open_stores
@@ -61,15 +64,19 @@ ROUTERS = (
     recordings,
     results,
     units,
+    calibrations,
     trends,
     benches,
     reservations,
     campaigns,
     schedules,
+    access,
     audit,
+    audit_chain,
     health,
     metrics,
 )
+PAGES = (static_files, docs, access_pages, images, pages, campaign_pages)
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apart: bool = False) -> BenchService:
@@ -129,6 +136,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     service = BenchService(
         stores, driver, planner, worker, code, safety, board, database.free_bytes, traces, roads, rescued, processes
     )
+    service.access.book.begin()
+    closing.callback(service.access.book.end)
     closing.callback(service.stop)
     service.register()
     return service
@@ -153,10 +162,16 @@ def _dispatcher(
     return Dispatcher(settings.bench_id, stores, runner, engine, lease, settings.poll_s, files.stopped)
 
 
-def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[], None], rules: door.Door) -> FastAPI:
+def create_app(
+    service: BenchService,
+    max_import_bytes: int,
+    at_end: Callable[[], None],
+    rules: door.Door,
+    proxies: identify.Proxies,
+) -> FastAPI:
     """The application around a service that is open; `at_end` is called when the server shuts down.
 
-    `rules`: decide which requests are let in.
+    `rules`: decide which requests are let in; `proxies`: those that authenticate people.
     """
 
     @asynccontextmanager
@@ -173,7 +188,8 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
         version=version("bench-service"),
         lifespan=lifespan,
         generate_unique_id_function=lambda route: route.name,
-        dependencies=[Depends(queries.only_known_names), Depends(bodies.only_plain_json)],
+        dependencies=[Depends(guard.authorised), Depends(queries.only_known_names), Depends(bodies.only_plain_json)],
+        openapi_url=None,  # a route of our own has the document, so that its right is asked for as of every other
         docs_url=None,  # the framework's own pages load scripts from another host
         redoc_url=None,
     )
@@ -183,11 +199,13 @@ def create_app(service: BenchService, max_import_bytes: int, at_end: Callable[[]
     app.state.import_threads = CapacityLimiter(IMPORT_THREADS)
     for module in ROUTERS:
         app.include_router(module.router)
-    for page in (static_files, docs, images, pages, campaign_pages):
+    for page in PAGES:
         app.include_router(page.router)
+    app.add_middleware(guard.Guarded, access=service.access)
     transfer.install(app)
     app.add_middleware(bodies.Bounded)
     errors.install(app)
+    app.add_middleware(identify.Identified, rules=identify.Identification(rules, service.access.book, proxies))
     app.add_middleware(door.Doorkeeper, door=rules)
     metrics.install(app, service)
     app.add_middleware(audit.Audited, trail=service.stores.audit)

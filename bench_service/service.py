@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 
+from bench_service.access.book import AccessBook
+from bench_service.access.service import AccessService
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import LiveBoard
 from bench_service.bench.make_safe import Rescue
@@ -50,6 +52,7 @@ class BenchService:
         through the database alone. `rescued`: the result of making devices safe at start. `processes`: where
         analyses are computed; None: in the caller's thread.
         """
+        self.access = AccessService(stores.access, AccessBook(stores.access))
         self.safety = safety
         self.traces = traces or Traces()
         self.live = live or LiveBoard(stores.live)

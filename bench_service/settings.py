@@ -1,10 +1,11 @@
 """Settings of the service: one frozen model, read from the environment once, in `__main__`."""
 
 from collections.abc import Mapping
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from bench_service.device_folder import BENCH_ID, DATABASE_URL, bench_id_in, device_folder
 
@@ -21,7 +22,13 @@ def _listed(given: object) -> object:
     return tuple(part for part in map(str.strip, given.split(",")) if part) if isinstance(given, str) else given
 
 
+def _network(given: str) -> str:
+    """Check an address or a network. Raises `ValueError`."""
+    return str(ip_network(given))
+
+
 HostName = Annotated[str, Field(pattern=r"^(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(:[0-9]{1,5})?$")]
+Network = Annotated[str, AfterValidator(_network)]
 
 
 class Settings(BaseModel):
@@ -41,6 +48,11 @@ class Settings(BaseModel):
     """File with the token that programs send from elsewhere than this host, as `Authorization: Bearer …`.
 
     The service asks for it, and commands with `--server` send it."""
+    proxy_user_header: str | None = Field(None, pattern=r"^[A-Za-z][A-Za-z0-9-]{0,63}$")
+    """Header in which a reverse proxy names the person that it has authenticated (`X-Forwarded-User`): an account's."""
+    proxy_addresses: Annotated[tuple[Network, ...], BeforeValidator(_listed)] = ()
+    """Addresses or networks of the proxies whose word is taken for that, comma-separated; from any other the header is
+    refused."""
     published: Literal["loopback"] | None = None
     """`loopback`: the service's address is reached only through a port published on a loopback address (a container's),
     or through a proxy there that lets in only people it knows; then every peer counts as one of this host."""
@@ -95,6 +107,12 @@ class Settings(BaseModel):
         found = bench_id_in(Path(given["bench_file"]))
         return given if found is None else {**given, "bench_id": found}
 
+    @model_validator(mode="after")
+    def _proxy_is_whole(self) -> "Settings":
+        if (self.proxy_user_header is None) != (not self.proxy_addresses):
+            raise ValueError("BENCH_PROXY_USER_HEADER and BENCH_PROXY_ADDRESSES are given together, or neither is")
+        return self
+
     def stop_secret_in(self) -> Path:
         """The file of the secret under which a stop goes to another host."""
         return self.stop_secret_file or self.devices_in() / "bench-stop.secret"
@@ -132,6 +150,8 @@ class Settings(BaseModel):
             return cls.model_validate(given)
         except ValidationError as error:
             first = error.errors()[0]
+            if not first["loc"]:
+                raise BadSettings(str(first["msg"]).removeprefix("Value error, ")) from error
             name = _variable(str(first["loc"][0]))
             raise BadSettings(f"{name} = {given.get(str(first['loc'][0]))!r}: {first['msg']}") from error
 

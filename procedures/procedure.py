@@ -10,6 +10,7 @@ from procedures.analysis.fitness.findings import FitnessSettings
 from procedures.analysis.fitness.watched import Inspection
 from procedures.bench import Bench, BenchDescription
 from procedures.bench.imu import Stream
+from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Check, Verdict
 from procedures.core.recording import Recording, Station
@@ -118,6 +119,21 @@ class Evidence:
     recordings: tuple[Recording, ...] = ()
     calibrations: tuple[DatedCalibration, ...] = ()
 
+    def one_each(self) -> dict[str, TriadCalibration]:
+        """The given calibrations by triad. Raises `BadParameter` where two are of one triad."""
+        found: dict[str, TriadCalibration] = {}
+        for calibration in (c for dated in self.calibrations for c in dated.triads):
+            if calibration.triad in found:
+                allowed = f"one of each triad; two are of the {calibration.triad} triad"
+                raise BadParameter("calibrations", len(self.calibrations), allowed)
+            found[calibration.triad] = calibration
+        return found
+
+    @property
+    def calibrations_in_words(self) -> str:
+        """The given calibrations as a result's basis names them: id and time of each."""
+        return "calibration " + ", ".join(f"{c.id} of {c.made_at}" for c in self.calibrations)
+
 
 def _no_calibrations(_: Any) -> tuple[TriadCalibration, ...]:
     return ()
@@ -171,8 +187,8 @@ class Procedure(Generic[P, R]):
     analyse: Callable[[Sequence[Recording], P, Context], R]
     report: Callable[[R], Report]
     calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
-    uses_calibration: bool = False
-    """True if the result rests on the unit's current calibration, which then belongs to its lineage."""
+    uses_calibration: tuple[str, ...] = ()
+    """Triads whose current calibrations the result rests on; those that there are then belong to its lineage."""
     corrections: Callable[[R], tuple[UnitCorrection, ...]] = _no_corrections
     """The correction sets that a result gives: at most one of a kind."""
     uses_corrections: Callable[[P], tuple[CorrectionKind, ...]] = _uses_none

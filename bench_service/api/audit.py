@@ -11,6 +11,8 @@ from pydantic import BaseModel, Field
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from bench_service.access.credentials import without_tokens
+from bench_service.api.access.identify import found_of
 from bench_service.api.http.bodies import is_json
 from bench_service.api.http.dependencies import NO_CONTROL_CHARACTERS, REQUESTED_BY, WHO_LENGTH, After, Limit, Service
 from bench_service.api.http.errors import FieldError, problems, respond
@@ -32,7 +34,9 @@ class AuditView(BaseModel):
 
     id: str
     at: datetime
-    who: str = Field(description=f"`{REQUESTED_BY}`, or the address that it was asked from")
+    who: str = Field(
+        description=f"The proved name; without accounts `{REQUESTED_BY}`, or the address that it came from"
+    )
     action: str = Field(description="The operation, as this document names it")
     target: str = Field(description="Path of what it was done to, or of what it made")
     outcome: str = Field(description="Status code of the answer, or a word where it was no request")
@@ -87,7 +91,7 @@ class Audited:
             field = FieldError(field=REQUESTED_BY, message=f"1 … {WHO_LENGTH} characters, no control characters")
             await respond(request, 422, f"{field.field}: {field.message}", "Invalid", [field])(scope, receive, send)
             return
-        act = _Act(request, who or (request.client.host if request.client else "local"))
+        act = _Act(request, who)
 
         async def receive_and_note() -> Message:
             message = await receive()
@@ -122,13 +126,25 @@ class Audited:
 class _Act:
     """The parts of a request that its audit entry needs, collected until the outcome is known."""
 
-    def __init__(self, request: Request, who: str) -> None:
+    def __init__(self, request: Request, claimed: str | None) -> None:
         self.request = request
-        self.who = who
+        self._claimed = claimed
         self.noted = False
         self._is_json = is_json(request.headers.get("content-type"))
         self._body = b""
         self._bytes = 0
+
+    @property
+    def who(self) -> str:
+        """The proved name; else the name that the client gives itself, or the address from which it asks."""
+        client = self.request.client
+        return self._proven()[0] or self._claimed or (client.host if client else "local")
+
+    def _proven(self) -> tuple[str | None, str]:
+        """The proved name and its proof, as far as there is one."""
+        found = found_of(self.request.scope)
+        identity = found.identity or found.stopper
+        return (None, "") if identity is None else (identity.proven_name, identity.proof.value)
 
     def body(self, message: Message) -> None:
         """Note a piece of the body that passes."""
@@ -140,6 +156,11 @@ class _Act:
     def detail(self) -> dict[str, Any]:
         """The request's details for the audit entry; never the contents of files, nor what could not be read back."""
         found: dict[str, Any] = {"request": request_id(), "path": shown(self.request.scope["path"])}
+        name, proof = self._proven()
+        if name is not None:
+            found["proof"] = proof
+            if self._claimed is not None and self._claimed != name:
+                found["claimed"] = self._claimed
         if self.request.url.query:
             found["query"] = self.request.url.query[:500]
         body = self._document()
@@ -157,4 +178,14 @@ class _Act:
             body = json.loads(self._body)
         except (ValueError, RecursionError):
             return None
-        return body if next(faults(body), None) is None else None
+        if next(faults(body), None) is not None:
+            return None
+        if getattr(self.request.scope.get("route"), "name", "") in WITH_PASSWORD:  # or a password under a mistyped name
+            body = {name: body[name] for name in NO_SECRETS if name in body} if isinstance(body, dict) else None
+        return json.loads(without_tokens(json.dumps(body)))
+
+
+WITH_PASSWORD = frozenset({"log_in", "add_account", "change_account"})
+"""Routes whose bodies have a password."""
+NO_SECRETS = ("name", "role", "team")
+"""Fields of those that an entry has."""

@@ -1,8 +1,9 @@
 """Health routes for monitoring: liveness and readiness of the service."""
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from pydantic import BaseModel, Field
 
+from bench_service.api.access.identify import found_of
 from bench_service.api.http.dependencies import Service
 from bench_service.api.http.errors import problems
 
@@ -26,9 +27,11 @@ async def healthz(service: Service) -> Health:
 
 
 @router.get("/readyz", responses=problems())
-def readyz(service: Service) -> Health:
+def readyz(service: Service, request: Request) -> Health:
     """Report whether a job could start: the database answers, its disk has room, the engine runs, the lease is held.
 
-    Waits for the engine after a start. 503 names every reason. A stopped bench refuses by a person's will: a note.
+    Waits for the engine after a start. 503 names every reason. A stopped bench refuses by a person's will: a note,
+    which a sender without log-in does not see.
     """
-    return Health(code_version=service.code_version, notes=list(service.ready()))
+    notes = service.ready()
+    return Health(code_version=service.code_version, notes=list(notes) if found_of(request.scope).identity else [])

@@ -3,14 +3,18 @@
 from typing import Annotated, Any
 
 from fastapi import APIRouter
-from pydantic import BaseModel, Field
+from fastapi import Request as HttpRequest
+from pydantic import BaseModel, Field, ValidationError
 
 from bench_service.api.http.dependencies import Service
-from bench_service.api.http.errors import problems
+from bench_service.api.http.errors import Problem, problem_of, problems, status_of
 from bench_service.api.http.fields import NAME, Request
+from bench_service.jobs.planning import Plan
 from bench_service.mapping import copied
+from bench_service.model.errors import ServiceError
+from procedures.core.errors import DomainError
 from procedures.core.recording import Station
-from procedures.procedure import Method, Outcome, Parameters, PredictedUncertainty, Procedure
+from procedures.procedure import Context, Method, Outcome, Parameters, PredictedUncertainty, Procedure
 
 router = APIRouter(prefix="/api/v1", tags=["procedures"])
 
@@ -49,6 +53,31 @@ class Preview(BaseModel):
     violations: list[str]
 
 
+class PlanRequest(PreviewRequest):
+    """One plan of a batch: the procedure with what a preview of it takes."""
+
+    procedure: str = NAME
+
+
+class PreviewBatch(Request):
+    """Plans to be previewed together."""
+
+    plans: list[PlanRequest] = Field(min_length=1, max_length=500)
+
+
+class PreviewOutcome(BaseModel):
+    """The preview of one plan of a batch, or the reason why it cannot be run."""
+
+    preview: Preview | None
+    refusal: Problem | None
+
+
+class PreviewOutcomes(BaseModel):
+    """Outcomes of a batch, in the order of its plans."""
+
+    items: list[PreviewOutcome]
+
+
 def _view(entry: Procedure[Parameters, Outcome] | Method[Parameters, Outcome]) -> ProcedureView:
     return copied(
         ProcedureView,
@@ -74,12 +103,35 @@ def read_procedure(name: str, service: Service) -> ProcedureView:
 def preview(name: str, request: PreviewRequest, service: Service) -> Preview:
     """Preview stations, duration, predicted uncertainties and warnings of a plan; violations of axis limits."""
     plan = service.planner.plan(name, request.unit, request.parameters, request.bench)
+    return _preview(name, request.unit, plan)
+
+
+@router.post("/previews", responses=problems(413))
+def preview_batch(body: PreviewBatch, service: Service, request: HttpRequest) -> PreviewOutcomes:
+    """Preview up to 500 plans at once; a plan that cannot be run is refused by itself, the others are previewed."""
+    contexts: dict[tuple[str, str | None], Context] = {}
+    items: list[PreviewOutcome] = []
+    for wanted in body.plans:
+        place = wanted.unit, wanted.bench
+        try:
+            if place not in contexts:
+                contexts[place] = service.planner.context(*place)
+            plan = service.planner.plan_in(contexts[place], wanted.procedure, wanted.parameters)
+            items.append(PreviewOutcome(preview=_preview(wanted.procedure, wanted.unit, plan), refusal=None))
+        except (DomainError, ServiceError, ValidationError) as error:
+            if not isinstance(error, ValidationError) and status_of(error) >= 500:
+                raise  # not this plan's affair
+            items.append(PreviewOutcome(preview=None, refusal=problem_of(request, error)))
+    return PreviewOutcomes(items=items)
+
+
+def _preview(procedure: str, unit: str, plan: Plan) -> Preview:
     return copied(
         Preview,
         plan,
         plan.prediction,
-        procedure=name,
-        unit=request.unit,
+        procedure=procedure,
+        unit=unit,
         bench=plan.context.bench.id,
         parameters=plan.parameters.model_dump(mode="json"),
         predicted_uncertainties=plan.prediction.uncertainties,

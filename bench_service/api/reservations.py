@@ -6,7 +6,8 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 from pydantic import AwareDatetime, BaseModel, Field, model_validator
 
-from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
+from bench_service.api.access.teams import TeamOfReservation
+from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Me, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.fields import NAME, Request
 from bench_service.jobs.queue_service import LONGEST, ReservationRequest
@@ -43,6 +44,7 @@ class ReservationView(BaseModel):
     unit: str | None
     holder: str
     note: str
+    team: str = Field(description="Team whose members act on it and on its jobs; empty: everybody")
     created_at: datetime
     until: datetime
     ended_at: datetime | None = Field(description="When it was given back before its time")
@@ -73,12 +75,15 @@ class ReservationPage(BaseModel):
     responses={**problems(404, 409, 413, 507), **made(201, "reservation_id", "read_reservation", "end_reservation")},
 )
 def reserve(
-    body: ReservationSubmission, service: Service, response: Response, key: IdempotencyKey = None
+    body: ReservationSubmission, service: Service, response: Response, me: Me, key: IdempotencyKey = None
 ) -> ReservationView:
-    """Reserve a bench or a unit. One that is reserved already is refused, with the holder and the end."""
+    """Reserve a bench or a unit, for the team of the account or token that asks.
+
+    One that is reserved already is refused, with the holder and the end.
+    """
     kind = Reserved.UNIT if body.bench is None else Reserved.BENCH
     name = body.bench or body.unit or ""
-    kept = service.queues.reserve(copied(ReservationRequest, body, kind=kind, name=name), key)
+    kept = service.queues.reserve(copied(ReservationRequest, body, kind=kind, name=name, team=me.team), key)
     response.headers["Location"] = f"/api/v1/reservations/{kept.id}"
     return ReservationView.of(kept)
 
@@ -101,7 +106,7 @@ def read_reservation(reservation_id: str, service: Service) -> ReservationView:
     return ReservationView.of(service.stores.reservations.get(reservation_id))
 
 
-@router.delete("/{reservation_id}", responses=problems(404, 507))
+@router.delete("/{reservation_id}", responses=problems(404, 507), dependencies=[TeamOfReservation])
 def end_reservation(reservation_id: str, service: Service) -> ReservationView:
     """End a reservation before its time: jobs that waited for it may start. One that is over stays as it is."""
     return ReservationView.of(service.queues.give_back(reservation_id))

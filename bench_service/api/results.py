@@ -39,6 +39,12 @@ class Lineage(BaseModel):
     seed: int | None
     job: str | None
 
+    @classmethod
+    def of(cls, result: StoredResult) -> "Lineage":
+        """Take the lineage from a stored result."""
+        recordings = [{"id": i, "content_hash": h} for i, h in result.recordings]
+        return copied(cls, result, recordings=recordings, job=result.job_id)
+
 
 class ResultView(BaseModel):
     """A result: the document of its procedure or method, and its lineage."""
@@ -56,13 +62,7 @@ class ResultView(BaseModel):
 
     @classmethod
     def of(cls, result: StoredResult) -> "ResultView":
-        lineage = copied(
-            Lineage,
-            result,
-            recordings=[{"id": i, "content_hash": h} for i, h in result.recordings],
-            job=result.job_id,
-        )
-        return copied(cls, result, lineage=lineage, page=f"/results/{result.id}")
+        return copied(cls, result, lineage=Lineage.of(result), page=f"/results/{result.id}")
 
 
 class ResultPage(BaseModel):

@@ -15,13 +15,14 @@ from procedures.bench.device import Status
 from procedures.bench.errors import DeviceFault
 from procedures.bench.supply import SupplyReading
 from procedures.bench.turntable import TableReading
-from procedures.core.measured import Measured, MeasuredAngles, MeasuredSupply
+from procedures.core.measured import Measured, MeasuredAngles, MeasuredEnvironment, MeasuredSupply
 from procedures.core.recording import Station
 from procedures.core.table_angles import TableAngles
 
 LEAST_S = 1.0
 """Shortest interval between two readings [s, bench time]."""
 AXES = ("outer", "middle", "inner")
+ROOM = ("temperature_c", "humidity_percent", "pressure_hpa")
 LEAST_TOLERANCE_DEG = 0.01
 """Difference from the demand that is no fault of any table [deg]."""
 SIGMAS = 10.0
@@ -64,6 +65,7 @@ class DeviceLog:
         self._angles = _Moments(len(AXES))
         self._power = _Moments(2)
         self._limiting = False
+        self._room = {name: _Moments(1) for name in ROOM}
         self._status: dict[str, None] = {}
 
     async def look(self) -> None:
@@ -78,6 +80,11 @@ class DeviceLog:
         if self._commanded is not None:
             self._table(self._commanded, await self._bench.turntable.read())
         self._supply(await self._bench.supply.read())
+        if self._bench.environment is not None:
+            room = await self._bench.environment.read()
+            for name, moments in self._room.items():
+                if (value := getattr(room, name)) is not None:
+                    moments.add((value,))
         self._note(self._bench.imu.status())
 
     def measured(self) -> Measured:
@@ -89,7 +96,9 @@ class DeviceLog:
         if self._power.count:
             voltage, current = self._power.mean
             supply = MeasuredSupply(voltage, current, self._power.spread[1], self._limiting, self._power.count)
-        return Measured(angles, supply, tuple(self._status))
+        means = {name: m.mean[0] for name, m in self._room.items() if m.count}
+        room = MeasuredEnvironment(**means) if means else None
+        return Measured(angles, supply, room, tuple(self._status))
 
     def _table(self, commanded: TableAngles, reading: TableReading) -> None:
         require_agreement(commanded, reading, self._bench.description.accuracy)

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench_service.bench.together import make_safe_together
-from procedures.bench import SAFE_ORDER, Bench, Chamber, Imu, Operator, Supply, Turntable
+from procedures.bench import SAFE_ORDER, Bench, Chamber, Environment, Imu, Operator, Supply, Turntable
 from procedures.bench.chamber import ChamberLimits, ChamberReading
 from procedures.bench.current_source import CurrentSource, CurrentSourceLimits, CurrentSourceReading
 from procedures.bench.device import DeviceIdentity, Status
+from procedures.bench.environment import EnvironmentReading
 from procedures.bench.imu import Stream
 from procedures.bench.supply import SupplyLimits, SupplyReading
 from procedures.bench.turntable import TableReading
@@ -188,6 +189,22 @@ class ObservedCurrentSource(_Seen):
             await self._source.make_safe()
 
 
+class ObservedEnvironment(_Seen):
+    """An `Environment` that reports its verbs to an observer."""
+
+    def __init__(self, environment: Environment, observer: Observer) -> None:
+        super().__init__(observer)
+        self._environment = environment
+
+    async def identify(self) -> DeviceIdentity:
+        with self._seen("environment.identify"):
+            return await self._environment.identify()
+
+    async def read(self) -> EnvironmentReading:
+        with self._seen("environment.read"):
+            return await self._environment.read()
+
+
 class ObservedOperator(_Seen):
     """An `Operator` that reports its requests to an observer."""
 
@@ -257,9 +274,10 @@ class ObservedBench(Bench):
             None if bench.chamber is None else ObservedChamber(bench.chamber, observer),
             None if bench.operator is None else ObservedOperator(bench.operator, observer),
             None if bench.current_source is None else ObservedCurrentSource(bench.current_source, observer),
+            None if bench.environment is None else ObservedEnvironment(bench.environment, observer),
+            bench.safe_s,
         )
         self.inner = bench
-        self.safe_s = bench.safe_s
 
     async def make_safe(self) -> None:
         """Make the devices safe as `Bench.make_safe` does: at the same time where they have deadlines of their own."""

@@ -14,6 +14,7 @@ from bench_service.background import BackgroundTasks
 from bench_service.campaigns import transitions
 from bench_service.campaigns.campaign import Step
 from bench_service.campaigns.judgement import judge
+from bench_service.campaigns.lineage import failed_calibrations
 from bench_service.campaigns.run import CampaignRun, StepState
 from bench_service.campaigns.run_log import tell
 from bench_service.campaigns.stores import Stores
@@ -32,7 +33,7 @@ from bench_service.model.records import BenchStop, StoredResult, reasons_of
 from bench_service.model.request import CAMPAIGN_RUN, JobRequest
 from bench_service.telemetry.log_context import about
 from bench_service.wall_clock import now
-from procedures.core.errors import DomainError
+from procedures.core.errors import DomainError, NoCalibration
 
 BUSY_S = 0.2
 """Interval between two looks while a run is open [s]."""
@@ -153,6 +154,8 @@ class Conductor:
         except (NotDriving, BenchBusy) as error:  # not the step's fault
             return transitions.waiting(run, str(error))
         except (DomainError, ServiceError) as error:
+            if isinstance(error, NoCalibration) and (why := failed_calibrations(run, index, self._stores)):
+                return transitions.left_out(run, index, f"left out: {why}; {error}", at)
             kind = type(error).__name__
             return transitions.failed(run, index, StepState.FAILED, f"{kind}: {error}", at, kind in HOPELESS)
         except Exception as error:  # a defect: the run must still end
@@ -265,7 +268,7 @@ class Conductor:
     def _calibrations_of(self, run: CampaignRun, step: Step) -> tuple[str, ...]:
         """Calibrations that the steps' results gave, in the order of the steps."""
         results = [s.result_id for name in step.calibrations_of for s in run.steps if s.name == name and s.result_id]
-        return self._stores.results.calibrations_of(results)
+        return tuple(c.id for c in self._stores.calibrations.of_results(results))
 
     def _abandoned(self, run: CampaignRun, changed: CampaignRun) -> None:
         """Cancel a job that was submitted in vain: another process changed the run first."""

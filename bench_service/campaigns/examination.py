@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from bench_service.campaigns.campaign import Campaign, Step, StepLimit
 from bench_service.jobs.planning import Plan, Planner, stations_of
 from bench_service.model.errors import NotFound
-from procedures.core.errors import BadParameter, DomainError
+from procedures.core.errors import BadParameter, DomainError, NoCalibration
 from procedures.core.units import HOUR, converted
 from procedures.procedure import PredictedUncertainty, Procedure
 
@@ -100,7 +100,6 @@ class Examiner:
             if self._catalogue.methods[step.does].calibrations is not NO_CALIBRATIONS:
                 progress.calibrating.add(step.name)
             return StepPlan(step.name, step.does)
-        procedure = self._catalogue.procedure(step.does)
         try:
             plan = self._planner.plan(step.does, unit, step.parameters, bench)
         except ValidationError as error:
@@ -108,7 +107,7 @@ class Examiner:
         except BadParameter as error:
             raise BadParameter(f"{where}.parameters.{error.field}", error.value, error.allowed) from error
         except DomainError as error:
-            if not (procedure.uses_calibration and type(error) is DomainError):
+            if not isinstance(error, NoCalibration):
                 raise BadParameter(f"{where}.parameters", step.does, str(error)) from error
             return self._without_calibration(step, where, unit, bench, progress, strict, error)
         if plan.violations:

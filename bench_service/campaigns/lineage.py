@@ -7,6 +7,7 @@ from bench_service.campaigns.run import CampaignRun, StepRun
 from bench_service.campaigns.stores import Stores
 from bench_service.model.job import Job
 from bench_service.model.records import StoredResult
+from procedures.core.limits import Verdict
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,14 @@ def lineage_of(run: CampaignRun, stores: Stores) -> tuple[StepLineage, ...]:
         if step.job_id is None and step.result_id is not None:
             found.append(_of_method(step, stores.results.get(step.result_id)))
     return tuple(found)
+
+
+def failed_calibrations(run: CampaignRun, index: int, stores: Stores) -> str:
+    """The calibrations of earlier steps that failed and so do not count, in words; empty where there is none."""
+    failed = {s.result_id: s.name for s in run.steps[:index] if s.verdict is not Verdict.PASS and s.result_id}
+    gave = stores.calibrations.of_results(list(failed))
+    names = dict.fromkeys(failed[c.result_id] for c in gave if c.result_id)
+    return f"the calibration of {', '.join(names)} did not pass" if names else ""
 
 
 def _of_job(step: StepRun, job: Job, result: StoredResult | None, stores: Stores) -> StepLineage:

@@ -107,6 +107,12 @@ def failed(
     return _after(_with(run, index, ended), index, at)
 
 
+def left_out(run: CampaignRun, index: int, reason: str, at: datetime) -> CampaignRun:
+    """The run with a step skipped, because an earlier step failed to give what it needs."""
+    step = replace(run.steps[index], state=StepState.SKIPPED, reason=reason, finished_at=at)
+    return _after(_with(run, index, step), index, at)
+
+
 def cancelled(run: CampaignRun, at: datetime) -> CampaignRun:
     """The run ended by a client's request; its steps that did not end are skipped."""
     skipped = _skipped(run, "the run was cancelled")

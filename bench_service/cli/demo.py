@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.text import Text
 
-from bench_service.cli.client import RESULT, call
-from bench_service.cli.tables import check_table, coefficient_table
-from bench_service.cli.watching import JOB, exit_code, watch
+from bench_service.cli.asking.client import RESULT, call
+from bench_service.cli.asking.watching import JOB, exit_code, watch
+from bench_service.cli.printing.tables import check_table, coefficient_table
 
 if TYPE_CHECKING:
     import httpx
@@ -41,10 +41,9 @@ def _one(client: "httpx.Client", procedure: str, unit: str, seed: int, console: 
 
 
 def _show_coefficients(client: "httpx.Client", job: dict[str, Any], console: Console) -> None:
-    newest = call(client, "GET", f"/api/v1/units/{job['unit']}/calibrations", ("items",), params={"limit": 1})["items"][
-        0
-    ]
+    path = f"/api/v1/units/{job['unit']}/calibrations"
+    newest = call(client, "GET", path, ("items",), params={"limit": 2})["items"]
     truth = call(client, "GET", f"/api/v1/jobs/{job['id']}/truth", ("triads",))["triads"]
-    table, worst = coefficient_table(newest["triads"], truth)
+    table, worst = coefficient_table([c["calibration"] for c in reversed(newest)], truth)
     console.print(table)
     console.print(f"Largest of 24 errors: {worst:.2f} of its own standard uncertainty")

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from bench_service.cli.private_files import mode_of_exports
+from bench_service.cli.processes.private_files import mode_of_exports
 from bench_service.cli.refusal import Refused
 
 

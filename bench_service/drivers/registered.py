@@ -11,7 +11,7 @@ from bench_service.drivers.device_register import DeviceLink, DeviceRegister
 from procedures.bench import SAFE_ORDER, Bench
 from procedures.bench.errors import BenchError, Disconnected, OutOfRange
 
-READS = frozenset(f"{device}.{verb}" for device in (*SAFE_ORDER, "imu") for verb in ("read", "identify"))
+READS = frozenset(f"{device}.{verb}" for device in (*SAFE_ORDER, "imu", "environment") for verb in ("read", "identify"))
 """Verbs that change nothing and are not noted."""
 REMEMBERED = ("table", "powered", "chamber_target_c", "current_ma")
 """Fields of the state that change as soon as a demand is made; a refused demand does not change them."""

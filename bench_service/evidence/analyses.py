@@ -12,6 +12,7 @@ from bench_service.evidence.documents import document_of, require_storable
 from bench_service.evidence.job_analysis import analysed, recordings_of
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.evidence.work_processes import WorkProcesses
+from bench_service.model.context import context_of
 from bench_service.model.job import Job
 from bench_service.model.records import Idempotency, RecordingState, StoredResult
 from bench_service.model.request import fingerprint
@@ -66,7 +67,8 @@ class AnalysisService:
         if self._processes is not None:
             procedure.params.model_validate(merged)
             return self._stores.results.get(self._processes.result("again", job_id, parameters, key))
-        result = analysed(job, procedure, merged, recordings, self._code_version)
+        context = context_of(job, self._stores.calibrations.several)
+        result = analysed(job, context, procedure, merged, recordings, self._code_version)
         return self._stores.results.add(result.stored, result.calibrations, False, idempotency, result.corrections)
 
     def run_method(self, request: AnalysisRequest, key: str | None = None) -> StoredResult:
@@ -81,8 +83,8 @@ class AnalysisService:
         params = method.params.model_validate(request.parameters)
         if self._processes is not None:
             return self._stores.results.get(self._processes.result("method", request, key))
-        used = [self._stores.results.calibration(c) for c in request.calibrations]
-        dated = tuple(DatedCalibration(c.id, c.made_at.isoformat(), c.triads) for c in used)
+        used = self._stores.calibrations.several(request.calibrations)
+        dated = tuple(DatedCalibration(c.id, c.made_at.isoformat(), (c.value,)) for c in used)
         evidence = Evidence(self._complete(request.recordings), dated)
         units = {r.info.unit for r in evidence.recordings} | {c.unit for c in used}
         if len(units) > 1:

@@ -7,7 +7,6 @@ from typing import Any
 from bench_service.evidence.catalogue import AnyProcedure
 from bench_service.evidence.documents import document_of, require_storable
 from bench_service.evidence.stores import EvidenceStores
-from bench_service.model.context import context_of
 from bench_service.model.job import Job
 from bench_service.model.records import StoredResult
 from bench_service.wall_clock import new_id, now
@@ -16,7 +15,7 @@ from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Recording
 from procedures.core.unit_correction import UnitCorrection
 from procedures.inspection import analyse_procedure
-from procedures.procedure import Outcome
+from procedures.procedure import Context, Outcome
 
 
 @dataclass(frozen=True)
@@ -36,6 +35,7 @@ def recordings_of(stores: EvidenceStores, job_id: str) -> list[Recording]:
 
 def analysed(
     job: Job,
+    context: Context,
     procedure: AnyProcedure,
     parameters: dict[str, Any],
     recordings: Sequence[Recording],
@@ -47,13 +47,12 @@ def analysed(
     """
     if len(recordings) != len(job.stations):
         raise UnfitRecording(f"job {job.id} has {len(recordings)} of its {len(job.stations)} recordings")
-    context = context_of(job)
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
     outcome = analyse_procedure(procedure, recordings, params, context)
     overdue = context.bench.overdue(job.created_at.date().isoformat())
     if overdue:
         outcome = outcome.model_copy(update={"warnings": (*overdue, *outcome.warnings)})
-    used = context.unit.calibration_id if procedure.uses_calibration else None
+    used = (context.unit.calibration_id(triad) for triad in procedure.uses_calibration)
     corrections = (context.unit.correction_id(kind) for kind in procedure.uses_corrections(params))
     stored = StoredResult(
         id=new_id(),
@@ -64,7 +63,7 @@ def analysed(
         document=document_of(outcome),
         verdict=outcome.verdict,
         recordings=tuple((r.info.id, r.info.content_hash) for r in recordings),
-        calibrations=(used,) if used else (),
+        calibrations=tuple(c for c in used if c is not None),
         code_version=code_version,
         simulated=job.simulated,
         created_at=now(),

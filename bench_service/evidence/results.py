@@ -6,7 +6,7 @@ Every method is one transaction, as in `store`.
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from bench_service.model.records import Idempotency, Page, ResultValue, StoredCalibration, StoredResult
+from bench_service.model.records import Idempotency, Page, ResultValue, StoredResult
 from bench_service.model.search import EVERYTHING, Search
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.unit_correction import UnitCorrection
@@ -19,13 +19,14 @@ class ResultStore(Protocol):
         self,
         result: StoredResult,
         calibrations: Sequence[TriadCalibration] = (),
-        make_current: bool = True,
+        by_rule: bool = True,
         idempotency: Idempotency | None = None,
         corrections: Sequence[UnitCorrection] = (),
     ) -> StoredResult:
-        """Store a result with its lineage, and its calibrations as the unit's current ones, in one transaction.
+        """Store a result with its lineage, calibrations and corrections, in one transaction.
 
-        Corrections, at most one of a kind, are stored in the same manner; see `CorrectionStore` for their history.
+        Calibrations, at most one of a triad, join the unit's history; where `by_rule` is true, those that
+        `model.calibrations.takes_over` allows become current. Corrections, at most one of a kind, become current there.
         Raises `IdempotencyConflict`; a known key with the same fingerprint returns the first result.
         """
         ...
@@ -66,18 +67,6 @@ class ResultStore(Protocol):
         """
         ...
 
-    def calibrations_of(self, results: Sequence[str]) -> tuple[str, ...]:
-        """Ids of the calibrations that results gave, in the order of the results."""
-        ...
-
     def of_recording(self, recording_id: str) -> tuple[str, ...]:
         """Ids of the results that used a recording."""
-        ...
-
-    def calibrations(self, unit: str, after: str | None = None, limit: int = 50) -> Page[StoredCalibration]:
-        """A unit's calibrations, newest first."""
-        ...
-
-    def calibration(self, calibration_id: str) -> StoredCalibration:
-        """Return one calibration by its id. Raises `NotFound`."""
         ...

@@ -1,21 +1,23 @@
-"""Stores of the evidence room: units, recordings, results, corrections, and clients' idempotency keys."""
+"""Stores of the evidence room: units, recordings, results, calibrations, corrections, and clients' idempotency keys."""
 
 from dataclasses import dataclass
 
+from bench_service.access.stores import AccessStores
+from bench_service.evidence.calibrations import CalibrationStore
 from bench_service.evidence.corrections import CorrectionStore
 from bench_service.evidence.keys import KeyStore
 from bench_service.evidence.recordings import RecordingStore
 from bench_service.evidence.results import ResultStore
 from bench_service.evidence.units import UnitStore
-from bench_service.telemetry.stores import TelemetryStores
 
 
 @dataclass(frozen=True)
-class EvidenceStores(TelemetryStores):
+class EvidenceStores(AccessStores):
     """The stores of this room and of those below it."""
 
     units: UnitStore
     recordings: RecordingStore
     results: ResultStore
+    calibrations: CalibrationStore
     corrections: CorrectionStore
     keys: KeyStore

@@ -59,8 +59,12 @@ class Planner:
 
     def plan(self, name: str, unit: str, requested: dict[str, Any], bench: str | None = None) -> Plan:
         """Plan a job; nothing moves. Raises pydantic's `ValidationError`, `DomainError`, `NotFound`, `NotMounted`."""
+        self.catalogue.procedure(name)  # an unknown procedure is said before an unknown unit
+        return self.plan_in(self.context(unit, bench), name, requested)
+
+    def plan_in(self, context: Context, name: str, requested: dict[str, Any]) -> Plan:
+        """Plan a job in a context that is known; raises as `plan`, but for the context."""
         procedure = self.catalogue.procedure(name)
-        context = self.context(unit, bench)
         parameters = procedure.resolve(procedure.params.model_validate(requested), context)
         stations = stations_of(procedure, parameters)
         overdue = context.bench.overdue(now().date().isoformat())

@@ -102,11 +102,11 @@ class BenchQueue:
         return f"behind {ahead} jobs; the last of them is {last}"
 
     def _of_others(self, entry: QueueEntry) -> Iterator[Reservation]:
-        """Reservations of the job's bench or unit by holders other than that of its own reservation."""
-        mine = next((r.holder for r in self.reservations if r.id == entry.reservation), None)
+        """Reservations of the job's bench or unit by holders and teams other than those of its own reservation."""
+        mine = next((r for r in self.reservations if r.id == entry.reservation), None)
         for reservation in self.reservations:
             concerned = {Reserved.BENCH: self.bench, Reserved.UNIT: entry.unit}[reservation.kind]
-            if reservation.name == concerned and reservation.holder != mine:
+            if reservation.name == concerned and not reservation.admits(mine):
                 yield reservation
 
 

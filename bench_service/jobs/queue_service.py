@@ -31,6 +31,7 @@ class ReservationRequest:
     minutes: float | None
     """Duration from now, where no end is given [min]."""
     note: str = ""
+    team: str = ""
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,20 @@ class QueueService:
         for bench_id in (kept.name,) if kept.kind is Reserved.BENCH else self._benches.ids():
             self._wake(bench_id)
         return kept
+
+    def team_of(self, reservation_id: str | None) -> str:
+        """The team of a reservation; empty where there is none, or everybody acts on it."""
+        if reservation_id is None:
+            return ""
+        try:
+            return self._stores.reservations.get(reservation_id).team
+        except NotFound:
+            return ""
+
+    def team_of_bench(self, bench_id: str) -> str:
+        """The team that has reserved a bench now; empty: none has."""
+        held = self._stores.queue.look(bench_id, now()).reservations
+        return next((r.team for r in held if (r.kind, r.name) == (Reserved.BENCH, bench_id)), "")
 
     def usable(self, reservation_id: str, bench: str, unit: str) -> None:
         """Refuse a reservation that does not hold, or is for another bench or unit. Raises `BadParameter`."""

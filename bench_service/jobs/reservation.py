@@ -27,12 +27,20 @@ class Reservation:
     created_at: datetime
     until: datetime
     note: str = ""
+    team: str = ""
+    """Team whose members act on it and on its jobs, from the account or token that made it; empty: everybody."""
     ended_at: datetime | None = None
     """Time when its holder gave it back early."""
 
     def active(self, at: datetime) -> bool:
         """Return whether it holds at a moment: the one place where a reservation's end is compared with a clock."""
         return self.ended_at is None and at < self.until
+
+    def admits(self, other: "Reservation | None") -> bool:
+        """Return whether a job under another reservation need not wait for this one: same holder, or same team."""
+        if other is None:
+            return False
+        return other.holder == self.holder or (bool(self.team) and other.team == self.team)
 
     @property
     def over_at(self) -> datetime:

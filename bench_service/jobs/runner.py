@@ -18,14 +18,14 @@ from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.retries import try_again
 from bench_service.jobs.stores import JobStores
-from bench_service.model.context import CONTEXT, context_of
+from bench_service.model.context import context_document, context_of, withheld_calibration
 from bench_service.model.errors import ServiceError, StorageFailure
 from bench_service.model.job import Failure, Job, JobState
 from bench_service.model.records import BenchStop, Idempotency, StoredResult
 from bench_service.wall_clock import now
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, Stopped
-from procedures.core.errors import DomainError
+from procedures.core.errors import DomainError, NoCalibration
 from procedures.core.limits import Verdict
 from procedures.procedure import Outcome
 
@@ -80,8 +80,8 @@ class JobRunner:
     def claim(self, entry: QueueEntry) -> Job | None:
         """Claim a queued job, with its unit's current data; None where it cannot begin any more."""
         job = self._stores.jobs.get(entry.id)
-        context = self._planner.refreshed(context_of(job))
-        return self._stores.queue.claim(entry, CONTEXT.dump_python(context, mode="json"), now())
+        context = self._planner.refreshed(context_of(job, self._stores.calibrations.several))
+        return self._stores.queue.claim(entry, context_document(context), now())
 
     def stations(self, job_id: str, attempt: int) -> int:
         """Number of a claimed job's stations; with 0 stations nothing moves.
@@ -115,6 +115,7 @@ class JobRunner:
         if not self._lease_held():
             return StepOutcome(Failure("LeaseLost", "another process may drive this bench now", index))
         try:
+            self._require_usable_calibrations(job)
             session = self._session_of(job)
             if self._ending.is_set():  # set while the bench was being opened, when there was no session to end
                 raise ShuttingDown
@@ -182,7 +183,8 @@ class JobRunner:
         procedure = self._planner.catalogue.procedure(job.procedure)
         try:
             recordings = recordings_of(self._stores, job_id)
-            result = analysed(job, procedure, job.parameters, recordings, self._code_version)
+            context = context_of(job, self._stores.calibrations.several)
+            result = analysed(job, context, procedure, job.parameters, recordings, self._code_version)
             stored = self._stores.results.add(
                 result.stored,
                 result.calibrations,
@@ -251,6 +253,12 @@ class JobRunner:
             return bench_stop is not None or self._stores.jobs.cancel_requested(job_id)
         except StorageFailure:
             return False
+
+    def _require_usable_calibrations(self, job: Job) -> None:
+        """Refuse a job whose unit's calibration was rejected or expired while it waited. Raises `NoCalibration`."""
+        triads = self._planner.catalogue.procedure(job.procedure).uses_calibration
+        if refusal := withheld_calibration(job, triads):
+            raise NoCalibration(refusal)
 
     def _session_of(self, job: Job) -> BenchSession:
         if self._session is not None and self._session.job.id == job.id:

@@ -12,7 +12,7 @@ from bench_service.jobs.queue_service import QueueService
 from bench_service.jobs.stores import JobStores
 from bench_service.jobs.worker import Worker
 from bench_service.mapping import copied
-from bench_service.model.context import CONTEXT
+from bench_service.model.context import context_document
 from bench_service.model.errors import NotFound
 from bench_service.model.job import Job, JobState
 from bench_service.model.records import Idempotency, StoredResult
@@ -127,7 +127,7 @@ class JobService:
             queued_at=created_at,
             requested_parameters=request.parameters,
             parameters=plan.parameters.model_dump(mode="json"),
-            context=CONTEXT.dump_python(plan.context, mode="json"),
+            context=context_document(plan.context),
             stations=plan.stations,
             duration_s=plan.prediction.duration_s,
             code_version=self._code_version,

@@ -1,7 +1,15 @@
-"""The context of a job: its unit and bench as they were known, stored with the job as JSON."""
+"""The context of a job: its unit and bench as they were known, stored with the job as JSON.
+
+The stored context names the unit's calibrations by their ids: their coefficients are stored once, with them.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
 
 from pydantic import TypeAdapter
 
+from bench_service.model.calibrations import StoredCalibration
 from bench_service.model.errors import NotUnderstood
 from bench_service.model.job import Job
 from procedures.core.errors import DomainError
@@ -10,9 +18,26 @@ from procedures.procedure import Context
 CONTEXT = TypeAdapter(Context)
 
 
-def context_of(job: Job) -> Context:
-    """Read a job's context back from JSON. Raises `NotUnderstood`."""
+def context_document(context: Context) -> dict[str, Any]:
+    """The context as JSON, without the coefficients of calibrations that have an id."""
+    unit = context.unit
+    stored = len(unit.calibration_ids) == len(unit.calibrations)
+    return CONTEXT.dump_python(context, mode="json", exclude={"unit": {"calibrations"}} if stored else None)
+
+
+def context_of(job: Job, calibrations: Callable[[Sequence[str]], Sequence[StoredCalibration]]) -> Context:
+    """Read a job's context back from JSON, with the `calibrations` that it names. Raises `NotUnderstood`."""
     try:
-        return CONTEXT.validate_python(job.context)
+        context = CONTEXT.validate_python(job.context)
     except (ValueError, DomainError) as error:
         raise NotUnderstood(job.id, job.code_version, error) from error
+    unit = context.unit
+    if not unit.calibration_ids or unit.calibrations:
+        return context
+    return replace(context, unit=replace(unit, calibrations=tuple(c.value for c in calibrations(unit.calibration_ids))))
+
+
+def withheld_calibration(job: Job, triads: Sequence[str]) -> str:
+    """Reason why a calibration that a job needs may not be used, as its context says; empty where all may."""
+    unit = job.context.get("unit") or {}
+    return "; ".join(entry["why"] for entry in unit.get("withheld") or () if entry["triad"] in triads)

@@ -5,12 +5,16 @@ ServiceError
 ├── IllegalTransition    the job's state does not allow it
 ├── IdempotencyConflict  the key was used before with another request
 ├── NameTaken            a campaign of that name exists already
+├── CalibrationRefused   a calibration may not become the one that counts
 ├── BenchBusy            another process drives this bench
 ├── Misconfigured        a file that the settings name cannot be used
 ├── NotDriving           this process drives no bench
 ├── NotReady             a job could not start here now
 ├── NotSafe              the bench's devices are not known to be safe
 ├── SeveralStops         a release must name one of the stops that stand
+├── NotAllowed           the role or the team does not have this right
+├── WrongPassword        name or password is wrong
+├── LockedOut            too many failed log-ins
 ├── AlreadyReserved      another holder has reserved this bench or unit
 ├── Overloaded           too much is requested at one time
 ├── NotUnderstood        a job was stored by a version whose format this one does not know
@@ -49,6 +53,10 @@ class IdempotencyConflict(ServiceError):
 
 class NameTaken(ServiceError):
     """Raised where a campaign of that name exists already."""
+
+
+class CalibrationRefused(ServiceError):
+    """Raised where a calibration may not become its triad's current one; the message has the way out."""
 
 
 class BenchBusy(ServiceError):
@@ -93,6 +101,25 @@ class SeveralStops(ServiceError):
             f"/api/v1/benches/{bench}/stops/{{stop_id}}/release"
         )
         self.stops = tuple(stops)
+
+
+class NotAllowed(ServiceError):
+    """Raised where the role or the team of a person or program does not have a right."""
+
+
+class WrongPassword(ServiceError):
+    """Raised where the name or the password of a log-in is wrong; it does not say which."""
+
+    def __init__(self) -> None:
+        super().__init__("name or password is wrong")
+
+
+class LockedOut(ServiceError):
+    """Raised where a name or an address has had too many failed log-ins; `wait_s`: until the next attempt [s]."""
+
+    def __init__(self, message: str, wait_s: float) -> None:
+        super().__init__(message)
+        self.wait_s = wait_s
 
 
 class AlreadyReserved(ServiceError):

@@ -1,4 +1,4 @@
-"""Stored records as values: recordings, results, calibrations, and the pages and keys around them."""
+"""Stored records as values: recordings, results, and the pages and keys around them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -10,7 +10,6 @@ import numpy as np
 
 from bench_service.model.quantities import Quantity
 from bench_service.wall_clock import new_id
-from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 from procedures.core.recording import Channel, RecordingInfo, Station
 
@@ -154,16 +153,3 @@ class ResultValue:
     simulated: bool
     code_version: str
     quantity: Quantity | None
-
-
-@dataclass(frozen=True)
-class StoredCalibration:
-    """A calibration in a unit's history."""
-
-    id: str
-    unit: str
-    result_id: str
-    made_at: datetime
-    current: bool
-    triads: tuple[TriadCalibration, ...]
-    simulated: bool

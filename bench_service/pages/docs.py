@@ -1,7 +1,7 @@
 """API documentation as a page, from files of an installed package: it needs no other host."""
 
 from fastapi import APIRouter, Request
-from fastapi.responses import HTMLResponse, RedirectResponse
+from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse
 
 from bench_service.pages.rendering import templates
 
@@ -18,6 +18,12 @@ POLICY = (
 def docs(request: Request) -> HTMLResponse:
     """Page of every operation of the API, to be read and tried."""
     return templates.TemplateResponse(request, "docs.html", headers={"Content-Security-Policy": POLICY})
+
+
+@router.get("/openapi.json")
+def openapi_document(request: Request) -> JSONResponse:
+    """The API's document."""
+    return JSONResponse(request.app.openapi())
 
 
 @router.get("/redoc")

@@ -159,7 +159,7 @@ def unit_page(serial: str, request: Request) -> HTMLResponse:
         "unit.html",
         unit=unit,
         noise=_noise_rows(unit),
-        calibrations=service.stores.results.calibrations(serial).items,
+        calibrations=service.stores.calibrations.list(serial).items,
         corrections=[(c, correction_table(c.correction)) for c in service.stores.corrections.list(serial).items],
         jobs=service.stores.jobs.list(unit=serial).items,
         imports=[r for r in service.stores.recordings.list(unit=serial).items if r.job_id is None],

@@ -13,7 +13,7 @@ from bench_service.pages.caching import kept
 router = APIRouter(include_in_schema=False)
 
 MEDIA_TYPES = {"css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
-OWN = ("page.css", "act.js", "live.js", "reload.js", "choose.js", "docs.js", "icon.svg")
+OWN = ("page.css", "act.js", "log_in.js", "log_out.js", "live.js", "reload.js", "choose.js", "docs.js", "icon.svg")
 OF_PACKAGE = ("swagger-ui.css", "swagger-ui-bundle.js")
 """Names of the files that the package `fastapi-offline` carries."""
 

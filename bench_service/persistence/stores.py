@@ -1,11 +1,13 @@
 """Construction of the stores: one database, all stores. Must not know their callers."""
 
 from bench_service.campaigns.stores import Stores
+from bench_service.persistence.access.access_store import SqlAccessStore
 from bench_service.persistence.bench.live_store import SqlLiveStore
 from bench_service.persistence.bench.prompt_store import SqlPromptStore
 from bench_service.persistence.bench.registry_store import SqlBenchRegistry
 from bench_service.persistence.campaign_store import SqlCampaignStore
 from bench_service.persistence.database import Database, connect
+from bench_service.persistence.evidence.calibration_store import SqlCalibrationStore
 from bench_service.persistence.evidence.correction_store import SqlCorrectionStore
 from bench_service.persistence.evidence.recording_store import SqlRecordingStore
 from bench_service.persistence.evidence.result_store import SqlResultStore
@@ -41,10 +43,12 @@ def stores_of(database: Database) -> Stores:
         units=SqlUnitStore(database),
         benches=SqlBenchRegistry(database),
         campaigns=SqlCampaignStore(database),
+        calibrations=SqlCalibrationStore(database),
         corrections=SqlCorrectionStore(database),
         live=SqlLiveStore(database),
         prompts=SqlPromptStore(database),
         audit=SqlAuditTrail(database),
         tallies=SqlTallyStore(database),
+        access=SqlAccessStore(database),
         keys=SqlKeyStore(database),
     )

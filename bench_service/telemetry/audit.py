@@ -1,4 +1,5 @@
-"""The audit trail: requests, their authors and outcomes. Entries are added, and never changed or removed.
+"""The audit trail: requests, their authors and outcomes. Entries are added, and never changed; a closed stretch is
+removed when its retention ends, and leaves a checkpoint (`bench_service.telemetry.audit_chain`).
 
 An entry is written after the outcome is known and before the answer, so every acknowledged act is in the trail. Where
 it cannot be written (a full disk) the answer is sent all the same, and the entry goes to the log.
@@ -11,6 +12,7 @@ from typing import Any, Protocol
 
 from bench_service.model.errors import ServiceError
 from bench_service.model.records import Page
+from bench_service.telemetry.audit_chain import ChainReport, Checkpoint
 from bench_service.wall_clock import new_id, now
 
 log = logging.getLogger(__name__)
@@ -23,7 +25,7 @@ class AuditEntry:
     id: str
     at: datetime
     who: str
-    """The name that the client gave, or the address from which it asked."""
+    """The proved name; without accounts the name that the client gave, or the address from which it asked."""
     action: str
     """Name of the operation, as in the API's document: "submit", "stop"."""
     target: str
@@ -44,6 +46,20 @@ class AuditTrail(Protocol):
         self, *, who: str | None = None, target: str | None = None, after: str | None = None, limit: int = 50
     ) -> Page[AuditEntry]:
         """List entries, newest first; `target` is a path or one of its parts, such as an id."""
+        ...
+
+    def verify(self, expected: str | None = None) -> ChainReport:
+        """Check every entry and checkpoint of the chain, and that one has the `expected` digest.
+
+        Raises `StorageFailure`.
+        """
+        ...
+
+    def close(self, before: datetime, by: str, at: datetime) -> tuple[Checkpoint, ...]:
+        """Remove the entries before a moment, and leave a checkpoint for each stretch that was removed.
+
+        Raises `IllegalTransition` where the chain is broken there: what is wrong must be looked at first.
+        """
         ...
 
 

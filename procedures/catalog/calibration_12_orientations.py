@@ -29,7 +29,7 @@ from procedures.analysis.calibration.reference_temperature import ThermalShare
 from procedures.analysis.calibration.scalar import require_scalar_determined
 from procedures.analysis.calibration.station_means import launch_warnings
 from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS, windows
-from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
+from procedures.analysis.calibration.summary import TriadSummary
 from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers, analyse_triad
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -37,7 +37,7 @@ from procedures.core import units
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import BadParameter, Undetermined
 from procedures.core.frames import orientation_beta_gamma, orientation_gamma_beta
-from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
+from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, coefficient_unit
 from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report

@@ -11,6 +11,7 @@ from typing import Annotated
 from pydantic import Field
 
 from procedures import steps
+from procedures.analysis.calibration.reference import TRIAD_NAMES
 from procedures.analysis.calibration.station_plan import windows
 from procedures.analysis.navigation.alignment import ThesisPrediction, require_alignable, thesis_prediction
 from procedures.analysis.repeated_alignment.expected import (
@@ -192,7 +193,7 @@ def _warnings(params: Params, context: Context, expected: ExpectedErrors) -> tup
 
 
 def _basis(context: Context) -> str:
-    return f"Aligned with calibration {context.unit.calibration_id or 'of the unit'}"
+    return f"Aligned with {context.unit.calibration_in_words(*TRIAD_NAMES)}"
 
 
 def _checks(angles: Sequence[AngleErrors], limits: Limits) -> tuple[Check, ...]:
@@ -219,5 +220,5 @@ PROCEDURE = Procedure(
     acquire,
     analyse,
     report,
-    uses_calibration=True,
+    uses_calibration=TRIAD_NAMES,
 )

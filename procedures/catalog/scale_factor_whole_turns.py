@@ -132,7 +132,7 @@ def predict(params: Params, context: Context) -> Prediction:
         for name, sd, of_noise, of_table in parts
     )
     basis = "whole turns; " + (
-        "the unit's calibration" if context.unit.calibration("gyro") else "nominal scale factors"
+        "the unit's calibration" if context.unit.known_matrix("gyro") is not None else "nominal scale factors"
     )
     note = f"; bench time about each axis {', '.join(f'{a} {t:.0f} s' for a, t in zip(AXES, per_axis_s, strict=True))}"
     return Prediction(duration_s, uncertainties, _warnings(params, plan), basis + note)

@@ -293,7 +293,7 @@ def _warnings(params: Params, context: Context) -> tuple[str, ...]:
 PROCEDURE = Procedure(
     *("thermal_cycle", "Thermal cycle", "1.1.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report),
-    uses_calibration=True,
+    uses_calibration=("accelerometer",),
     corrections=corrections,
     uses_corrections=uses_corrections,
     inspection=lambda _: replace(STATIONS, temperatures=True),

@@ -196,6 +196,6 @@ PROCEDURE = Procedure(
     acquire,
     analyse,
     report,
-    uses_calibration=True,
+    uses_calibration=TRIAD_NAMES,
     quantities=quantities,
 )

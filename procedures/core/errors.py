@@ -5,6 +5,7 @@ DomainError
 ├── Undetermined    the plan or the recordings cannot determine a parameter: names the lost combinations
 ├── UnfitRecording  a recording cannot be analysed as asked: gaps, too short, constant, wrong unit
 ├── MissingChannel  a recording lacks a channel that is needed
+├── NoCalibration   a triad has no calibration that may be used
 ├── UnfitResult     a result has a value that cannot be stored: names the field
 └── ProcedureDefect a procedure does not do what its place in the catalogue promises: for its author
 """
@@ -50,6 +51,10 @@ class MissingChannel(DomainError):
         super().__init__(f"the recording has no channel {name!r}; it has {', '.join(present) or 'none'}")
         self.name = name
         self.present = tuple(present)
+
+
+class NoCalibration(DomainError):
+    """A triad of the unit has no calibration, or its current one was rejected or has expired."""
 
 
 class UnfitResult(DomainError):

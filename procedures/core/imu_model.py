@@ -19,6 +19,13 @@ COEFFICIENT_NAMES = tuple(name for i in (1, 2, 3) for name in (f"b_{'xyz'[i - 1]
 """Per triad, channel by channel: [b, K_i1, K_i2, K_i3] for i = x, y, z."""
 
 
+def coefficient_unit(name: str, output_unit: str, input_unit: str) -> str:
+    """Unit of b is the output's; of K "1" where output and input have the same unit."""
+    if name.startswith("b"):
+        return output_unit
+    return "1" if output_unit == input_unit else f"{output_unit}/({input_unit})"
+
+
 @dataclass(frozen=True)
 class TriadCalibration:
     """Calibration coefficients of one triad, with the covariance of their estimate.
@@ -38,8 +45,8 @@ class TriadCalibration:
     matrix: Matrix
     covariance: Matrix = field(repr=False)
     model: str = "linear"
-    """"linear" (full K against known vectors), "scalar" (K upper triangular, magnitude as the only reference) or
-    "field" (K diagonal; cross-couplings zero with the spread that was declared)."""
+    """"linear" (full K against known vectors), "scalar" (K upper triangular, magnitude as the only reference),
+    "field" (K diagonal; cross-couplings zero with the spread that was declared) or "entered" (typed by a person)."""
 
     def __post_init__(self) -> None:
         for name, value, shape in (
@@ -74,6 +81,15 @@ class TriadCalibration:
     def standard_uncertainties(self) -> Array:
         """Square root of the covariance's diagonal, shape (12,)."""
         return np.sqrt(np.diagonal(self.covariance_array))
+
+    @property
+    def correlations(self) -> Array:
+        """Correlation of each pair of coefficients, shape (12, 12): 1 on the diagonal, 0 beside a fixed coefficient."""
+        sd = self.standard_uncertainties
+        safe = np.where(sd > 0.0, sd, 1.0)
+        found = self.covariance_array / np.outer(safe, safe)
+        np.fill_diagonal(found, 1.0)
+        return found
 
 
 def triad_calibration(

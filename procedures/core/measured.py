@@ -32,10 +32,20 @@ class MeasuredSupply:
 
 
 @dataclass(frozen=True)
+class MeasuredEnvironment:
+    """Means of the room's conditions while a recording was made; None: not measured."""
+
+    temperature_c: float | None = None
+    humidity_percent: float | None = None
+    pressure_hpa: float | None = None
+
+
+@dataclass(frozen=True)
 class Measured:
     """Readings of the devices around the unit while a recording was made; None: not read."""
 
     angles: MeasuredAngles | None = None
     supply: MeasuredSupply | None = None
+    environment: MeasuredEnvironment | None = None
     status: tuple[str, ...] = ()
     """Status words of table, supply and unit that were read meanwhile, each once, by first appearance."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from procedures.core.arrays import Array
 from procedures.core.converter import ConverterTriad
-from procedures.core.errors import DomainError
+from procedures.core.errors import NoCalibration
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import TRIADS, Channel
@@ -68,6 +68,16 @@ class UnitDeclaration:
 
 
 @dataclass(frozen=True)
+class WithheldCalibration:
+    """The calibration of a triad that would be in use, but was rejected or has expired."""
+
+    triad: str
+    id: str
+    why: str
+    """Sentence that says why it is not used, and what to do."""
+
+
+@dataclass(frozen=True)
 class Unit:
     """The device under test. `gyro` or `accelerometer` is None where nothing is known of its noise."""
 
@@ -79,9 +89,11 @@ class Unit:
     averaging_time_s: float = 70.0
     """Averaging time at which quantization falls below the rest of the noise (thesis 4.1.3: 70 s)."""
     calibrations: tuple[TriadCalibration, ...] = field(default=(), repr=False)
-    """The current calibration, one entry a triad; empty before the first."""
-    calibration_id: str | None = None
-    """Id of the stored calibration in use."""
+    """The current calibrations, at most one a triad; empty before the first."""
+    calibration_ids: tuple[str, ...] = ()
+    """Ids of the stored calibrations in use, in the order of `calibrations`."""
+    withheld: tuple[WithheldCalibration, ...] = field(default=(), repr=False)
+    """Current calibrations that may not be used."""
     thermal_correction: ThermalCorrection | None = field(default=None, repr=False)
     """The current correction of the kind "thermal", or None."""
     thermal_correction_id: str | None = None
@@ -92,8 +104,21 @@ class Unit:
     """Declaration from the unit's own file; None for a simulated unit."""
 
     def calibration(self, triad: str) -> TriadCalibration | None:
-        """The current calibration of a triad, or None."""
+        """The current calibration of a triad, or None. Raises `NoCalibration` for one that is rejected or expired."""
+        for withheld in self.withheld:
+            if withheld.triad == triad:
+                raise NoCalibration(f"unit {self.serial}: {withheld.why}")
         return next((c for c in self.calibrations if c.triad == triad), None)
+
+    def calibration_id(self, triad: str) -> str | None:
+        """Id of the stored calibration in use of a triad, or None."""
+        ids = {c.triad: known for c, known in zip(self.calibrations, self.calibration_ids, strict=False)}
+        return ids.get(triad)
+
+    def calibration_in_words(self, *triads: str) -> str:
+        """The calibrations of triads as a result's basis names them: "calibration 1 (gyro), 2 (accelerometer)"."""
+        named = [f"{known} ({triad})" for triad in triads if (known := self.calibration_id(triad)) is not None]
+        return f"calibration {', '.join(named) or 'of the unit'}"
 
     def correction_id(self, kind: CorrectionKind) -> str | None:
         """Id of the current correction of a kind, or None."""
@@ -112,15 +137,16 @@ class Unit:
         return None
 
     def known_matrix(self, triad: str) -> Array | None:
-        """K (3, 3) of the current calibration, None without one; of counts neither, for a plan is in SI."""
-        calibration = self.calibration(triad)
+        """K (3, 3) of the current calibration; None without one that may be used, and for one in counts."""
+        calibration = next((c for c in self.calibrations if c.triad == triad), None)
         return None if calibration is None or calibration.output_unit == "count" else calibration.matrix_array
 
     def required_calibration(self, triad: str, purpose: str) -> TriadCalibration:
-        """The current calibration of a triad for a purpose ("verify"). Raises `DomainError` with the remedy."""
+        """The current calibration of a triad for a purpose ("verify"). Raises `NoCalibration` with the remedy."""
         calibration = self.calibration(triad)
         if calibration is None:
-            raise DomainError(
-                f"unit {self.serial} has no calibration of its {triad} triad to {purpose}: calibrate it first"
+            raise NoCalibration(
+                f"unit {self.serial} has no calibration of its {triad} triad to {purpose}: calibrate it first, "
+                "choose one of its history or enter known coefficients; one that failed counts only where it is chosen"
             )
         return calibration

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from procedures.analysis.calibration.reference import TRIAD_NAMES
 from procedures.analysis.navigation import growth_summary as told
 from procedures.analysis.navigation.alignment import rotation_nb
 from procedures.analysis.navigation.error_growth import Alignment, constant_error, error_growth
@@ -171,14 +172,12 @@ def _errors(
 
 
 def _calibration(evidence: Evidence, unit: Unit | None) -> tuple[tuple[TriadCalibration, ...], str]:
-    if len(evidence.calibrations) > 1:
-        raise BadParameter("calibrations", len(evidence.calibrations), "one at a time")
     if evidence.calibrations:
-        dated = evidence.calibrations[0]
-        return dated.triads, f"calibration {dated.id} of {dated.made_at}"
+        return tuple(evidence.one_each().values()), evidence.calibrations_in_words
     if unit is None:
         raise BadParameter("calibrations", 0, "give a calibration, a recording of a calibrated unit, or `declared`")
-    return unit.calibrations, f"the current calibration {unit.calibration_id or ''} of unit {unit.serial}"
+    found = [known for triad in TRIAD_NAMES if (known := unit.calibration(triad)) is not None]
+    return tuple(found), f"the current {unit.calibration_in_words(*TRIAD_NAMES)} of unit {unit.serial}"
 
 
 def _declared(d: Declared, rate_b: Array, force_b: Array) -> tuple[TriadErrors, TriadErrors]:

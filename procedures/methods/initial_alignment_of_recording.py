@@ -120,14 +120,12 @@ def report(result: Result) -> Report:
 
 
 def _calibrations(evidence: Evidence, unit: Unit | None) -> tuple[dict[str, TriadCalibration], str]:
-    if len(evidence.calibrations) > 1:
-        raise BadParameter("calibrations", len(evidence.calibrations), "one at a time")
     if evidence.calibrations:
-        triads, basis = evidence.calibrations[0].triads, f"calibration {evidence.calibrations[0].id}"
+        by_name, basis = evidence.one_each(), evidence.calibrations_in_words
     else:
-        triads = unit.calibrations if unit else ()
-        basis = f"the unit's current calibration {unit.calibration_id or ''}" if unit else ""
-    by_name = {c.triad: c for c in triads}
+        known = {triad: unit.calibration(triad) for triad in TRIADS} if unit else {}
+        by_name = {triad: c for triad, c in known.items() if c is not None}
+        basis = f"the unit's current {unit.calibration_in_words(*TRIADS)}" if unit else ""
     for triad in TRIADS:
         if triad not in by_name:
             raise BadParameter("calibrations", len(evidence.calibrations), f"the {triad} triad has no calibration")

@@ -39,7 +39,7 @@ def upgrade() -> None:
 """
 SUBMIT = """
 import json, sys
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.persistence import open_stores
 from bench_service.settings import Settings

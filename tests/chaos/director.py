@@ -11,7 +11,7 @@ from pathlib import Path
 import httpx
 
 from tests.chaos.databases import OwnPostgres, SqliteFile
-from tests.chaos.load import CAMPAIGN, SHORT, Asked, Clients
+from tests.chaos.load import CAMPAIGN, KNOWN, SHORT, Asked, Clients
 from tests.chaos.processes import Ledger, Program, Topology
 from tests.chaos.witnesses import DatabaseWitness, DeviceWitness, Listener, is_safe, is_warm, register
 
@@ -162,7 +162,7 @@ class Director:
         return run
 
     def _begin(self) -> None:
-        """Start everything, store the campaign, and calibrate the unit once: a verification needs that."""
+        """Start everything, store the campaign, enter known coefficients, and calibrate the unit once."""
         self.topology.start()
         address = f"http://127.0.0.1:{self.topology.ports[0]}"
         with httpx.Client(base_url=address, timeout=30, trust_env=False) as http:
@@ -170,6 +170,9 @@ class Director:
             self._until(lambda: all(map(self.topology.drives, self.topology.benches)), START_S, "benches are driven")
             added = http.post("/api/v1/campaigns", json=CAMPAIGN)
             assert added.status_code == 201, added.text
+            for coefficients in KNOWN:
+                entered = http.post("/api/v1/units/SIM-0001/calibrations", json=coefficients)
+                assert entered.status_code == 201, entered.text
         body = {"procedure": "calibration_12_orientations", "unit": "SIM-0001", "parameters": SHORT, "retries": 5}
         first = Asked("chaos-first", {**body, "bench": self.topology.benches[0], "seed": 1}, "none")
         clients = self.run.clients  # devices fail already: a bench may have to be released before its job goes on

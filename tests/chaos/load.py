@@ -54,6 +54,23 @@ CAMPAIGN: dict[str, Any] = {
         {"name": "nothing", "procedure": "no_operation", "retries": 1},
     ],
 }
+KNOWN = [
+    {
+        "triad": triad,
+        "origin": "nominal scale factors",
+        "choose": True,
+        "coefficients": [
+            {"name": f"b_{axis}", "value": 0.0, "unit": unit, "standard_uncertainty": size} for axis in "xyz"
+        ]
+        + [
+            {"name": f"K{i}{j}", "value": float(i == j), "unit": "1", "standard_uncertainty": 0.2}
+            for i in (1, 2, 3)
+            for j in (1, 2, 3)
+        ],
+    }
+    for triad, unit, size in (("gyro", "deg/h", 1.0), ("accelerometer", "m/s^2", 0.2))
+]
+"""Coefficients that a person enters and chooses: a verification needs some, and so short a calibration fails."""
 BASE_SEED = 1
 RETRY_SEED = 1000
 """What a retry of a step adds to its seed, as the service's documents say; a step's number is added too."""

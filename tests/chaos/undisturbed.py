@@ -10,7 +10,7 @@ import httpx
 from tests.chaos.books import Books, twin_key
 from tests.chaos.databases import engine
 from tests.chaos.director import START_S
-from tests.chaos.load import CAMPAIGN, Asked, campaign_run, recipes_beside_campaign
+from tests.chaos.load import CAMPAIGN, KNOWN, Asked, campaign_run, recipes_beside_campaign
 from tests.chaos.processes import Ledger, Topology
 
 
@@ -23,6 +23,8 @@ def twins(folder: Path) -> dict[str, dict[int, str]]:
         with httpx.Client(base_url=f"http://127.0.0.1:{topology.ports[0]}", timeout=60, trust_env=False) as http:
             _wait(lambda: _says(http, "/healthz"))
             assert http.post("/api/v1/campaigns", json=CAMPAIGN).status_code == 201
+            for coefficients in KNOWN:
+                assert http.post("/api/v1/units/SIM-0001/calibrations", json=coefficients).status_code == 201
             _ended(http, campaign_run(topology.benches[0], 0))
             for number, (procedure, parameters, seed) in enumerate(recipes_beside_campaign()):
                 body = {"procedure": procedure, "unit": "SIM-0001", "parameters": parameters, "seed": seed}

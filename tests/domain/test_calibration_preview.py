@@ -60,11 +60,11 @@ def test_the_preview_says_what_it_rests_on(context: Context):
             ("accelerometer", "m/s^2", B_ACCELEROMETER, K_ACCELEROMETER),
         )
     ]
-    known = Context(replace(context.unit, calibrations=tuple(made), calibration_id="c-7"), context.bench)
-    assert CALIBRATION.predict(CALIBRATION.params(), known).basis == "calibration c-7"
-    assert VERIFICATION.predict(VERIFICATION.params(), known).basis == "calibration c-7"
+    known = Context(replace(context.unit, calibrations=tuple(made), calibration_ids=("c-7", "c-8")), context.bench)
+    assert CALIBRATION.predict(CALIBRATION.params(), known).basis == "calibration c-7 (gyro), c-8 (accelerometer)"
+    assert VERIFICATION.predict(VERIFICATION.params(), known).basis == "calibration c-7 (gyro), c-8 (accelerometer)"
     gyro_only = Context(replace(known.unit, calibrations=(made[0],)), context.bench)
-    expected = "calibration c-7; accelerometer: nominal scale factors, uncertainties scale with the true ones"
+    expected = "calibration c-7 (gyro); accelerometer: nominal scale factors, uncertainties scale with the true ones"
     assert CALIBRATION.predict(CALIBRATION.params(), gyro_only).basis == expected
 
 

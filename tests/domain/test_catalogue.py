@@ -59,7 +59,7 @@ def calibrated() -> Context:
         for triad, unit, bias, matrix in triads
     )
     context = simulated_context()
-    return replace(context, unit=replace(context.unit, calibrations=made, calibration_id="c-1"))
+    return replace(context, unit=replace(context.unit, calibrations=made, calibration_ids=("c-1", "c-2")))
 
 
 @pytest.mark.parametrize("name", OURS)

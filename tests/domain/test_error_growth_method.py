@@ -86,7 +86,7 @@ def test_what_is_missing_is_asked_for(unit: Unit):
         METHOD.analyse(Evidence(), params, None)
     with pytest.raises(BadParameter, match="accelerometer triad is missing"):
         METHOD.analyse(Evidence(calibrations=(dated(1e-9, ("gyro",)),)), params, unit)
-    with pytest.raises(BadParameter, match="one at a time"):
+    with pytest.raises(BadParameter, match="one of each triad; two are of the gyro triad"):
         METHOD.analyse(Evidence(calibrations=(dated(1e-9),) * 2), params, unit)
     with pytest.raises(BadParameter, match="latitude_deg"):
         METHOD.analyse(Evidence(), METHOD.params(latitude_deg=90.0, declared={}), None)

@@ -74,6 +74,7 @@ def test_everything_that_takes_recordings_says_how_they_are_inspected() -> None:
         "gyro_half_turns",
         "initial_alignment_of_recording",
         "kalman_calibration",
+        "multi_position_calibration_of_recordings",
         "noise_analysis",
         "scalar_calibration",
     }

@@ -75,7 +75,7 @@ def test_the_command_does_not_pretend(tmp_path: Path) -> None:
 
 def test_the_command_loads_neither_database_nor_numerics() -> None:
     code = (
-        "import sys; from bench_service.cli.stopping import stop_command; "
+        "import sys; from bench_service.cli.processes.stopping import stop_command; "
         "print([name for name in ('numpy', 'sqlalchemy', 'pydantic', 'typer', 'fastapi') if name in sys.modules])"
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

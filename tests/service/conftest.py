@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
 from tests.service.client import Client
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
 from tests.kit.registered import register_bench
 from tests.service.campaigns import SHORT, add, ended, named, start

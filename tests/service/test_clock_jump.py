@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, now, pause
 from tests.kit.metrics import scraped

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from bench_service.cli import patience
+from bench_service.cli.asking import patience
+from bench_service.cli.asking.patience import patiently
 from bench_service.cli.commands import run_command_line
-from bench_service.cli.patience import patiently
 from bench_service.cli.refusal import Away, Refused
 from bench_service.settings import Settings
 from tests.kit.odd_answers import ENDED, JOB, JOB_ENDED, RESULT, RUN

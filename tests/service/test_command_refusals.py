@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from bench_service.cli import commands
 from bench_service.cli.commands import run_command_line
+from bench_service.cli.groups import jobs
 from bench_service.settings import Settings
 from tests.service.answering import Answer, answering
 
@@ -137,7 +137,7 @@ def test_what_nobody_foresaw_is_one_sentence_and_its_place_is_in_the_log_of_who_
     def broken(*_arguments: object, **_options: object) -> None:
         raise LookupError("a thing\nof two lines")
 
-    monkeypatch.setattr(commands, "connect", broken)
+    monkeypatch.setattr(jobs, "connect", broken)
     assert "unforeseen LookupError: a thing of two lines" in refused(capsys, "jobs")
     assert run_command_line(Settings.model_validate({"log_level": "debug"}), ["jobs"]) == 2
     assert "in broken" in capsys.readouterr().err
@@ -155,5 +155,5 @@ def test_a_library_that_ends_the_process_gives_no_verdict(
     def ends(*_arguments: object, **_options: object) -> None:
         raise SystemExit(code)
 
-    monkeypatch.setattr(commands, "connect", ends)
+    monkeypatch.setattr(jobs, "connect", ends)
     assert run_command_line(Settings.model_validate({}), ["jobs"]) == mine

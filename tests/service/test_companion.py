@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import pytest
 
-from bench_service.cli.companion import AGAIN_S, SLOWEST_S, UNSUPERVISED_S, Companion
-from bench_service.cli.supervising import SUPERVISED_ALREADY
+from bench_service.cli.processes.companion import AGAIN_S, SLOWEST_S, UNSUPERVISED_S, Companion
+from bench_service.cli.processes.supervising import SUPERVISED_ALREADY
 
 KILLED = -9
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from bench_service.bench.session import BenchSession
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.jobs.runner import JobRunner
 from bench_service.settings import Settings

@@ -15,7 +15,7 @@ from bench_service.bench.processes import Driving
 from bench_service.bench.session import BenchSession, ShuttingDown
 from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.supervisor import Supervisor
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.jobs.runner import StepOutcome
 from bench_service.persistence import acquire_lease, open_stores

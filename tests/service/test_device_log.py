@@ -11,9 +11,11 @@ import pytest
 from bench_service.bench.device_log import DeviceLog, require_agreement
 from procedures.bench.description import TableAccuracy
 from procedures.bench.device import StatusWord
+from procedures.bench.environment import EnvironmentReading
 from procedures.bench.errors import DeviceFault
 from procedures.bench.supply import SupplyReading
 from procedures.bench.turntable import TableReading
+from procedures.core.measured import MeasuredEnvironment
 from procedures.core.recording import Station
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
@@ -33,7 +35,11 @@ class _Bench:
         self.clock = SimpleNamespace(now_s=lambda: self.time_s)
         self.turntable = SimpleNamespace(read=self._table)
         self.supply = SimpleNamespace(read=self._supply)
+        self.environment = SimpleNamespace(read=self._room)
         self.imu = SimpleNamespace(status=lambda: (StatusWord("status", "0x0010", ("gyro failed",)),))
+
+    async def _room(self) -> EnvironmentReading:
+        return EnvironmentReading(self.time_s, 20.0 + self.time_s, None, 1004.0)
 
     async def _table(self) -> TableReading:
         self.asked += 1
@@ -77,6 +83,7 @@ def test_means_and_spreads_are_those_of_the_readings_once_a_second() -> None:
     assert found.supply.current_a == pytest.approx(np.mean(currents))
     assert found.supply.current_spread_a == pytest.approx(np.std(currents, ddof=1))
     assert (found.supply.limiting, found.supply.readings) == (False, 10)
+    assert found.environment == MeasuredEnvironment(24.5, None, 1004.0)  # the mean of 20 … 29
     assert found.status == ("*STB? = 0x00", "status = 0x0010 (gyro failed)")
 
 

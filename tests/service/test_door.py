@@ -9,9 +9,9 @@ import pytest
 from starlette.datastructures import Headers
 
 from bench_service.api.http.door import Door, is_loopback, is_loopback_address, may_listen
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.cli.commands import run_command_line
-from bench_service.cli.serving import serving
+from bench_service.cli.processes.serving import serving
 from bench_service.model.errors import Misconfigured
 from bench_service.settings import BadSettings, Settings
 from tests.service.client import Client
@@ -185,11 +185,12 @@ def test_an_address_that_others_reach_needs_a_token(tmp_path: Path, capsys: pyte
 def test_a_service_in_a_container_takes_what_its_published_port_brings() -> None:
     door = Door.of(Settings(host="0.0.0.0", published="loopback"))
     bridge, local = "172.18.0.1", Headers({"host": "localhost:8000"})
-    assert door.refusal(local, "POST", bridge) is None
-    assert Door.of(Settings()).refusal(local, "POST", bridge) is not None
-    assert Door.of(Settings()).refusal(local, "POST", "127.0.0.1") is None
-    assert Door.of(Settings()).refusal(local, "POST", None) is None, "over a socket file"
-    refused = door.refusal(Headers({"host": "0.0.0.0:8000"}), "GET", bridge)
+    assert door.refusal(local, "POST") is None
+    assert door.is_local(bridge)
+    assert not Door.of(Settings()).is_local(bridge)
+    assert Door.of(Settings()).is_local("127.0.0.1")
+    assert Door.of(Settings()).is_local(None), "over a socket file"
+    refused = door.refusal(Headers({"host": "0.0.0.0:8000"}), "GET")
     assert refused is not None, "any address is nobody's name"
     assert refused.status == 421
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
 from simulators.truth import default_bench, save_bench
 from tests.kit.registered import register_bench
@@ -30,14 +30,12 @@ def uncalibrated(sqlite_client: Client) -> str:
 
 
 @pytest.fixture(scope="module")
-def calibration(sqlite_client: Client, uncalibrated: str) -> str:
-    job = sqlite_client.wait(sqlite_client.submit(seed=21, parameters={"dwell_s": 30.0, "settle_s": 0.5})["id"])
-    assert job["state"] == "succeeded", job
-    return sqlite_client.http.get("/api/v1/units/SIM-0001/calibrations").json()["items"][0]["id"]
+def calibration(sqlite_client: Client, uncalibrated: str) -> dict[str, str]:
+    return sqlite_client.calibrate(seed=21, dwell_s=30.0, settle_s=0.5)
 
 
 @pytest.fixture(scope="module")
-def job(sqlite_client: Client, calibration: str) -> dict[str, Any]:
+def job(sqlite_client: Client, calibration: dict[str, str]) -> dict[str, Any]:
     return sqlite_client.wait(sqlite_client.submit("initial_alignment", parameters=PLAN, seed=22)["id"], seconds=100.0)
 
 
@@ -63,9 +61,12 @@ def test_every_alignment_is_a_launch_and_errs_as_predicted(
     assert result["verdict"] == "pass", result["document"]["checks"]
 
 
-def test_the_result_rests_on_the_calibration(sqlite_client: Client, calibration: str, result: dict[str, Any]) -> None:
-    assert result["document"]["basis"] == f"Aligned with calibration {calibration}"
-    assert calibration in str(result)
+def test_the_result_rests_on_the_calibration(
+    sqlite_client: Client, calibration: dict[str, str], result: dict[str, Any]
+) -> None:
+    gyro, accelerometer = calibration.values()
+    assert result["document"]["basis"] == f"Aligned with calibration {gyro} (gyro), {accelerometer} (accelerometer)"
+    assert result["lineage"]["calibrations"] == [gyro, accelerometer]
     page = sqlite_client.http.get(result["page"]).text
     for text in ("Errors found and predicted", "thesis 1.1", "Expected of one alignment, by source"):
         assert text in page
@@ -84,12 +85,12 @@ def test_the_preview_predicts_both_ways(sqlite_client: Client, result: dict[str,
     assert preview["duration_s"] > 4 * (60.0 + 30.0)
 
 
-def test_a_unit_without_a_calibration_is_refused(uncalibrated: str, calibration: str) -> None:
+def test_a_unit_without_a_calibration_is_refused(uncalibrated: str, calibration: dict[str, str]) -> None:
     assert "has no calibration of its accelerometer triad to align with" in uncalibrated
     assert calibration
 
 
-def test_a_pole_and_a_unit_on_end_are_refused(sqlite_client: Client, calibration: str) -> None:
+def test_a_pole_and_a_unit_on_end_are_refused(sqlite_client: Client, calibration: dict[str, str]) -> None:
     before = sqlite_client.stored()
     for parameters, field in (
         ({"latitude_deg": 90.0}, "latitude_deg"),

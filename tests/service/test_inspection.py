@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.cli.commands import run_command_line
 from bench_service.settings import Settings
 from tests.service.client import Client

@@ -19,9 +19,10 @@ def test_a_calibration_ends_with_a_result_a_calibration_and_its_lineage(client: 
     assert result["lineage"]["code_version"] == job["code_version"]
     one = client.http.get(f"/api/v1/recordings/{recordings[0]['id']}").json()
     assert one["results"] == [result["id"]]
-    newest = client.http.get("/api/v1/units/SIM-0001/calibrations").json()["items"][0]
-    assert newest["current"]
-    assert newest["result"] == result["id"]
+    newest = client.http.get("/api/v1/units/SIM-0001/calibrations").json()["items"][:2]
+    assert {c["triad"] for c in newest} == {"gyro", "accelerometer"}
+    assert [c["result"] for c in newest] == [result["id"]] * 2
+    assert [c["current"] for c in newest] == [job["verdict"] == "pass"] * 2
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(client: Client) -> None:
@@ -130,11 +131,10 @@ def test_a_result_read_twice_is_not_sent_twice(client: Client) -> None:
 
 
 def test_verification_names_the_calibration_that_it_rests_on(client: Client) -> None:
-    client.wait(client.submit(seed=21)["id"])
-    current = client.http.get("/api/v1/units/SIM-0001").json()["calibration"]
+    current = client.calibrate(seed=21)
     job = client.wait(client.submit("verification_9_orientations", seed=22)["id"])
     result = client.http.get(f"/api/v1/jobs/{job['id']}/result").json()
-    assert result["lineage"]["calibrations"] == [current]
+    assert result["lineage"]["calibrations"] == list(current.values())
 
 
 def test_lists_are_paged_newest_first(client: Client) -> None:

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 import httpx
 import pytest
 
-from bench_service.cli.serving import serving
+from bench_service.cli.processes.serving import serving
 from bench_service.settings import Settings
 from tests.service.client import Client
 

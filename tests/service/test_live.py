@@ -8,7 +8,7 @@ import httpx
 import numpy as np
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from tests.service.client import Client

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bench_service.cli import logs
+from bench_service.cli.processes import logs
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from tests.kit.logged_service import process

@@ -13,7 +13,7 @@ import pytest
 
 from bench_service import wall_clock
 from bench_service.bench.devices import AT_REST, DeviceState
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices

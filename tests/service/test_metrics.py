@@ -1,6 +1,6 @@
 """What a monitor scrapes: right for every process of a database, also after a restart, and true to what happened."""
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
 from tests.kit.metrics import scraped
 from tests.service.campaigns import add, ended, named, start, until

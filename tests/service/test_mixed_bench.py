@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.drivers.interface import registry
 from bench_service.settings import Settings
 from tests.kit import line_devices
@@ -14,7 +14,7 @@ from tests.kit.line_devices import LineDevice, bench_text, served
 from tests.service.client import Client
 
 CERTIFICATE = 'certificate = { number = "AT-117", laboratory = "PTB", due = 2020-03-02 }\n'
-WARN = '[policy]\nexpired_certificate = "warn"\n'
+WARN = '[policy]\nexpired_certificate = "warn"\n[environment]\ntemperature_c = 21.5\n'
 PLAN = {"positions": [[0, 90, 0, 1], [45, 0, -30, 1]], "delay_from": "rest", "settle_s": 0.0}
 
 
@@ -61,12 +61,14 @@ def test_a_recording_says_device_by_device_where_it_comes_from(
         "unit_link": True,
         "chamber": False,
         "operator": True,
+        "environment": False,
     }
     assert devices["turntable"]["identity"]["serial"] == "T-7"
     assert devices["turntable"]["certificate"] == {"number": "AT-117", "laboratory": "PTB", "due": "2020-03-02"}
     measured, angles = recording["measured"], recording["station"]["angles"]
     assert measured["angles"]["mean"] == angles
     assert measured["supply"]["voltage_v"] == 28.0
+    assert measured["environment"] == {"temperature_c": 21.5, "humidity_percent": None, "pressure_hpa": None}
 
 
 def test_the_result_is_marked_and_says_which_angles_were_used(

@@ -9,7 +9,7 @@ import allantools
 import numpy as np
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
 from tests.service.client import Client
 from tests.service.page import drawn

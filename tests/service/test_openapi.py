@@ -11,7 +11,7 @@ from typing import Any
 import httpx
 import pytest
 
-from bench_service.cli.serving import serving
+from bench_service.cli.processes.serving import serving
 from bench_service.settings import Settings
 
 METHODS = ("get", "put", "post", "delete", "patch")
@@ -185,7 +185,7 @@ def test_the_document_says_where_it_is_served_who_may_ask_and_what_its_tags_are(
     assert document["info"]["contact"]
     used = {tag for _, operation in operations(document) for tag in operation["tags"]}
     assert used == {tag["name"] for tag in document["tags"] if tag["description"]}
-    named = {name for way in document["security"] for name in way}
+    named = {name for _, operation in operations(document) for way in operation["security"] for name in way}
     assert named == set(document["components"]["securitySchemes"]) != set()
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from bench_service.api.http.headers import OWN_FILES_ONLY
 from bench_service.bench.directory import BenchDirectory
-from bench_service.cli.serving import serving
+from bench_service.cli.processes.serving import serving
 from bench_service.pages import figures, images
 from bench_service.settings import Settings
 from tests.service.campaigns import add, named, start

@@ -78,7 +78,7 @@ def test_the_preview_is_the_plan_of_the_job(sqlite_client: Client) -> None:
 
 
 def test_a_verification_can_be_previewed_once_there_is_a_calibration(sqlite_client: Client) -> None:
-    sqlite_client.wait(sqlite_client.submit(seed=32)["id"])
+    sqlite_client.calibrate(seed=32)
     plan = sqlite_client.preview("verification_9_orientations").json()
     assert len(plan["stations"]) == 9
     assert {u["name"] for u in plan["predicted_uncertainties"]} >= {
@@ -90,7 +90,7 @@ def test_a_verification_can_be_previewed_once_there_is_a_calibration(sqlite_clie
 def test_launches_are_compared_and_what_the_calibrations_cannot_resolve_is_said(sqlite_client: Client) -> None:
     for seed in (41, 42, 43):
         assert sqlite_client.wait(sqlite_client.submit(parameters={}, seed=seed)["id"])["state"] == "succeeded"
-    items = sqlite_client.http.get("/api/v1/units/SIM-0001/calibrations", params={"limit": 3}).json()["items"]
+    items = sqlite_client.http.get("/api/v1/units/SIM-0001/calibrations", params={"limit": 6}).json()["items"]
     ids = [c["id"] for c in items]
     answer = sqlite_client.analyse("run_to_run", calibrations=ids)
     assert answer.status_code == 201, answer.text
@@ -114,15 +114,14 @@ def test_launches_are_compared_and_what_the_calibrations_cannot_resolve_is_said(
 def test_a_comparison_of_simulated_calibrations_is_itself_simulated(sqlite_client: Client) -> None:
     for seed in (51, 52):
         sqlite_client.wait(sqlite_client.submit(seed=seed)["id"])
-    items = sqlite_client.http.get("/api/v1/units/SIM-0001/calibrations", params={"limit": 2}).json()["items"]
+    items = sqlite_client.http.get("/api/v1/units/SIM-0001/calibrations", params={"limit": 4}).json()["items"]
     assert all(c["simulated"] for c in items)
     result = sqlite_client.analyse("run_to_run", calibrations=[c["id"] for c in items]).json()
     assert result["lineage"]["simulated"] is True
 
 
 def test_one_calibration_is_not_a_comparison(sqlite_client: Client) -> None:
-    sqlite_client.wait(sqlite_client.submit(seed=61)["id"])
-    newest = sqlite_client.http.get("/api/v1/units/SIM-0001").json()["calibration"]
+    newest = sqlite_client.calibrate(seed=61)["gyro"]
     answer = sqlite_client.analyse("run_to_run", calibrations=[newest])
     assert answer.status_code == 422
     assert "at least two" in answer.json()["detail"]

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from bench_service.cli import private_files
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.cli.files import whole_file
-from bench_service.cli.private_files import protect
+from bench_service.cli.processes import private_files
+from bench_service.cli.processes.private_files import protect
 from bench_service.settings import Settings
 
 

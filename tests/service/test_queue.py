@@ -5,7 +5,7 @@ from datetime import timedelta
 
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
 from bench_service.wall_clock import now, pause
 from tests.service.client import Client

@@ -8,7 +8,7 @@ from threading import Thread
 import pytest
 import sqlalchemy as sa
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.persistence.bench.lease import FileLease, lease_key
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause

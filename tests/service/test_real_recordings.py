@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
 from tests.service.client import Client
 from tests.service.page import drawn
@@ -147,7 +147,7 @@ def test_lineage_leads_from_the_samples_to_the_numbers_and_back(
     assert client.http.get(f"/api/v1/results/{xsens_result['id']}").json() == xsens_result
     calibrations = client.http.get("/api/v1/units/XSENS-1/calibrations").json()["items"]
     assert [c["result"] for c in calibrations] == [xsens_result["id"]]
-    assert calibrations[0]["triads"] == [xsens_result["document"]["calibration"]]
+    assert calibrations[0]["calibration"] == xsens_result["document"]["calibration"]
 
 
 def test_the_result_has_a_page_with_its_verdict_and_a_plot(client: Client, xsens_result: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import httpx
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
 from bench_service.wall_clock import pause
 from tests.service.client import Client

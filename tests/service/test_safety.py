@@ -9,7 +9,7 @@ import pytest
 
 from bench_service.bench import safety
 from bench_service.bench.processes import ProcessIdentity
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.persistence import open_stores
 from bench_service.persistence.bench.host_files import HostFiles

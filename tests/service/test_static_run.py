@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.settings import Settings
 from procedures.core.units import ARCSEC, DEG_PER_SQRT_HOUR, MICRO_G
 from tests.service.client import Client

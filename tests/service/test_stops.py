@@ -8,7 +8,7 @@ import httpx
 import pytest
 
 from bench_service.bench.safety import SafetyService
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.model.errors import NotSafe
 from bench_service.persistence import open_stores

@@ -56,7 +56,7 @@ def test_launches_are_told_apart_at_ten_parts_in_a_million(sqlite_client: Client
         job = sqlite_client.wait(sqlite_client.submit(PROCEDURE, seed=seed, parameters=parameters)["id"])
         assert (job["state"], job["verdict"], job["error"]) == ("succeeded", "pass", None)
         assert_true(sqlite_client, job["id"])
-        ids.append(sqlite_client.http.get("/api/v1/units/SIM-0001").json()["calibration"])
+        ids.append(sqlite_client.http.get("/api/v1/units/SIM-0001").json()["gyro_calibration"])
     turns = [r["station"]["turn"] for r in sqlite_client.recordings(job["id"])]
     assert sorted({t["turns"] for t in turns}) == [-1, 1]
     compared = sqlite_client.analyse("run_to_run", calibrations=ids).json()["document"]

@@ -7,7 +7,7 @@ import pytest
 import sqlalchemy as sa
 
 from bench_service.campaigns.stores import Stores
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.jobs.dispatcher import Dispatcher, Unfinished
 from bench_service.jobs.queue import QueueEntry

@@ -1,7 +1,6 @@
 """Results, calibrations and their lineage; units and benches."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -72,38 +71,9 @@ def test_a_result_of_something_that_does_not_exist_leaves_nothing(stores: Stores
     with pytest.raises(NotFound, match="calibration 'c'"):
         stores.results.add(new_result(calibrations=("c",)), [_triad("gyro")])
     assert stores.results.list().items == ()
-    assert stores.results.calibrations("U-1").items == ()
+    assert stores.calibrations.list("U-1").items == ()
     with pytest.raises(NotFound, match="result 'x'"):
         stores.results.get("x")
-
-
-def test_one_calibration_is_current(stores: Stores, new_result: NewResult) -> None:
-    assert stores.results.calibrations("U-1").items == ()
-    triads = [_triad("gyro", 1), _triad("accelerometer", 2)]
-    first = stores.results.add(new_result(), triads)
-    stores.results.add(new_result(unit="U-2"), [_triad("gyro", 9)])
-    second = stores.results.add(new_result(), [_triad("gyro", 3)], make_current=False)
-    third = stores.results.add(new_result(), [_triad("gyro", 4)])
-    history = stores.results.calibrations("U-1").items
-    assert [(c.result_id, c.current) for c in history] == [(third.id, True), (second.id, False), (first.id, False)]
-    assert history[2].triads == tuple(triads), "to the last bit"
-    assert [c for c in history if c.current] == [history[0]]
-    assert stores.results.calibration(history[1].id) == history[1]
-    page = stores.results.calibrations("U-1", limit=2)
-    assert page.items == history[:2]
-    assert stores.results.calibrations("U-1", after=page.next).items == history[2:]
-    using = stores.results.add(new_result(calibrations=(history[0].id, history[2].id)))
-    assert stores.results.get(using.id).calibrations == (history[0].id, history[2].id)
-    with pytest.raises(NotFound, match="calibration 'c'"):
-        stores.results.calibration("c")
-
-
-def test_of_many_calibrations_made_at_once_one_is_current(stores: Stores, new_result: NewResult) -> None:
-    with ThreadPoolExecutor(4) as workers:
-        list(workers.map(lambda i: stores.results.add(new_result(), [_triad("gyro", i)]), range(8)))
-    history = stores.results.calibrations("U-1").items
-    assert len(history) == 8
-    assert sum(c.current for c in history) == 1
 
 
 def test_a_calibration_needs_a_unit(stores: Stores, new_result: NewResult) -> None:
@@ -115,7 +85,7 @@ def test_a_key_makes_one_result_and_one_calibration(stores: Stores, new_result: 
     key = Idempotency("k", "f")
     first = stores.results.add(new_result(), [_triad("gyro")], idempotency=key)
     assert stores.results.add(new_result(), [_triad("gyro")], idempotency=key) == first
-    assert len(stores.results.calibrations("U-1").items) == 1
+    assert len(stores.calibrations.list("U-1").items) == 1
     with pytest.raises(IdempotencyConflict):
         stores.results.add(new_result(), idempotency=Idempotency("k", "g"))
 
@@ -162,8 +132,9 @@ def test_a_unit_comes_back_with_its_current_calibration(
     assert stores.units.unit("U-1") == unit, "the calibrations of the record are not stored"
     stores.results.add(new_result(), [_triad("gyro", 4)])
     stores.results.add(new_result(), [_triad("gyro", 5)])
-    (current,) = (c for c in stores.results.calibrations("U-1").items if c.current)
-    assert stores.units.unit("U-1") == replace(unit, calibrations=(_triad("gyro", 5),), calibration_id=current.id)
+    (current,) = (c for c in stores.calibrations.list("U-1").items if c.current)
+    assert stores.units.unit("U-1") == replace(unit, calibrations=(current.value,), calibration_ids=(current.id,))
+    assert current.value.coefficients.tolist() == _triad("gyro", 5).coefficients.tolist(), "to the last bit"
     other = replace(unit, serial="A-1", gyro=None)
     stores.units.put_unit(other)
     assert stores.units.units() == (other, stores.units.unit("U-1"))

@@ -7,17 +7,15 @@ from threading import Barrier
 
 import pytest
 import sqlalchemy as sa
-from alembic import command
-from alembic.config import Config
 
 from bench_service.campaigns.stores import Stores
 from bench_service.model.errors import IllegalTransition, NotFound
 from bench_service.model.job import Job
 from bench_service.model.records import BenchStop, reasons_of
-from bench_service.persistence import Database, open_stores
+from bench_service.persistence import open_stores
 from bench_service.persistence.database import connect
-from bench_service.persistence.migration import SCRIPTS
 from tests.storage.conftest import NOW
+from tests.storage.migrating import migrated
 
 LATER = timedelta(minutes=1)
 
@@ -132,16 +130,6 @@ def test_a_sentence_names_each_reason_once_and_only_a_few() -> None:
     stops = [BenchStop("sim", NOW, reason) for reason in ("a", "b", "a", "c", "d", "e")]
     assert reasons_of(stops[:3]) == "a; b"
     assert reasons_of(stops) == "a; b; c (and 2 more reasons)"
-
-
-def migrated(database: Database, to: str) -> None:
-    """Bring a database to a revision, up or down."""
-    config = Config()
-    config.set_main_option("script_location", str(SCRIPTS))
-    with database.write_connection() as connection:
-        config.attributes["connection"] = connection
-        up = int(to) > int(connection.scalar(sa.text("SELECT version_num FROM alembic_version")) or "0")
-        (command.upgrade if up else command.downgrade)(config, to)
 
 
 def test_stops_of_an_older_database_stand_after_the_upgrade(database_url: str) -> None:

@@ -3,6 +3,7 @@
 from fastapi import APIRouter
 from fastapi.exceptions import RequestValidationError
 
+from bench_service.api.access.teams import TeamOfBench
 from bench_service.api.benches.schemas import (
     BenchView,
     QueueEntryView,
@@ -16,7 +17,15 @@ from bench_service.api.benches.schemas import (
     StopView,
 )
 from bench_service.api.benches.stop_threads import stop_in_own_thread
-from bench_service.api.http.dependencies import REQUESTED_BY, After, ClientName, Limit, RequestedBy, Service
+from bench_service.api.http.dependencies import (
+    REQUESTED_BY,
+    After,
+    ClientName,
+    Limit,
+    ProvenName,
+    RequestedBy,
+    Service,
+)
 from bench_service.api.http.errors import problems
 from bench_service.model.records import reasons_of
 from bench_service.service import BenchService
@@ -70,7 +79,9 @@ def read_queue(bench_id: str, service: Service) -> QueueView:
 
 
 @router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 413, 507))
-async def stop(bench_id: str, service: Service, client: ClientName, body: StopRequest | None = None) -> Stopping:
+async def stop(
+    bench_id: str, service: Service, client: ClientName, proven: ProvenName, body: StopRequest | None = None
+) -> Stopping:
     """Stop a bench by software: end the running job, stop the table, switch the unit off; until this stop is released.
 
     The stop goes to the bench itself first, on its host, and needs no database for that: a worker sees it, and in its
@@ -78,7 +89,7 @@ async def stop(bench_id: str, service: Service, client: ClientName, body: StopRe
     of a bench can stand at the same time.
     """
     asked = body or StopRequest.model_validate({})
-    done = await stop_in_own_thread(service.stops, bench_id, asked.reason, asked.by or client)
+    done = await stop_in_own_thread(service.stops, bench_id, asked.reason, proven or asked.by or client)
     return Stopping(
         bench=bench_id, stop=done.stop.id, job=done.job, safety=SafetyView.of(done.safety), books=done.books or None
     )
@@ -92,16 +103,17 @@ def list_stops(bench_id: str, service: Service, after: After = None, limit: Limi
     return StopPage(items=[StopView.of(one) for one in page.items], next=page.next)
 
 
-@router.post("/{bench_id}/stops/{stop_id}/release", responses=problems(404, 409, 413, 507))
+@router.post("/{bench_id}/stops/{stop_id}/release", responses=problems(404, 409, 413, 507), dependencies=[TeamOfBench])
 def release_stop(
-    bench_id: str, stop_id: str, service: Service, body: ReleaseRequest, requested_by: RequestedBy = None
+    bench_id: str, stop_id: str, service: Service, body: ReleaseRequest, proven: ProvenName, requested_by: RequestedBy
 ) -> Releasing:
     """Release one stop, the client's own or another's, once the bench is known to be safe.
 
-    The person who releases it gives a name, as `by` or in `X-Requested-By`. The jobs in the bench's queue go on once
+    The person who releases it is the one who has logged in; without accounts, a name is given as `by` or in
+    `X-Requested-By`. The jobs in the bench's queue go on once
     no stop stands.
     """
-    by = body.by or requested_by
+    by = proven or body.by or requested_by
     if by is None:
         text = f"the person who releases a stop names himself, here or in {REQUESTED_BY}"
         raise RequestValidationError([{"type": "missing", "loc": ("body", "by"), "msg": text, "input": None}])
@@ -110,7 +122,7 @@ def release_stop(
     return Releasing(stop=StopView.of(released), standing=[StopView.of(one) for one in standing])
 
 
-@router.post("/{bench_id}/release", responses=problems(404, 409, 507))
+@router.post("/{bench_id}/release", responses=problems(404, 409, 507), dependencies=[TeamOfBench])
 def release(bench_id: str, service: Service, client: ClientName) -> BenchView:
     """Release the only stop of a bench that stands; where several stand, 409 with their ids.
 

@@ -5,6 +5,9 @@ from typing import Annotated
 
 from fastapi import Depends, Header, Query, Request
 
+from bench_service.access.identity import Identity, Proof
+from bench_service.access.roles import Role
+from bench_service.api.access.identify import found_of
 from bench_service.jobs.events.hub import EventHub
 from bench_service.service import BenchService
 
@@ -30,25 +33,54 @@ IdempotencyKey = Annotated[
         description="A create that is repeated with the same key and body gives what the first one made",
     ),
 ]
+NOBODY = Identity("", Role.VIEWER, Proof.NONE, proven=False)
+"""Somebody on this host who has not logged in, and may only stop a bench."""
 REQUESTED_BY = "X-Requested-By"
 WHO_LENGTH = 200
-RequestedBy = Annotated[
+_Claimed = Annotated[
     str | None,
     Header(
         alias=REQUESTED_BY,
         min_length=1,
         max_length=WHO_LENGTH,
         pattern=NO_CONTROL_CHARACTERS.pattern,
-        description="Who asks, for the job and the audit trail; without it, the trail has the client's address",
+        description=(
+            "Who asks, for the job and the audit trail, where nobody logs in; else the proved name counts. Without "
+            "both, the trail has the client's address"
+        ),
     ),
 ]
 
 
-async def _client_name(request: Request, requested_by: RequestedBy = None) -> str:
+async def _identity(request: Request) -> Identity:
+    return found_of(request.scope).identity or NOBODY
+
+
+async def _proven_name(request: Request) -> str | None:
+    found = found_of(request.scope)
+    identity = found.identity or found.stopper
+    return None if identity is None else identity.proven_name
+
+
+Me = Annotated[Identity, Depends(_identity)]
+"""The identity of the request; on routes that need none it may be nobody's."""
+ProvenName = Annotated[str | None, Depends(_proven_name)]
+"""The name that the request has proved; None where a client names itself."""
+
+
+async def _requested_by(proven: ProvenName, claimed: _Claimed = None) -> str | None:
+    return proven or claimed
+
+
+RequestedBy = Annotated[str | None, Depends(_requested_by)]
+"""Name of the person or program that asks: the proved one, or the one that a client gives itself; None: not given."""
+
+
+async def _client_name(request: Request, requested_by: RequestedBy) -> str:
     return requested_by or (request.client.host if request.client else "local")
 
 
 ClientName = Annotated[str, Depends(_client_name)]
-"""Name of the client: the one that it gives itself, or the address that it asks from."""
+"""Name of the client: the proved one, the one that it gives itself, or the address that it asks from."""
 After = Annotated[str | None, Query(max_length=100, description="Cursor: `next` of the page before")]
 Limit = Annotated[int, Query(ge=1, le=500)]

@@ -4,20 +4,21 @@ Host: a page of another site can make its own name resolve to this address (DNS 
 as a page of this service; so the name in `Host` must be one of this service's. Origin and Sec-Fetch-Site: a browser
 states from which site a request comes; a request from another site is refused. The one exception is a person who
 follows a link: a top-level navigation that only reads. A request with neither header comes from a program: it is let
-in from a loopback address, and from elsewhere with the service's token.
+in here, and its sender is identified by `bench_service.api.access.identify`.
 """
 
-import hmac
 import logging
 import re
 from dataclasses import dataclass
 from ipaddress import IPv6Address, ip_address
 from socket import getaddrinfo
+from urllib.parse import unquote
 
 from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from bench_service.access.credentials import names_token, without_tokens
 from bench_service.api.http.errors import respond
 from bench_service.model.errors import Misconfigured
 from bench_service.settings import BadSettings, Settings
@@ -42,7 +43,7 @@ class Door:
     hosts: frozenset[str]
     """Names in `Host` that belong to this service; with a port only that port, without one any."""
     token: str | None = None
-    """The token that programs send as `Authorization: Bearer …` from any address but a loopback one."""
+    """The token of `BENCH_TOKEN_FILE`, with which a program may do everything."""
     all_local: bool = False
     """True where the address is reached through a port of a loopback address only, so that all peers count as local."""
 
@@ -57,8 +58,8 @@ class Door:
         hosts = frozenset(name.lower() for name in (*LOOPBACK_NAMES, *own, *settings.hosts, *more_hosts))
         return cls(hosts, token, settings.published == "loopback")
 
-    def refusal(self, headers: Headers, method: str, peer: str | None) -> "Refusal | None":
-        """Return why a request is refused; None where it is let in. `peer`: its source address; None: a socket file."""
+    def refusal(self, headers: Headers, method: str, query: str = "") -> "Refusal | None":
+        """Return why a request is refused; None where it is let in. `query`: what follows its path."""
         hosts = headers.getlist("host")
         if len(hosts) != 1 or not self._ours(hosts[0]):
             text = "the name that this request speaks to is not one of this service: BENCH_HOSTS lists further names"
@@ -69,23 +70,18 @@ class Door:
         site = headers.get("sec-fetch-site", "none")
         if site not in ("same-origin", "none") and not _follows_link(headers, method):
             return Refusal(403, "ForeignSite", "a page of another site may not ask this service", site)
-        return self._unknown_peer(headers, peer)
+        if names_token(f"{query} {headers.get('referer', '')}"):
+            text = "a token in an address stands in logs and histories: revoke it, and send it as Authorization: Bearer"
+            return Refusal(400, "TokenInAddress", text, "a token")
+        return None
+
+    def is_local(self, peer: str | None) -> bool:
+        """Return whether a request comes from this host. `peer`: its source address; None: a socket file."""
+        return self.all_local or peer is None or is_loopback_address(peer)
 
     def _ours(self, host: str) -> bool:
         found = _AUTHORITY.fullmatch(host.lower())
         return found is not None and (found["name"] in self.hosts or found[0] in self.hosts)
-
-    def _unknown_peer(self, headers: Headers, peer: str | None) -> "Refusal | None":
-        if self.all_local or peer is None or is_loopback_address(peer):
-            return None
-        scheme, _, given = headers.get("authorization", "").partition(" ")
-        if self.token is None:
-            text = "requests from elsewhere than a loopback address need a token: BENCH_TOKEN_FILE names its file"
-        elif scheme.lower() != "bearer" or not hmac.compare_digest(given.strip().encode(), self.token.encode()):
-            text = "requests from elsewhere than a loopback address need the service's token, as Authorization: Bearer"
-        else:
-            return None
-        return Refusal(401, "NoToken", text, peer)
 
 
 @dataclass(frozen=True)
@@ -111,23 +107,20 @@ class Doorkeeper:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        client = scope.get("client")
-        refusal = self._door.refusal(Headers(scope=scope), scope["method"], client[0] if client else None)
+        query = f"{scope['path']}?{unquote(scope['query_string'].decode('latin-1'))}"
+        refusal = self._door.refusal(Headers(scope=scope), scope["method"], query)
         if refusal is None:
             await self._app(scope, receive, send)
             return
         self._log(refusal, scope)
-        answer = respond(Request(scope), refusal.status, refusal.text, refusal.kind)
-        if refusal.status == 401:
-            answer.headers["WWW-Authenticate"] = "Bearer"
-        await answer(scope, receive, send)
+        await respond(Request(scope), refusal.status, refusal.text, refusal.kind)(scope, receive, send)
 
     def _log(self, refusal: Refusal, scope: Scope) -> None:
         now_s = monotonic_s()
         if now_s - self._logged_s.get(refusal.kind, -QUIET_S) < QUIET_S:
             return
         self._logged_s[refusal.kind] = now_s
-        given, path = refusal.given[:200], scope["path"][:200]
+        given, path = refusal.given[:200], without_tokens(scope["path"])[:200]
         log.warning(
             "refused %s %s, %s: %s; the next minute's are not logged", scope["method"], path, refusal.kind, given
         )

@@ -3,6 +3,7 @@
 from asyncio import CancelledError
 from collections.abc import Sequence
 from http import HTTPStatus
+from math import ceil
 from typing import Annotated, Any
 
 from fastapi import FastAPI, Request
@@ -17,9 +18,12 @@ from bench_service.formats.plain_json import A_NUMBER, NOT_SO_DEEP, is_finite, s
 from bench_service.model.errors import (
     AlreadyReserved,
     BenchBusy,
+    CalibrationRefused,
     IdempotencyConflict,
     IllegalTransition,
+    LockedOut,
     NameTaken,
+    NotAllowed,
     NotDriving,
     NotFound,
     NotMounted,
@@ -31,6 +35,7 @@ from bench_service.model.errors import (
     SeveralStops,
     StorageFailure,
     StorageFull,
+    WrongPassword,
 )
 from procedures.bench.errors import BenchError
 from procedures.core.errors import BadParameter, DomainError, Undetermined
@@ -42,6 +47,10 @@ STATUS: dict[type[Exception], int] = {
     BenchBusy: 409,
     AlreadyReserved: 409,
     NameTaken: 409,
+    CalibrationRefused: 409,
+    NotAllowed: 403,
+    WrongPassword: 401,
+    LockedOut: 429,
     NotDriving: 503,
     NotReady: 503,
     Overloaded: 503,
@@ -56,6 +65,14 @@ STATUS: dict[type[Exception], int] = {
     ServiceError: 500,
 }
 """Status codes by error class; an error has the status of its nearest ancestor here."""
+
+
+class AccessRefused(HTTPException):
+    """Raised where a request is refused for its sender; as it is raised while a body is read, it is an HTTP error."""
+
+    def __init__(self, status: int, kind: str, text: str, headers: dict[str, str] | None = None) -> None:
+        super().__init__(status, text, headers)
+        self.kind = kind
 
 
 Shown = Annotated[str, BeforeValidator(shown)]
@@ -172,7 +189,24 @@ def status_of(error: Exception) -> int:
     return next(STATUS[cls] for cls in type(error).__mro__ if cls in STATUS)
 
 
+def problem_of(request: Request, error: DomainError | ServiceError | ValidationError) -> Problem:
+    """Return the problem document of a known error, for an answer that holds several."""
+    if isinstance(error, ValidationError):
+        return _invalid_problem(request, error.errors(include_url=False), "parameters")
+    return _problem(request, status_of(error), str(error), type(error).__name__, *_details(error))
+
+
 def _on_known(request: Request, error: Exception) -> Response:
+    response = respond(request, status_of(error), str(error), type(error).__name__, *_details(error))
+    if isinstance(error, Overloaded):
+        response.headers["Retry-After"] = RETRY_AFTER_S
+    if isinstance(error, LockedOut):
+        response.headers["Retry-After"] = str(ceil(error.wait_s))
+    return response
+
+
+def _details(error: Exception) -> tuple[list[FieldError], list[str]]:
+    """The fields that caused an error, and the combinations that a plan cannot determine."""
     fields: list[FieldError] = []
     if isinstance(error, BadParameter):
         fields = [FieldError(field=error.field, message=error.allowed, value=_jsonable(error.value))]
@@ -180,11 +214,7 @@ def _on_known(request: Request, error: Exception) -> Response:
         fields = [FieldError(field="service", message=reason) for reason in error.reasons]
     if isinstance(error, SeveralStops):
         fields = [FieldError(field="stop_id", message=text, value=stop) for stop, text in error.stops]
-    lost = list(error.lost) if isinstance(error, Undetermined) else []
-    response = respond(request, status_of(error), str(error), type(error).__name__, fields, lost)
-    if isinstance(error, Overloaded):
-        response.headers["Retry-After"] = RETRY_AFTER_S
-    return response
+    return fields, list(error.lost) if isinstance(error, Undetermined) else []
 
 
 def _on_request_validation(request: Request, error: Exception) -> Response:
@@ -202,13 +232,17 @@ def _on_parameter_validation(request: Request, error: Exception) -> Response:
 
 
 def _invalid(request: Request, errors: Sequence[Any], prefix: str) -> Response:
+    return _answer(_invalid_problem(request, errors, prefix))
+
+
+def _invalid_problem(request: Request, errors: Sequence[Any], prefix: str) -> Problem:
     fields = [
         FieldError(field=_path(e["loc"], prefix), message=str(e["msg"]), value=_jsonable(e.get("input")))
         for e in errors[:MOST_FIELDS]
         if not _follows(e, errors)
     ]
     detail = "; ".join(f"{f.field}: {f.message}" for f in fields[:5])
-    return respond(request, 422, detail, "Invalid", fields)
+    return _problem(request, 422, detail, "Invalid", fields)
 
 
 def _follows(error: Any, errors: Sequence[Any]) -> bool:
@@ -224,7 +258,7 @@ def _on_http(request: Request, error: Exception) -> Response:
     status = error.status_code
     if status == 400 and (allowed := _UNREAD.get(type(error.__cause__))) is not None:
         return respond(request, 422, f"body: {allowed}", "Invalid", [FieldError(field="body", message=allowed)])
-    kind = HTTPStatus(status).phrase.replace(" ", "")
+    kind = error.kind if isinstance(error, AccessRefused) else HTTPStatus(status).phrase.replace(" ", "")
     allowed = str(error.detail).rpartition(": ")[2]
     fields = {400: [_NO_BODY], 413: [FieldError(field="body", message=allowed)]}.get(status, [])
     response = respond(request, status, str(error.detail), kind, fields)
@@ -242,7 +276,17 @@ def respond(
     request: Request, status: int, detail: str, kind: str, errors: Sequence[FieldError] = (), lost: Sequence[str] = ()
 ) -> JSONResponse:
     """Build the response that carries a problem document."""
-    problem = Problem(
+    return _answer(_problem(request, status, detail, kind, errors, lost))
+
+
+def _answer(problem: Problem) -> JSONResponse:
+    return JSONResponse(problem.model_dump(), problem.status, media_type="application/problem+json")
+
+
+def _problem(
+    request: Request, status: int, detail: str, kind: str, errors: Sequence[FieldError] = (), lost: Sequence[str] = ()
+) -> Problem:
+    return Problem(
         type=f"/problems/{kind}" if kind else "about:blank",
         title=HTTPStatus(status).phrase,
         status=status,
@@ -251,7 +295,6 @@ def respond(
         errors=list(errors),
         lost=list(lost),
     )
-    return JSONResponse(problem.model_dump(), status, media_type="application/problem+json")
 
 
 def _path(location: Sequence[str | int], prefix: str) -> str:

@@ -1,5 +1,7 @@
 """Security headers of every answer, which restrict the browser: no frame, no foreign script, no guessed type."""
 
+from urllib.parse import quote
+
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -16,6 +18,11 @@ SECURITY_HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cross-Origin-Opener-Policy": "same-origin",
 }
+
+
+def quoted(path: str) -> str:
+    """Quote a path of this service as the value of another address's parameter."""
+    return quote(path, safe="/")
 
 
 class SecurityHeaders:

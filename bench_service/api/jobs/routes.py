@@ -6,7 +6,9 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Query, Response
 from fastapi.responses import JSONResponse, StreamingResponse
 
-from bench_service.api.http.dependencies import After, Hub, IdempotencyKey, Limit, RequestedBy, Service
+from bench_service.access.service import require_team
+from bench_service.api.access.teams import TeamOfJob
+from bench_service.api.http.dependencies import After, Hub, IdempotencyKey, Limit, Me, RequestedBy, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.queries import Searched
 from bench_service.api.jobs import event_stream
@@ -59,10 +61,16 @@ def submit(
     body: JobSubmission,
     service: Service,
     response: Response,
+    requested_by: RequestedBy,
+    me: Me,
     key: IdempotencyKey = None,
-    requested_by: RequestedBy = None,
 ) -> JobView:
-    """Submit a job to the queue. The same `Idempotency-Key` with the same body gives the job of the first request."""
+    """Submit a job to the queue. The same `Idempotency-Key` with the same body gives the job of the first request.
+
+    An operator submits approved procedures; under a reservation, a member of its team.
+    """
+    service.access.require_approved(me, body.procedure, lambda: service.catalogue.procedure(body.procedure).version)
+    require_team(me, service.queues.team_of(body.reservation), f"reservation {body.reservation}")
     job = service.jobs.submit(copied(JobRequest, body), key, requested_by or "")
     response.headers["Location"] = f"/api/v1/jobs/{job.id}"
     return _view(service, job)
@@ -98,7 +106,7 @@ def read_job(job_id: str, service: Service) -> JobView:
     return _view(service, service.stores.jobs.get(job_id))
 
 
-@router.patch("/{job_id}", responses=problems(404, 409, 413, 507))
+@router.patch("/{job_id}", responses=problems(404, 409, 413, 507), dependencies=[TeamOfJob])
 def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
     """Change the priority of a queued job, and with it its place in the queue."""
     return _view(service, service.jobs.set_priority(job_id, body.priority))
@@ -107,6 +115,7 @@ def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
 @router.post(
     "/{job_id}/cancel",
     status_code=202,
+    dependencies=[TeamOfJob],
     response_model=JobView,
     responses={
         **problems(404, 409, 507),
@@ -125,20 +134,20 @@ def cancel(job_id: str, service: Service) -> JobView | JSONResponse:
         return JSONResponse(ForeignJob(id=job_id, state=state, waiting=str(error)).model_dump(mode="json"), 200)
 
 
-@router.post("/{job_id}/pause", status_code=202, responses=problems(404, 409, 507))
+@router.post("/{job_id}/pause", status_code=202, responses=problems(404, 409, 507), dependencies=[TeamOfJob])
 def pause(job_id: str, service: Service) -> JobView:
     """Pause a job: a queued one at once, a running one before its next station. The bench is then safe and free."""
     return _view(service, service.jobs.pause(job_id))
 
 
-@router.post("/{job_id}/answer", status_code=202, responses=problems(404, 409, 413, 507))
-def answer(job_id: str, body: PromptAnswer, service: Service, requested_by: RequestedBy = None) -> JobView:
+@router.post("/{job_id}/answer", status_code=202, responses=problems(404, 409, 413, 507), dependencies=[TeamOfJob])
+def answer(job_id: str, body: PromptAnswer, service: Service, requested_by: RequestedBy) -> JobView:
     """Confirm that the person at the bench did what the job's prompt asks (`prompt`), or decline it."""
     said = Answer(body.done, body.remark, requested_by or "")
     return _view(service, service.stores.prompts.answer(job_id, said, now()))
 
 
-@router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409, 507))
+@router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409, 507), dependencies=[TeamOfJob])
 def resume(job_id: str, service: Service) -> JobView:
     """Resume a paused, interrupted or resumable failed job: it is queued again and does the stations that remain."""
     return _view(service, service.jobs.resume(job_id))

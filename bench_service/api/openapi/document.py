@@ -6,7 +6,7 @@ from typing import Any
 from fastapi import FastAPI
 
 from bench_service.api.http.errors import Problem
-from bench_service.api.openapi.access import SECURITY, SECURITY_SCHEMES
+from bench_service.api.openapi.access import SCHEMES, declare_security
 from bench_service.api.openapi.result_schemas import REFERENCE, add_results
 from bench_service.api.openapi.schemas import PREFIX, Schema, component, plain_name, renamed, tidy
 from bench_service.evidence.catalogue import Catalogue
@@ -21,6 +21,7 @@ TAGS = {
     "benches": "Benches: state, queue, software stops.",
     "reservations": "Benches and units that are kept free for a client until a moment.",
     "campaigns": "Sequences of jobs with limits, their runs, schedules and trends.",
+    "access": "The session of a request, accounts of people, tokens of programs, approvals of procedures.",
     "audit": "The audit trail: every request that may have changed something.",
     "health": "Probes and counts for programs that watch the service.",
 }
@@ -59,17 +60,17 @@ def completed(document: Schema, catalogue: Catalogue) -> Schema:
     add_results(schemas, catalogue)
     paths = renamed(_tidy_paths(document["paths"]), names)
     _describe_upload(paths, schemas)
+    declare_security(paths)
     return {
         **document,
         "info": {**document["info"], **INFO},
         "servers": [{"url": "/", "description": "The service that this document came from"}],
         "tags": [{"name": name, "description": text} for name, text in TAGS.items()],
-        "security": SECURITY,
         "paths": paths,
         "components": {
             **document["components"],
             "schemas": dict(sorted(schemas.items())),
-            "securitySchemes": SECURITY_SCHEMES,
+            "securitySchemes": SCHEMES,
         },
     }
 

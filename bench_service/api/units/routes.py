@@ -1,4 +1,4 @@
-"""Routes of units under test: their declarations, their calibrations and their corrections."""
+"""Routes of units under test: their declarations and their corrections."""
 
 from typing import Annotated
 
@@ -7,8 +7,6 @@ from fastapi import APIRouter, Path
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.http.errors import problems
 from bench_service.api.units.schemas import (
-    CalibrationPage,
-    CalibrationView,
     CorrectionPage,
     CorrectionView,
     UnitDeclaration,
@@ -49,14 +47,6 @@ def declare_unit(serial: Serial, body: UnitDeclaration, service: Service) -> Uni
         )
     )
     return UnitView.of(service.stores.units.unit(serial))
-
-
-@router.get("/{serial}/calibrations", responses=problems(404))
-def list_calibrations(serial: str, service: Service, after: After = None, limit: Limit = 50) -> CalibrationPage:
-    """List the unit's calibrations, newest first; one is current."""
-    service.stores.units.unit(serial)
-    page = service.stores.results.calibrations(serial, after=after, limit=limit)
-    return CalibrationPage(items=[CalibrationView.of(c) for c in page.items], next=page.next)
 
 
 @router.get("/{serial}/corrections", responses=problems(404))

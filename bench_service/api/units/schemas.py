@@ -1,4 +1,4 @@
-"""Schemas of units, their calibrations and their corrections. Units of measurement are in the field names."""
+"""Schemas of units and their corrections. Units of measurement are in the field names."""
 
 from datetime import datetime
 
@@ -7,9 +7,7 @@ from pydantic import BaseModel, Field
 from bench_service.api.http.fields import Request
 from bench_service.evidence.corrections import StoredCorrection
 from bench_service.mapping import copied
-from bench_service.model.records import StoredCalibration
 from procedures.core.converter import ConverterTriad
-from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Channel
 from procedures.core.thermal_correction import ThermalCorrection
 from procedures.core.unit import TriadRecord, Unit
@@ -35,7 +33,9 @@ class UnitView(BaseModel):
     gyro: TriadRecord | None
     accelerometer: TriadRecord | None
     averaging_time_s: float
-    calibration: str | None = Field(description="Id of the current calibration")
+    gyro_calibration: str | None = Field(description="Id of the gyros' current calibration, where it may be used")
+    accelerometer_calibration: str | None = Field(description="The same of the accelerometers")
+    withheld: list[str] = Field(description="Why a current calibration may not be used, and the way out")
     thermal_correction: str | None = Field(description="Id of the current correction of the kind `thermal`")
     converter: str | None = Field(description="Id of the current correction of the kind `converter`")
 
@@ -44,33 +44,12 @@ class UnitView(BaseModel):
         return copied(
             cls,
             unit,
-            calibration=unit.calibration_id,
+            gyro_calibration=unit.calibration_id("gyro"),
+            accelerometer_calibration=unit.calibration_id("accelerometer"),
+            withheld=[entry.why for entry in unit.withheld],
             thermal_correction=unit.thermal_correction_id,
             converter=unit.converter_id,
         )
-
-
-class CalibrationView(BaseModel):
-    """A calibration in a unit's history."""
-
-    id: str
-    unit: str
-    result: str
-    made_at: datetime
-    current: bool
-    simulated: bool
-    triads: list[TriadCalibration]
-
-    @classmethod
-    def of(cls, stored: StoredCalibration) -> "CalibrationView":
-        return copied(cls, stored, result=stored.result_id)
-
-
-class CalibrationPage(BaseModel):
-    """One page of a unit's calibrations, newest first."""
-
-    items: list[CalibrationView]
-    next: str | None
 
 
 class CorrectionView(BaseModel):

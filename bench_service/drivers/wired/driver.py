@@ -14,16 +14,18 @@ from bench_service.drivers.bench_file.document import BenchFile
 from bench_service.drivers.bench_file.unit_files import read_units
 from bench_service.drivers.device_register import DeviceLink, DeviceRegister
 from bench_service.drivers.interface.driver import DriverContext, Found, Kind
-from bench_service.drivers.interface.sections import Wire
+from bench_service.drivers.interface.sections import EnvironmentSection, Wire
 from bench_service.drivers.registered import RegisteredBench
 from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.drivers.wall_bench_clock import WallBenchClock
 from bench_service.drivers.wired.devices import WiredDevices, safe_state
+from bench_service.drivers.wired.entered_environment import EnteredEnvironment
+from bench_service.drivers.wired.guarded import LaunchedUnit, LaunchingSupply
 from bench_service.drivers.wired.mixed import CatchUp, MixedClock, TwinSupply, TwinTurntable
 from bench_service.drivers.wired.opening import opened, survey
 from bench_service.drivers.wired.parallel import named
 from bench_service.model.errors import NotMounted
-from procedures.bench import Bench, BenchDescription, BenchNeeds, Operator
+from procedures.bench import Bench, BenchDescription, BenchNeeds, Clock, Environment, Operator
 from procedures.bench.errors import DeviceFault, Disconnected
 from procedures.core.unit import Unit
 
@@ -147,8 +149,12 @@ class BenchFileDriver:
         bench.chamber, bench.current_source = devices.get("chamber"), devices.get("current_source")
         if any(file.within(kind) for kind in ("turntable", "unit_link", "supply", "chamber", "current_source")):
             self._add_simulated(bench, unit.serial, seed, needs, wall)
+        if not file.within("unit_link"):
+            supply = LaunchingSupply(bench.supply, bench.clock.now_s)
+            bench.supply, bench.imu = supply, LaunchedUnit(bench.imu, supply)  # pyright: ignore[reportAttributeAccessIssue]
         bench.operator = self._operator(bench.operator, job)
         bench.safe_s = {k: s.safe_s for k, s in file.real().items() if isinstance(s, Wire)}
+        bench.environment = self._environment(devices, bench.clock)
         chamber = description.chamber
         ambient = None if chamber is None else chamber.ambient_c
         link.note(
@@ -177,6 +183,13 @@ class BenchFileDriver:
         if self._file.rest.operator.driver == "asked":
             return None if self._asking is None or job is None else self._asking(job, None)
         return simulated
+
+    def _environment(self, devices: Mapping[Kind, Any], clock: Clock) -> Environment | None:
+        """A sensor of the room, or the values that were entered."""
+        section = self._file.devices.get("environment")
+        if not isinstance(section, EnvironmentSection):
+            return None
+        return devices.get("environment") or EnteredEnvironment(section, clock)
 
     def _safe_state(self, device: str, state: DeviceState) -> dict[str, Any]:
         section = next((s for kind, s in self._file.devices.items() if kind == device), None)
@@ -215,7 +228,7 @@ def _is_wanted(kind: Kind, needs: BenchNeeds) -> bool:
     """Return whether a job needs a device: a chamber that it does not use is left alone."""
     if kind == "chamber":
         return needs.temperatures or needs.currents
-    return kind != "environment" and (kind != "current_source" or needs.currents)
+    return kind != "current_source" or needs.currents
 
 
 def _or_twin(real: Any, seen: Any, below: Any, unit_simulated: bool, twin: Callable[[Any, Any], Any]) -> Any:

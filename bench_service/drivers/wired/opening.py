@@ -1,18 +1,20 @@
 """Devices of a bench file as objects, and a survey of them: who answers, in which state, with which limits."""
 
 from collections.abc import Callable, Coroutine, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from bench_service.drivers.bench_file.document import BenchFile
+from bench_service.drivers.bench_file.unit_files import read_units
 from bench_service.drivers.interface.driver import DriverContext, Found, Kind, WireDevice, differences
 from bench_service.drivers.interface.registry import driver
 from bench_service.drivers.interface.sections import DeviceSection, Wire
 from bench_service.drivers.wall_bench_clock import WallBenchClock
 from bench_service.drivers.wired.guarded import Guarded, GuardedTurntable
 from bench_service.drivers.wired.parallel import in_parallel
+from bench_service.model.errors import Misconfigured
 
 READ: tuple[Kind, ...] = ("turntable", "chamber", "supply", "current_source", "environment")
 """Devices that have a state to read; a unit's link sends of itself."""
@@ -34,8 +36,9 @@ def _opened(kind: Kind, section: DeviceSection, context: DriverContext) -> Any:
 
 
 def context_of(file: BenchFile) -> DriverContext:
-    """Surroundings of devices that are asked outside a job."""
-    return DriverContext(file.id, WallBenchClock(factor=file.time_factor), Path(file.folder))
+    """Surroundings of devices that are asked outside a job: a unit that sends nothing is taken as switched off."""
+    clock = WallBenchClock(factor=file.time_factor)
+    return DriverContext(file.id, clock, Path(file.folder), powered=lambda: False)
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,12 @@ def survey(file: BenchFile, kinds: Iterable[Kind] | None = None) -> Survey:
     A device that does not answer is among the failures, with its address.
     """
     wanted = tuple(file.real()) if kinds is None else tuple(kinds)
-    devices = opened(file, wanted, context_of(file))
+    context, result, devices = _context_of_survey(file, wanted), Survey(), dict[Kind, Any]()
+    for kind in wanted:
+        try:
+            devices |= opened(file, (kind,), context)
+        except Misconfigured as error:  # such as a unit that its link cannot be for
+            result.failures[kind] = error
     deadlines: dict[Kind, float] = {}
     work: dict[Kind, Callable[[], Coroutine[Any, Any, tuple[Found, Any]]]] = {}
     for kind, device in devices.items():
@@ -69,7 +77,6 @@ def survey(file: BenchFile, kinds: Iterable[Kind] | None = None) -> Survey:
         assert isinstance(section, Wire)
         deadlines[kind] = section.connect_s + 4.0 * section.answer_s
         work[kind] = partial(_ask, kind, device)
-    result = Survey()
     for kind, outcome in in_parallel(work, deadlines).items():
         if isinstance(outcome, Exception):
             result.failures[kind] = outcome
@@ -78,6 +85,12 @@ def survey(file: BenchFile, kinds: Iterable[Kind] | None = None) -> Survey:
             if reading is not None:
                 result.readings[kind] = reading
     return result
+
+
+def _context_of_survey(file: BenchFile, wanted: Iterable[Kind]) -> DriverContext:
+    """A unit's link is asked for the first declared unit: which one is on the bench, only a job knows."""
+    units = read_units(file.folder / "units") if "unit_link" in wanted else ()
+    return replace(context_of(file), unit=units[0] if units else None)
 
 
 async def _ask(kind: Kind, device: WireDevice | Any) -> tuple[Found, Any]:

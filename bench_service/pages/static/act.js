@@ -22,8 +22,10 @@ async function problemOf(answer) {
 async function ask(form) {
   const output = form.querySelector("output"), button = form.querySelector("button");
   const sent = documentOf(form), request = { method: "POST", signal: AbortSignal.timeout(PATIENCE_MS) };
+  const csrf = document.querySelector('meta[name="csrf"]');
+  request.headers = csrf ? { "X-CSRF-Token": csrf.content } : {};
   if (Object.keys(sent).length) {
-    request.headers = { "Content-Type": "application/json" };
+    request.headers["Content-Type"] = "application/json";
     request.body = JSON.stringify(sent);
   }
   if (sent.by) localStorage.setItem(NAME, sent.by);

@@ -20,8 +20,8 @@ from bench_service.persistence.database import Database, connect
 from bench_service.persistence.jobs.job_store import SqlJobStore
 from bench_service.persistence.jobs.queue_store import SqlQueueStore
 from bench_service.persistence.tables.bench import BenchStopRow
-from bench_service.persistence.tables.telemetry import AuditRow
 from bench_service.persistence.telemetry.audit_store import SqlAuditTrail
+from bench_service.telemetry.audit import AuditEntry
 
 
 class SqlSafetyBooks:
@@ -56,18 +56,10 @@ class SqlSafetyBooks:
 
     def note(self, by: str, text: str, job: str | None) -> None:
         at = wall_clock.now()
-        with self._database.write() as session:
-            session.add(
-                AuditRow(
-                    id=wall_clock.new_id(),
-                    at=at,
-                    who=by,
-                    action="make_safe",
-                    target=f"bench {self._bench_id}",
-                    outcome="noted",
-                    detail={"text": text, "job": job},
-                )
-            )
+        entry = AuditEntry(
+            wall_clock.new_id(), at, by, "make_safe", f"bench {self._bench_id}", "noted", {"text": text, "job": job}
+        )
+        SqlAuditTrail(self._database).add(entry)
         if job is not None:
             try:
                 SqlJobStore(self._database).note(job, "note", at, {"text": text, "by": by})

@@ -1,35 +1,30 @@
-"""Results, their numbers, and calibrations as rows and back. Knows the shapes only; no transaction begins here."""
+"""Results and their numbers as rows and back. Knows the shapes only; no transaction begins here."""
 
 from collections.abc import Iterable
-
-from pydantic import TypeAdapter
+from typing import Any
 
 from bench_service.mapping import copied
 from bench_service.model.quantities import quantities
-from bench_service.model.records import StoredCalibration, StoredResult
+from bench_service.model.records import StoredResult
 from bench_service.persistence.tables.evidence import (
-    CalibrationRow,
     ResultCalibrationRow,
     ResultCorrectionRow,
     ResultQuantityRow,
     ResultRecordingRow,
     ResultRow,
 )
-from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
 
-TRIADS = TypeAdapter(tuple[TriadCalibration, ...])
+
+def row_of_result(result: StoredResult, document: dict[str, Any]) -> ResultRow:
+    """Convert a result to its row, without its lineage and with the document that is stored."""
+    return copied(ResultRow, result, verdict=result.verdict.value, document=document)
 
 
-def row_of_result(result: StoredResult) -> ResultRow:
-    """Convert a result to its row, without its lineage."""
-    return copied(ResultRow, result, verdict=result.verdict.value)
-
-
-def quantity_rows(result: StoredResult) -> list[ResultQuantityRow]:
-    """Build the rows that hold the numbers of a result's document."""
+def quantity_rows(result: StoredResult, elsewhere: frozenset[str]) -> list[ResultQuantityRow]:
+    """Build the rows that hold the numbers of a result's document, but not those that are stored elsewhere."""
     found = quantities(result.document).values()
-    return [copied(ResultQuantityRow, quantity, result_id=result.id) for quantity in found]
+    return [copied(ResultQuantityRow, q, result_id=result.id) for q in found if q.name not in elsewhere]
 
 
 def lineage_rows(result: StoredResult) -> tuple[ResultRecordingRow | ResultCalibrationRow, ...]:
@@ -47,21 +42,18 @@ def lineage_rows(result: StoredResult) -> tuple[ResultRecordingRow | ResultCalib
 
 def result_of_row(
     row: ResultRow,
+    document: dict[str, Any],
     recordings: Iterable[ResultRecordingRow],
     calibrations: Iterable[ResultCalibrationRow],
     corrections: Iterable[ResultCorrectionRow],
 ) -> StoredResult:
-    """Convert rows to their result; lineage in the order of its positions."""
+    """Convert rows to their result, with its whole document; lineage in the order of its positions."""
     return copied(
         StoredResult,
         row,
+        document=document,
         verdict=Verdict(row.verdict),
         recordings=tuple((r.recording_id, r.content_hash) for r in recordings),
         calibrations=tuple(c.calibration_id for c in calibrations),
         corrections=tuple(c.correction_id for c in corrections),
     )
-
-
-def calibration_of_row(row: CalibrationRow) -> StoredCalibration:
-    """Convert a row to its calibration."""
-    return copied(StoredCalibration, row, current=row.is_current, triads=TRIADS.validate_python(row.triads))

@@ -5,18 +5,22 @@ from collections.abc import Sequence
 from itertools import islice
 from typing import Any
 
-from sqlalchemy import select, update
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from bench_service import wall_clock
+from bench_service.model.calibrations import StoredCalibration
 from bench_service.model.errors import NotFound
-from bench_service.model.records import Idempotency, Page, ResultValue, StoredCalibration, StoredResult
+from bench_service.model.records import Idempotency, Page, ResultValue, StoredResult
 from bench_service.model.search import EVERYTHING, Search
 from bench_service.persistence.database import Database
+from bench_service.persistence.evidence.calibration_rows import (
+    calibrations_where,
+    with_coefficients,
+    without_coefficients,
+)
+from bench_service.persistence.evidence.calibration_store import add_calibrations
 from bench_service.persistence.evidence.correction_rows import add_corrections, check_corrections, correction_lineage
 from bench_service.persistence.evidence.result_rows import (
-    TRIADS,
-    calibration_of_row,
     lineage_rows,
     quantity_rows,
     result_of_row,
@@ -48,7 +52,7 @@ class SqlResultStore:
         self,
         result: StoredResult,
         calibrations: Sequence[TriadCalibration] = (),
-        make_current: bool = True,
+        by_rule: bool = True,
         idempotency: Idempotency | None = None,
         corrections: Sequence[UnitCorrection] = (),
     ) -> StoredResult:
@@ -56,6 +60,8 @@ class SqlResultStore:
             raise ValueError("a calibration or correction needs the unit that it belongs to")
         if len({c.kind for c in corrections}) < len(corrections):
             raise ValueError("a result gives at most one correction of a kind")
+        if len({c.triad for c in calibrations}) < len(calibrations):
+            raise ValueError("a result gives at most one calibration of a triad")
 
         def once() -> StoredResult:
             with self._database.write() as session:
@@ -64,13 +70,16 @@ class SqlResultStore:
                     return _results(session, [_found(session, known)])[0]
                 remember(session, idempotency, "result", result.id, result.created_at)
                 _check_lineage(session, result)
-                session.add(row_of_result(result))
+                document, taken = without_coefficients(result.document, calibrations)
+                session.add(row_of_result(result, document))
                 session.flush()
-                session.add_all([*quantity_rows(result), *lineage_rows(result), *correction_lineage(result)])
-                if calibrations:
-                    _add_calibration(session, result, calibrations, make_current)
-                add_corrections(session, result, corrections, make_current)
-                return result
+                session.add_all([*quantity_rows(result, taken), *lineage_rows(result), *correction_lineage(result)])
+                add_calibrations(session, result, calibrations, by_rule)
+                add_corrections(session, result, corrections, by_rule)
+                if not calibrations:
+                    return result
+                session.flush()
+                return _results(session, [_found(session, result.id)])[0]  # as it is read again, to the last bit
 
         return again_after_conflict(once)
 
@@ -119,13 +128,7 @@ class SqlResultStore:
         with self._database.read() as session:
             rows = newest_first(session, query, before)
             same = (row for row in rows if parameters is None or row.parameters == parameters)
-            return tuple(value_of_row(row, quantity) for row in islice(same, limit))
-
-    def calibrations_of(self, results: Sequence[str]) -> tuple[str, ...]:
-        query = select(CalibrationRow.result_id, CalibrationRow.id).where(CalibrationRow.result_id.in_(results))
-        with self._database.read() as session:
-            found = {result_id: made for result_id, made in session.execute(query)}  # noqa: C416  rows are not tuples
-        return tuple(found[result_id] for result_id in results if result_id in found)
+            return tuple(value_of_row(session, row, quantity) for row in islice(same, limit))
 
     def of_recording(self, recording_id: str) -> tuple[str, ...]:
         query = (
@@ -136,18 +139,6 @@ class SqlResultStore:
         )
         with self._database.read() as session:
             return tuple(session.scalars(query))
-
-    def calibrations(self, unit: str, after: str | None = None, limit: int = 50) -> Page[StoredCalibration]:
-        query = select(CalibrationRow).where(CalibrationRow.unit == unit)
-        with self._database.read() as session:
-            return page(session, query, CalibrationRow.id, after, limit, calibration_of_row)
-
-    def calibration(self, calibration_id: str) -> StoredCalibration:
-        with self._database.read() as session:
-            row = session.get(CalibrationRow, calibration_id)
-            if row is None:
-                raise NotFound("calibration", calibration_id)
-            return calibration_of_row(row)
 
 
 def _itself(row: ResultRow) -> ResultRow:
@@ -162,12 +153,15 @@ def _found(session: Session, result_id: str) -> ResultRow:
 
 
 def _results(session: Session, rows: Sequence[ResultRow]) -> tuple[StoredResult, ...]:
-    """Results with their lineage, in three queries however many they are."""
+    """Results with their coefficients and their lineage, in seven queries however many they are."""
     ids = [row.id for row in rows]
     recordings: dict[str, list[ResultRecordingRow]] = defaultdict(list)
     calibrations: dict[str, list[ResultCalibrationRow]] = defaultdict(list)
     corrections: dict[str, list[ResultCorrectionRow]] = defaultdict(list)
+    given: dict[str | None, list[StoredCalibration]] = defaultdict(list)
     if ids:
+        for made in calibrations_where(session, CalibrationRow.result_id.in_(ids)):
+            given[made.result_id].append(made)
         used = select(ResultRecordingRow).where(ResultRecordingRow.result_id.in_(ids))
         for recording in session.scalars(used.order_by(ResultRecordingRow.position)):
             recordings[recording.result_id].append(recording)
@@ -177,7 +171,16 @@ def _results(session: Session, rows: Sequence[ResultRow]) -> tuple[StoredResult,
         corrected = select(ResultCorrectionRow).where(ResultCorrectionRow.result_id.in_(ids))
         for correction in session.scalars(corrected.order_by(ResultCorrectionRow.position)):
             corrections[correction.result_id].append(correction)
-    return tuple(result_of_row(row, recordings[row.id], calibrations[row.id], corrections[row.id]) for row in rows)
+    return tuple(
+        result_of_row(
+            row,
+            with_coefficients(row.document, given[row.id]),
+            recordings[row.id],
+            calibrations[row.id],
+            corrections[row.id],
+        )
+        for row in rows
+    )
 
 
 def _check_lineage(session: Session, result: StoredResult) -> None:
@@ -189,27 +192,3 @@ def _check_lineage(session: Session, result: StoredResult) -> None:
         if session.scalar(select(CalibrationRow.id).where(CalibrationRow.id == calibration_id)) is None:
             raise NotFound("calibration", calibration_id)
     check_corrections(session, result)
-
-
-def _add_calibration(
-    session: Session, result: StoredResult, triads: Sequence[TriadCalibration], make_current: bool
-) -> None:
-    """Add to a unit's history; of two that become current at once, the index lets one wait and the store try again."""
-    if make_current:
-        session.execute(
-            update(CalibrationRow)
-            .where(CalibrationRow.unit == result.unit, CalibrationRow.is_current)
-            .values(is_current=False)
-        )
-    session.add(
-        CalibrationRow(
-            id=wall_clock.new_id(),
-            unit=result.unit,
-            result_id=result.id,
-            made_at=result.created_at,
-            is_current=make_current,
-            triads=TRIADS.dump_python(tuple(triads), mode="json"),
-            simulated=result.simulated,
-        )
-    )
-    session.flush()

@@ -3,15 +3,22 @@
 from collections.abc import Iterator
 from typing import Any, TypeVar
 
-from sqlalchemy import Row, Select, and_, select
+from sqlalchemy import Row, Select, and_, func, select
 from sqlalchemy.orm import Session
 
 from bench_service.mapping import copied
 from bench_service.model.errors import NotFound
 from bench_service.model.quantities import Quantity, quantity
 from bench_service.model.records import ResultValue
-from bench_service.persistence.tables.evidence import ResultQuantityRow, ResultRow
+from bench_service.persistence.evidence.calibration_rows import calibrations_where, with_coefficients
+from bench_service.persistence.tables.evidence import (
+    CalibrationRow,
+    CoefficientRow,
+    ResultQuantityRow,
+    ResultRow,
+)
 from bench_service.persistence.tables.jobs import JobRow
+from procedures.core.imu_model import COEFFICIENT_NAMES
 
 Q = TypeVar("Q", bound=Select[*tuple[Any, ...]])
 AT_ONCE = 20
@@ -41,7 +48,21 @@ def values_query(name: str) -> Select[*tuple[Any, ...]]:
         return select(*ABOUT, ResultRow.document)
     kept = ResultQuantityRow
     named = and_(kept.result_id == ResultRow.id, kept.name == name)
-    return select(*ABOUT, kept.value, kept.unit, kept.standard_uncertainty).outerjoin(kept, named)
+    triad, _, symbol = name.partition(".")
+    if symbol not in COEFFICIENT_NAMES:
+        return select(*ABOUT, kept.value, kept.unit, kept.standard_uncertainty).outerjoin(kept, named)
+    given, number = CalibrationRow, CoefficientRow
+    return (
+        select(
+            *ABOUT,
+            func.coalesce(kept.value, number.value).label("value"),
+            func.coalesce(kept.unit, number.unit).label("unit"),
+            func.coalesce(kept.standard_uncertainty, number.standard_uncertainty).label("standard_uncertainty"),
+        )
+        .outerjoin(kept, named)
+        .outerjoin(given, and_(given.result_id == ResultRow.id, given.triad == triad))
+        .outerjoin(number, and_(number.calibration_id == given.id, number.name == symbol))
+    )
 
 
 def newest_first(
@@ -54,16 +75,17 @@ def newest_first(
         before = rows[-1].id
 
 
-def value_of_row(row: Row[*tuple[Any, ...]], name: str) -> ResultValue:
+def value_of_row(session: Session, row: Row[*tuple[Any, ...]], name: str) -> ResultValue:
     """Read the value of the quantity from one result's row."""
     about = {"result": row.id, "job": row.job_id, "at": row.created_at}
-    return copied(ResultValue, row, **about, quantity=_quantity(row, name))
+    return copied(ResultValue, row, **about, quantity=_quantity(session, row, name))
 
 
-def _quantity(row: Row[*tuple[Any, ...]], name: str) -> Quantity | None:
+def _quantity(session: Session, row: Row[*tuple[Any, ...]], name: str) -> Quantity | None:
     if not name.startswith("/"):
         return None if row.value is None else Quantity(name, row.value, row.unit, row.standard_uncertainty)
+    given = calibrations_where(session, CalibrationRow.result_id == row.id)
     try:
-        return quantity(row.document, name)
+        return quantity(with_coefficients(row.document, given), name)
     except NotFound:
         return None

@@ -99,7 +99,10 @@ class ResultRecordingRow(Table):
 
 
 class ResultQuantityRow(Table):
-    """A quantity of a result by name, copied from its document: a trend over many results reads no document."""
+    """A quantity of a result by name, copied from its document: a trend over many results reads no document.
+
+    Coefficients of the result's own calibrations are not here, but in `coefficients`.
+    """
 
     __tablename__ = "result_quantities"
 
@@ -111,12 +114,16 @@ class ResultQuantityRow(Table):
 
 
 class CalibrationRow(Table):
+    """A calibration of one triad, without its coefficients; at most one of each triad of a unit is current."""
+
     __tablename__ = "calibrations"
     __table_args__ = (
         Index("ix_calibrations_unit_id", "unit", "id"),
+        Index("uq_calibrations_result_triad", "result_id", "triad", unique=True),
         Index(
-            "uq_calibrations_current_unit",
+            "uq_calibrations_current_unit_triad",
             "unit",
+            "triad",
             unique=True,
             sqlite_where=text("is_current"),
             postgresql_where=text("is_current"),
@@ -125,11 +132,49 @@ class CalibrationRow(Table):
 
     id: Mapped[str] = mapped_column(Id, primary_key=True)
     unit: Mapped[str]
-    result_id: Mapped[str] = mapped_column(Id, ForeignKey("results.id"))
+    triad: Mapped[str]
+    method: Mapped[str]
+    origin: Mapped[str]
+    result_id: Mapped[str | None] = mapped_column(Id, ForeignKey("results.id"))
     made_at: Mapped[datetime]
-    is_current: Mapped[bool]
-    triads: Mapped[list[Any]]
     simulated: Mapped[bool]
+    output_unit: Mapped[str]
+    input_unit: Mapped[str]
+    model: Mapped[str]
+    correlations: Mapped[list[Any]]
+    is_current: Mapped[bool]
+    by_rule: Mapped[bool]
+    approval: Mapped[str]
+    valid_from: Mapped[datetime | None]
+    valid_until: Mapped[datetime | None]
+
+
+class CoefficientRow(Table):
+    """A coefficient of a calibration: the one place where its value and its standard uncertainty are stored."""
+
+    __tablename__ = "coefficients"
+
+    calibration_id: Mapped[str] = mapped_column(Id, ForeignKey("calibrations.id"), primary_key=True)
+    position: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    name: Mapped[str]
+    value: Mapped[float] = mapped_column(Float(53))
+    unit: Mapped[str]
+    standard_uncertainty: Mapped[float] = mapped_column(Float(53))
+
+
+class CalibrationDecisionRow(Table):
+    """A decision about a calibration; rows are added, and never changed or removed."""
+
+    __tablename__ = "calibration_decisions"
+    __table_args__ = (Index("ix_calibration_decisions_calibration_id_id", "calibration_id", "id"),)
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    calibration_id: Mapped[str] = mapped_column(Id, ForeignKey("calibrations.id"))
+    act: Mapped[str]
+    at: Mapped[datetime]
+    by: Mapped[str]
+    proven: Mapped[bool]
+    remark: Mapped[str]
 
 
 class ResultCalibrationRow(Table):

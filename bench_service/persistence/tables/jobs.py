@@ -77,6 +77,7 @@ class ReservationRow(Table):
     name: Mapped[str] = mapped_column(Id)
     holder: Mapped[str]
     note: Mapped[str]
+    team: Mapped[str] = mapped_column(server_default="")
     created_at: Mapped[datetime]
     until: Mapped[datetime]
     ended_at: Mapped[datetime | None]

@@ -113,7 +113,7 @@ def basis(plans: Sequence[TriadPlan]) -> str:
     nominal = [plan.triad for plan in plans if not plan.calibrated]
     if len(nominal) == len(plans):
         return "nominal scale factors: the unit has no calibration yet; uncertainties scale with the true ones"
-    calibration = f"calibration {plans[0].unit.calibration_id or 'of the unit'}"
+    calibration = plans[0].unit.calibration_in_words(*(plan.triad for plan in plans if plan.calibrated))
     of_others = "".join(
         f"; {triad}: nominal scale factors, uncertainties scale with the true ones" for triad in nominal
     )

@@ -11,7 +11,7 @@ from procedures.analysis.calibration.multiposition import TriadFit
 from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, observable_derivative, scalar_parameters
 from procedures.analysis.calibration.verification import Magnitudes
 from procedures.core.coefficient_name import CoefficientName
-from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
+from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, coefficient_unit
 
 
 @dataclass(frozen=True)
@@ -79,13 +79,6 @@ class TriadSummary:
     """Residuals over what noise and table allow; None without a spare equation and in results of older versions."""
     worst: str = ""
     """Station and channel with the greatest residual."""
-
-
-def coefficient_unit(name: str, output_unit: str, input_unit: str) -> str:
-    """Unit of b is the output's; of K "1" where output and input have the same unit."""
-    if name.startswith("b"):
-        return output_unit
-    return "1" if output_unit == input_unit else f"{output_unit}/({input_unit})"
 
 
 def triad_summary(

@@ -15,7 +15,7 @@ from procedures.core.arrays import Array
 from procedures.core.frames import table_rotation
 from procedures.core.table_angles import TableAngles
 
-SOURCES = ("orthogonality", "level", "azimuth", "gravity", "pointing")
+SOURCES = ("orthogonality", "level", "azimuth", "gravity", "pointing", "direction")
 X, Y, Z = np.eye(3)
 
 
@@ -75,6 +75,20 @@ def table_errors(
     pointing = np.full(3 * n, u.pointing_sd_arcsec * units.ARCSEC)
     source = ("orthogonality",) * 2 + ("level",) * 2 + ("azimuth", "gravity") + ("pointing",) * (3 * n)
     return TableErrors(sensitivity, np.concatenate([sd, pointing]), source)
+
+
+def direction_errors(vectors: Array, sd_rad: float, magnitude_relative_sd: float) -> TableErrors:
+    """Flaws of input vectors (n, 3) that were given and not set by a table: a small turn of each about any axis.
+
+    Columns: the common magnitude, then three turns of vector after vector, independent and of `sd_rad` each.
+    """
+    n = len(vectors)
+    sensitivity = np.zeros((n, 3, 1 + 3 * n))
+    sensitivity[:, :, 0] = vectors
+    for i, v in enumerate(vectors):
+        sensitivity[i, :, 1 + 3 * i : 4 + 3 * i] = np.cross(v, np.eye(3)).T
+    sd = np.concatenate([[magnitude_relative_sd], np.full(3 * n, sd_rad)])
+    return TableErrors(sensitivity, sd, ("gravity",) + ("direction",) * (3 * n))
 
 
 def _axes_in_unit(station: TableAngles) -> Array:

@@ -24,7 +24,7 @@ from procedures.analysis.calibration.summary import (
     scalar_check,
     triad_summary,
 )
-from procedures.analysis.calibration.table_errors import TableUncertainty, table_errors
+from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
 from procedures.analysis.calibration.verification import magnitudes
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
@@ -62,15 +62,31 @@ def analyse_means(
 
     Raises `UnfitRecording`, `Undetermined`.
     """
-    triad = means.triad
     angles = station_angles(means)
-    vectors = reference_vectors(triad, angles, site)
-    table = table_errors(angles, vectors, uncertainty, of_gravity=triad == "accelerometer")
+    vectors = reference_vectors(means.triad, angles, site)
+    table = table_errors(angles, vectors, uncertainty, of_gravity=means.triad == "accelerometer")
+    reference = reference_magnitude(means.triad, site)
+    return analyse_inputs(means, vectors, table, reference, record, with_scalar, weighting, more)
+
+
+def analyse_inputs(
+    means: StationMeans,
+    vectors: Array,
+    table: TableErrors,
+    reference: float,
+    record: TriadRecord | None,
+    with_scalar: bool = False,
+    weighting: Weighting = "noise_and_table",
+    more: Array | None = None,
+) -> tuple[TriadSummary, TriadFit]:
+    """Calibrate one triad from its station means at known input vectors (n, 3) of one magnitude, `reference` [SI].
+
+    `table`: the flaws of what set them; `more` as in `analyse_means`. Raises `UnfitRecording`, `Undetermined`.
+    """
     noise, known = noise_of_means(means, record)
     noise = noise if more is None else noise + more
-    unit = INPUT_UNITS[triad]
-    fit = fit_triad(triad, means.output_unit, unit, vectors, means.outputs, noise, table, known, weighting)
-    reference = reference_magnitude(triad, site)
+    unit = INPUT_UNITS[means.triad]
+    fit = fit_triad(means.triad, means.output_unit, unit, vectors, means.outputs, noise, table, known, weighting)
     scalar = _scalar(means, reference, noise, known, fit) if with_scalar else None
     after = magnitudes(means.outputs, fit.calibration(), reference, means.labels, fit.magnitude_sd)
     return triad_summary(fit, after, means.labels, scalar, _slow(means, noise, fit, known)), fit

@@ -1,0 +1,112 @@
+"""Accounts, tokens and sessions as values, and their secrets. A secret is shown once; only its digest is kept.
+
+A token or a session secret has 256 random bits, so its SHA-256 cannot be guessed from, and needs no salt and no slow
+hash. A password has few bits: see `bench_service.access.passwords`.
+"""
+
+import hashlib
+import hmac
+import re
+import secrets
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+
+from bench_service.access.roles import Role
+
+NAME = r"^[a-z0-9][a-z0-9._@+-]{0,63}$"
+"""Pattern of the names of accounts, tokens and teams: small letters, so that no two names look the same."""
+PREFIX = "bench_"
+"""Beginning of every token, by which a person or a scanner of files knows it."""
+_SECRET = re.compile(r"bench_[A-Za-z0-9_-]{43}")
+IDLE = timedelta(hours=12)
+"""Time after which a session that is not used ends."""
+LONGEST = timedelta(days=7)
+"""Time after which a session ends, used or not."""
+STOPS_AFTER_END = timedelta(days=7)
+"""Time for which a session that has ended by itself still stops a bench: a page that was left open."""
+
+
+@dataclass(frozen=True)
+class Account:
+    """The account of a person."""
+
+    name: str
+    role: Role
+    team: str
+    created_at: datetime
+    created_by: str
+    has_password: bool
+    """False for a person whom only a trusted proxy authenticates."""
+
+
+@dataclass(frozen=True)
+class AccessToken:
+    """A named token of a program, without its secret."""
+
+    id: str
+    name: str
+    role: Role
+    team: str
+    digest: str = field(repr=False)
+    created_at: datetime
+    created_by: str
+    expires_at: datetime
+    revoked_at: datetime | None = None
+    last_used_at: datetime | None = None
+
+    def valid(self, at: datetime) -> bool:
+        """Return whether it is neither revoked nor expired."""
+        return self.revoked_at is None and at < self.expires_at
+
+
+@dataclass(frozen=True)
+class Session:
+    """A person's session, without its secret."""
+
+    digest: str = field(repr=False)
+    account: str
+    created_at: datetime
+    last_used_at: datetime
+
+    @property
+    def over_at(self) -> datetime:
+        """Time of its end unless it is used before."""
+        return min(self.last_used_at + IDLE, self.created_at + LONGEST)
+
+    def valid(self, at: datetime) -> bool:
+        """Return whether it has not ended by itself."""
+        return at < self.over_at
+
+    def stops(self, at: datetime) -> bool:
+        """Return whether it still stops a bench: a page left open over a weekend does."""
+        return at < self.over_at + STOPS_AFTER_END
+
+
+def new_token() -> str:
+    """Make the secret of a token."""
+    return PREFIX + secrets.token_urlsafe(32)
+
+
+def new_session_secret() -> str:
+    """Make the secret of a session, the value of its cookie."""
+    return secrets.token_urlsafe(32)
+
+
+def digest_of(secret: str) -> str:
+    """The digest under which a secret is kept."""
+    return hashlib.sha256(secret.encode()).hexdigest()
+
+
+def csrf_of(key: bytes, subject: str) -> str:
+    """The value that the pages of a session repeat with each change: nobody can make it who cannot read a page."""
+    return hmac.new(key, f"csrf:{subject}".encode(), "sha256").hexdigest()
+
+
+def names_token(text: str) -> bool:
+    """Return whether a text contains a token."""
+    return _SECRET.search(text) is not None
+
+
+def without_tokens(text: str) -> str:
+    """Replace every token in a text: for log lines and the audit trail."""
+    return _SECRET.sub(f"{PREFIX}[hidden]", text)

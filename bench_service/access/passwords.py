@@ -1,0 +1,64 @@
+"""Passwords: their rule and their hashes (argon2id, the parameters of argon2-cffi, RFC 9106's second choice)."""
+
+from functools import cache
+from threading import BoundedSemaphore
+
+from argon2 import PasswordHasher
+from argon2.exceptions import InvalidHashError, VerificationError
+
+from bench_service.model.errors import Overloaded
+from procedures.core.errors import BadParameter
+
+SHORTEST, LONGEST = 10, 200
+"""Allowed lengths [characters]. No rule about kinds of characters: length is what keeps a guess out (NIST 800-63B)."""
+AT_ONCE = 2
+"""Number of hashes that are computed at one time: each takes 64 MiB and some 50 ms."""
+WAIT_S = 3.0
+"""Longest time that a log-in waits for its turn [s]."""
+
+_turn = BoundedSemaphore(AT_ONCE)
+
+
+def check_rule(name: str, password: str) -> None:
+    """Refuse a password that is too short, too long, or the account's name. Raises `BadParameter`."""
+    if not SHORTEST <= len(password) <= LONGEST:
+        raise BadParameter("password", f"{len(password)} characters", f"{SHORTEST} … {LONGEST} characters")
+    if name in password.lower() and len(password) < len(name) + SHORTEST:
+        raise BadParameter("password", "(not shown)", "one that is more than the name of the account")
+
+
+def hashed(password: str) -> str:
+    """Hash a password. Raises `Overloaded`."""
+    with _Turn():
+        return _hasher().hash(password)
+
+
+def matches(password: str, stored: str | None) -> bool:
+    """Return whether a password is the one of a hash; without a hash it takes as long, and is none."""
+    with _Turn():
+        try:
+            return _hasher().verify(stored or _nobody(), password) and stored is not None
+        except (VerificationError, InvalidHashError):
+            return False
+
+
+class _Turn:
+    """One of the few places for hashing."""
+
+    def __enter__(self) -> None:
+        if not _turn.acquire(timeout=WAIT_S):
+            raise Overloaded("too many log-ins at one time: try again in a moment")
+
+    def __exit__(self, *_: object) -> None:
+        _turn.release()
+
+
+@cache
+def _hasher() -> PasswordHasher:
+    return PasswordHasher()
+
+
+@cache
+def _nobody() -> str:
+    """Hash of a password that nobody has: an unknown name is answered no faster than a known one."""
+    return _hasher().hash("nobody has this password")

@@ -1,0 +1,68 @@
+"""The right that each route needs: every route that changes something is named here, reading needs the right to see.
+
+`docs/rights.md` is made from this. A route that changes something and is not named here is an admin's alone.
+"""
+
+from typing import Any
+
+from bench_service.access.roles import Right
+
+READING = ("GET", "HEAD")
+RIGHTS: dict[str, Right] = {
+    # health, the log-in, and what its page is made of
+    "healthz": Right.OPEN,
+    "readyz": Right.OPEN,
+    "read_static": Right.OPEN,
+    "log_in_page": Right.OPEN,
+    "read_session": Right.OPEN,
+    "log_in": Right.OPEN,
+    "log_out": Right.SEE,
+    # previews change nothing
+    "preview": Right.SEE,
+    "preview_campaign": Right.SEE,
+    "stop": Right.STOP,
+    "submit": Right.OPERATE,
+    "change_job": Right.OPERATE,
+    "cancel": Right.OPERATE,
+    "pause": Right.OPERATE,
+    "answer": Right.OPERATE,
+    "resume": Right.OPERATE,
+    "release": Right.OPERATE,
+    "release_stop": Right.OPERATE,
+    "reserve": Right.OPERATE,
+    "end_reservation": Right.OPERATE,
+    "cancel_campaign_run": Right.OPERATE,
+    "analyse_again": Right.ENGINEER,
+    "run_method": Right.ENGINEER,
+    "import_recording": Right.ENGINEER,
+    "declare_unit": Right.ENGINEER,
+    "choose_correction": Right.ENGINEER,
+    "add_campaign": Right.ENGINEER,
+    "replace_campaign": Right.ENGINEER,
+    "start_campaign": Right.ENGINEER,
+    "add_schedule": Right.ENGINEER,
+    "change_schedule": Right.ENGINEER,
+    "remove_schedule": Right.ENGINEER,
+    "approve_procedure": Right.ENGINEER,
+    "withdraw_approval": Right.ENGINEER,
+    "verify_audit": Right.ADMIN,
+    "close_audit": Right.ADMIN,
+    "list_accounts": Right.ACCESS,
+    "add_account": Right.ACCESS,
+    "change_account": Right.ACCESS,
+    "remove_account": Right.ACCESS,
+    "list_tokens": Right.ACCESS,
+    "add_token": Right.ACCESS,
+    "revoke_token": Right.ACCESS,
+}
+"""Rights by the name of the route, which is the operation's in the API's document."""
+
+
+def right_of(name: str, method: str) -> Right:
+    """The right that a route needs."""
+    return RIGHTS.get(name, Right.SEE if method in READING else Right.ADMIN)
+
+
+def right_of_route(route: Any) -> Right:
+    """The right that a route of the application needs."""
+    return right_of(route.name, "GET" if route.methods & set(READING) else "POST")

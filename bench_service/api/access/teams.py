@@ -1,0 +1,34 @@
+"""Dependencies of routes that act on what a team has reserved: members of the team may, and admins."""
+
+from fastapi import Depends
+
+from bench_service.access.service import require_team
+from bench_service.api.http.dependencies import Me, Service
+from bench_service.model.errors import NotUnderstood
+
+
+def _of_job(job_id: str, service: Service, me: Me) -> None:
+    if me.in_every_team:  # what is reserved need not be read
+        return
+    try:
+        reservation = service.stores.jobs.get(job_id).reservation
+    except NotUnderstood:  # stored by another version: the route itself says so, or cancels it
+        return
+    require_team(me, service.queues.team_of(reservation), f"job {job_id}")
+
+
+def _of_reservation(reservation_id: str, service: Service, me: Me) -> None:
+    require_team(me, service.queues.team_of(reservation_id), f"reservation {reservation_id}")
+
+
+def _of_bench(bench_id: str, service: Service, me: Me) -> None:
+    if not me.in_every_team:
+        require_team(me, service.queues.team_of_bench(bench_id), f"bench {bench_id}")
+
+
+TeamOfJob = Depends(_of_job)
+"""Refuses a job whose reservation is another team's."""
+TeamOfReservation = Depends(_of_reservation)
+"""Refuses another team's reservation."""
+TeamOfBench = Depends(_of_bench)
+"""Refuses a bench that another team has reserved."""

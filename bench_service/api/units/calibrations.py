@@ -1,0 +1,131 @@
+"""Routes of a unit's calibrations: history, known coefficients, and which one of each triad counts."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query, Response
+
+from bench_service.api.http.dependencies import After, ClientName, IdempotencyKey, Limit, Service
+from bench_service.api.http.errors import made, problems
+from bench_service.api.units.calibration_schemas import (
+    CalibrationApproval,
+    CalibrationChoice,
+    CalibrationDetail,
+    CalibrationEntry,
+    CalibrationPage,
+    CalibrationRejection,
+    CalibrationView,
+    RuleChoice,
+    Triad,
+)
+from bench_service.evidence.entered_calibrations import stored_calibration
+from bench_service.model.calibrations import Decider
+from bench_service.model.errors import NotFound
+from bench_service.model.records import Idempotency
+from bench_service.model.request import fingerprint
+from procedures.core.unit import SERIAL
+
+router = APIRouter(prefix="/api/v1/units/{serial}/calibrations", tags=["units"])
+Serial = Annotated[str, Path(pattern=SERIAL)]
+
+
+@router.get("", responses=problems(404))
+def list_calibrations(
+    serial: str,
+    service: Service,
+    triad: Annotated[Triad | None, Query(description="Only those of this triad")] = None,
+    after: After = None,
+    limit: Limit = 50,
+) -> CalibrationPage:
+    """List the unit's calibrations, newest first; at most one of each triad is current."""
+    service.stores.units.unit(serial)
+    page = service.stores.calibrations.list(serial, triad=triad, after=after, limit=limit)
+    return CalibrationPage(items=[CalibrationView.of(c) for c in page.items], next=page.next)
+
+
+@router.post(
+    "",
+    status_code=201,
+    responses={**problems(404, 409, 413, 507), **made(201, "calibration_id", "read_calibration")},
+)
+def enter_calibration(
+    serial: Serial,
+    body: CalibrationEntry,
+    service: Service,
+    client: ClientName,
+    response: Response,
+    key: IdempotencyKey = None,
+) -> CalibrationView:
+    """Enter known coefficients of a triad, with their standard uncertainties and their origin."""
+    service.stores.units.unit(serial)
+    calibration = stored_calibration(serial, body.entry())
+    by = Decider(body.by or client, body.remark)
+    stored = service.stores.calibrations.add(calibration, by, body.choose, _key("enter", key, serial, body))
+    response.headers["Location"] = f"/api/v1/units/{serial}/calibrations/{stored.id}"
+    return CalibrationView.of(stored)
+
+
+@router.post("/choose-by-rule", responses=problems(404, 409, 413, 507))
+def choose_by_rule(serial: str, body: RuleChoice, service: Service, client: ClientName) -> CalibrationView:
+    """Give a triad back to the rule: its newest usable calibration by a job that passed becomes current."""
+    service.stores.units.unit(serial)
+    by = Decider(body.by or client, body.remark)
+    return CalibrationView.of(service.stores.calibrations.choose_by_rule(serial, body.triad, by))
+
+
+@router.get("/{calibration_id}", responses=problems(404))
+def read_calibration(serial: str, calibration_id: str, service: Service) -> CalibrationDetail:
+    """Read one calibration with its lineage, and the results that rest on it."""
+    stored = service.stores.calibrations.get(calibration_id)
+    if stored.unit != serial:
+        raise NotFound("calibration", calibration_id, f"unit {serial} has none of that id")
+    made_by = None if stored.result_id is None else service.stores.results.get(stored.result_id)
+    return CalibrationDetail.of_use(stored, made_by, service.stores.calibrations.used_by(calibration_id))
+
+
+@router.post("/{calibration_id}/choose", responses=problems(404, 409, 413, 507))
+def choose_calibration(
+    serial: str,
+    calibration_id: str,
+    body: CalibrationChoice,
+    service: Service,
+    client: ClientName,
+    key: IdempotencyKey = None,
+) -> CalibrationView:
+    """Make a calibration the one of its triad that new jobs use; jobs that began before keep theirs."""
+    by = Decider(body.by or client, body.remark)
+    asked = _key("choose", key, serial, calibration_id, body)
+    return CalibrationView.of(service.stores.calibrations.choose(serial, calibration_id, by, asked))
+
+
+@router.post("/{calibration_id}/approve", responses=problems(404, 409, 413, 507))
+def approve_calibration(
+    serial: str,
+    calibration_id: str,
+    body: CalibrationApproval,
+    service: Service,
+    client: ClientName,
+    key: IdempotencyKey = None,
+) -> CalibrationView:
+    """Approve a calibration, and say until when it is valid."""
+    by = Decider(body.by or client, body.remark)
+    asked = _key("approve", key, serial, calibration_id, body)
+    return CalibrationView.of(service.stores.calibrations.approve(serial, calibration_id, by, body.valid_until, asked))
+
+
+@router.post("/{calibration_id}/reject", responses=problems(404, 409, 413, 507))
+def reject_calibration(
+    serial: str,
+    calibration_id: str,
+    body: CalibrationRejection,
+    service: Service,
+    client: ClientName,
+    key: IdempotencyKey = None,
+) -> CalibrationView:
+    """Reject a calibration: no new job uses it, also where it is current."""
+    by = Decider(body.by or client, body.remark)
+    asked = _key("reject", key, serial, calibration_id, body)
+    return CalibrationView.of(service.stores.calibrations.reject(serial, calibration_id, by, asked))
+
+
+def _key(act: str, key: str | None, *about: object) -> Idempotency | None:
+    return None if key is None else Idempotency(f"calibrations-{act}:{key}", fingerprint(list(about)))

@@ -1,0 +1,1 @@
+"""Requests of commands: the client of a service, retries, and watching what a service does."""

@@ -1,0 +1,74 @@
+"""Progress of a job until its end, with a progress bar for a person."""
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from bench_service.cli.asking.client import call
+from bench_service.cli.asking.patience import patiently
+from bench_service.cli.options import notice
+from bench_service.wall_clock import pause
+
+if TYPE_CHECKING:
+    import httpx
+
+ENDED = ("succeeded", "failed", "cancelled", "interrupted")
+LOOK_S = 0.1
+"""Interval between two polls of the service [s]."""
+LOOK_TIMEOUT_S = 15.0
+"""Longest time that one poll may take [s]: a service that hangs counts as away."""
+JOB = ("id", "procedure", "unit", "state", "verdict", "progress", "page", "result", "error")
+CAMPAIGN_RUN = ("id", "campaign", "unit", "state", "verdict", "steps", "waiting", "reason", "warnings")
+"""Fields of a job and of a campaign's run that commands read."""
+
+
+def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict[str, Any]:
+    """Follow a job until it has ended; return its last state. Raises `Refused` where the service is away for long."""
+    page = f"{str(client.base_url).rstrip('/')}{job['page']}"
+    goes_on = f"The service has job {job['id']} and goes on with it: {page} shows it, `bench jobs` lists it"
+    with _progress(console) as progress:
+        bar = progress.add_task(f"{job['procedure']} {job['unit']}", total=job["progress"]["stations"] or 1, doing="")
+        paused = False
+        while job["state"] not in ENDED:
+            if (job["state"] == "paused") > paused:
+                notice(f"job {job['id']} is paused: `bench job resume {job['id']}` goes on with it")
+            paused = job["state"] == "paused"
+            pause(LOOK_S)
+            ask = partial(call, client, "GET", f"/api/v1/jobs/{job['id']}", JOB, timeout=LOOK_TIMEOUT_S)
+            job = patiently(ask, notice, goes_on)
+            progress.update(bar, completed=job["progress"]["station"])
+        if job["state"] == "succeeded":
+            progress.update(bar, completed=job["progress"]["stations"] or 1)
+    return job
+
+
+def exit_code(verdict: str | None) -> int:
+    """Return the exit code of a verdict: 0 pass, 1 fail, 2 everything else."""
+    return {"pass": 0, "fail": 1}.get(verdict or "", 2)
+
+
+def watch_campaign(client: "httpx.Client", run: dict[str, Any], console: Console, goes_on: str) -> dict[str, Any]:
+    """Follow a campaign's run until it has ended; the reason that it waits for is shown next to the bar.
+
+    Raises `Refused` with `goes_on` where the service is away for long.
+    """
+    with _progress(console) as progress:
+        bar = progress.add_task(f"{run['campaign']} {run['unit']}", total=len(run["steps"]), doing="")
+        while True:
+            ended = [step for step in run["steps"] if step["finished_at"] or step["state"] == "skipped"]
+            now = next((s["name"] for s in run["steps"] if s["state"] in ("running", "paused")), "")
+            progress.update(bar, completed=len(ended), doing=run["waiting"] or now)
+            if run["state"] in ENDED:
+                return run
+            pause(LOOK_S)
+            path = f"/api/v1/campaign-runs/{run['id']}"
+            ask = partial(call, client, "GET", path, CAMPAIGN_RUN, timeout=LOOK_TIMEOUT_S)
+            run = patiently(ask, notice, goes_on)
+
+
+def _progress(console: Console) -> Progress:
+    """Build the progress bar; names and reasons come from people and are no markup."""
+    name, doing = (TextColumn(text, markup=False) for text in ("{task.description}", "{task.fields[doing]}"))
+    return Progress(name, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), doing, console=console)

@@ -1,0 +1,155 @@
+"""Commands about evidence: recordings and results are listed, files imported and exported, methods run."""
+
+import json
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from bench_service.cli.asking.client import RESULT, call, check, connect, segment
+from bench_service.cli.asking.lists import newest, show
+from bench_service.cli.completion import method_names
+from bench_service.cli.files import check_folder, text_of, whole_file
+from bench_service.cli.options import NO_ITEMS, AsJson, Limit, Server, Set, console, errors, parameter
+
+Labelled = Annotated[list[str], typer.Option("--label", help="Only of jobs with name or name=text; may be repeated")]
+Verdict = Annotated[str | None, typer.Option(help="pass, fail or error")]
+Since = Annotated[str | None, typer.Option(help="Made at this moment or later: 2026-11-30T08:00:00Z")]
+Until = Annotated[str | None, typer.Option(help="Made before this moment")]
+Text = Annotated[str | None, typer.Option(help="In an id, a name, a label or the name of an imported file")]
+
+
+def import_(
+    context: typer.Context,
+    files: Annotated[list[Path], typer.Argument(exists=True, dir_okay=False)],
+    description: Annotated[Path, typer.Option(exists=True, dir_okay=False, help="JSON file that says what is in them")],
+    server: Server = None,
+) -> None:
+    """Import a recorded file, or several that are columns of one recording."""
+    data = {"description": text_of(description)}
+    with connect(context.obj, server, drive=False) as client, ExitStack() as closing:
+        opened = [(path.name, closing.enter_context(path.open("rb"))) for path in files]
+        parts = [("files", (name, file, "application/octet-stream")) for name, file in opened]
+        recording = call(client, "POST", "/api/v1/recordings", ("id", "warnings"), files=parts, data=data)
+    console.print_json(json.dumps(recording))
+    for warning in recording["warnings"]:
+        errors.print(f"warning: {warning}", soft_wrap=True)
+
+
+def analyse(
+    context: typer.Context,
+    method: Annotated[str, typer.Argument(autocompletion=method_names)],
+    recording: Annotated[list[str], typer.Option(help="Id of a recording; may be repeated")] = NO_ITEMS,
+    calibration: Annotated[list[str], typer.Option(help="Id of a calibration; may be repeated")] = NO_ITEMS,
+    set_: Set = NO_ITEMS,
+    server: Server = None,
+    as_json: AsJson = False,
+) -> int:
+    """Run a method on stored recordings or calibrations; prints its coefficients, checks and verdict."""
+    from bench_service.cli.asking.watching import exit_code
+
+    body = {
+        "method": method,
+        "recordings": recording,
+        "calibrations": calibration,
+        "parameters": dict(map(parameter, set_)),
+    }
+    with connect(context.obj, server, drive=False) as client:
+        result = call(client, "POST", "/api/v1/analyses", RESULT, json=body)
+    _print_result(method, result, as_json)
+    return exit_code(result["verdict"])
+
+
+def export(
+    context: typer.Context,
+    recording: str,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", dir_okay=False, help="File to write; its ending is the format")
+    ],
+    channels: Annotated[str | None, typer.Option(help="Names, separated by commas; all without it")] = None,
+    start_s: Annotated[float | None, typer.Option(help="From this second of the recording")] = None,
+    stop_s: Annotated[float | None, typer.Option(help="Up to this second of the recording")] = None,
+    server: Server = None,
+) -> None:
+    """Take a recording's samples out as .csv, .parquet or .arrow."""
+    options: dict[str, Any] = {"channels": channels, "start_s": start_s, "stop_s": stop_s}
+    query = {"format": output.suffix.removeprefix("."), **{k: v for k, v in options.items() if v is not None}}
+    check_folder(output)
+    with (
+        connect(context.obj, server, drive=False) as client,
+        client.stream("GET", f"/api/v1/recordings/{segment(recording)}/data", params=query) as response,
+    ):
+        check(response)
+        with whole_file(output) as sink:
+            for piece in response.iter_bytes():
+                sink.write(piece)
+    console.print(f"{output}: {output.stat().st_size} bytes")
+
+
+def recordings(
+    context: typer.Context,
+    recording: Annotated[str | None, typer.Argument(help="Id of one recording, to be shown whole")] = None,
+    job: Annotated[str | None, typer.Option(help="Only of this job")] = None,
+    unit: Annotated[str | None, typer.Option(help="Only of this unit")] = None,
+    verdict: Verdict = None,
+    since: Since = None,
+    until: Until = None,
+    label: Labelled = NO_ITEMS,
+    text: Text = None,
+    limit: Limit = 20,
+    server: Server = None,
+    as_json: AsJson = False,
+) -> None:
+    """List recordings, newest first, or show one."""
+    from bench_service.cli.printing.tables import recording_table
+
+    query = {"job": job, "unit": unit, "verdict": verdict, "since": since, "until": until, "label": label, "text": text}
+    with connect(context.obj, server, drive=False) as client:
+        if recording is not None:
+            found = call(client, "GET", f"/api/v1/recordings/{segment(recording)}", ("id", "channels"))
+            console.print_json(json.dumps(found))
+            return
+        page = newest(client, "/api/v1/recordings", limit, query)
+    show(page if as_json else page["items"], as_json, recording_table)
+
+
+def results(
+    context: typer.Context,
+    result: Annotated[str | None, typer.Argument(help="Id of one result, to be shown whole")] = None,
+    name: Annotated[str | None, typer.Option(help="Only of this procedure or method")] = None,
+    unit: Annotated[str | None, typer.Option(help="Only of this unit")] = None,
+    verdict: Verdict = None,
+    since: Since = None,
+    until: Until = None,
+    label: Labelled = NO_ITEMS,
+    text: Text = None,
+    limit: Limit = 20,
+    server: Server = None,
+    as_json: AsJson = False,
+) -> None:
+    """List results, newest first, or show one with its tables, checks and verdict."""
+    from bench_service.cli.printing.tables import result_table
+
+    query = {"name": name, "unit": unit, "verdict": verdict, "since": since, "until": until}
+    with connect(context.obj, server, drive=False) as client:
+        if result is not None:
+            found = call(client, "GET", f"/api/v1/results/{segment(result)}", (*RESULT, "name"))
+            _print_result(found["name"], found, as_json)
+            return
+        page = newest(client, "/api/v1/results", limit, {**query, "label": label, "text": text})
+    show(page if as_json else page["items"], as_json, result_table)
+
+
+def _print_result(name: str, result: dict[str, Any], as_json: bool) -> None:
+    from bench_service.cli.printing.report_tables import report_tables
+    from bench_service.cli.printing.tables import check_table, show_warnings
+
+    if as_json:
+        print(json.dumps(result, indent=2))
+        return
+    for table in report_tables(name, result["document"]):
+        console.print(table)
+    console.print(check_table(result["document"]))
+    show_warnings(result["document"], console)
+    console.print(f"verdict {result['verdict']}, result {result['id']}", soft_wrap=True)

@@ -1,0 +1,1 @@
+"""Tables of commands for a terminal: jobs, results, campaigns."""

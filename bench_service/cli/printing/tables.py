@@ -1,0 +1,193 @@
+"""Tables for a terminal: coefficients next to the true values, checks next to their limits."""
+
+import json
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from bench_service.cli.printing.moments import moment
+from procedures.core.imu_model import COEFFICIENT_NAMES
+from procedures.core.units import DISPLAY
+
+
+def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]] | None) -> tuple[Table, float]:
+    """Estimate ± standard uncertainty σ, truth, error in sigmas; and the largest error in sigmas (0 without truth)."""
+    table = Table(title="Coefficients, U = b + K·v")
+    for column in ("coefficient", "unit", "estimate", "± σ", "truth", "error / σ"):
+        table.add_column(column, justify="left" if column in ("coefficient", "unit") else "right", no_wrap=True)
+    true_by_triad = {t["triad"]: t for t in truths or []}
+    worst = 0.0
+    for triad in triads:
+        name, size = DISPLAY[triad["output_unit"]]
+        true = true_by_triad.get(triad["triad"])
+        for index, coefficient in enumerate(COEFFICIENT_NAMES):
+            channel, column = divmod(index, 4)
+            scale, unit = (size, name) if column == 0 else (1.0, "1")
+            estimate = _entry(triad, channel, column)
+            sd = triad["covariance"][index][index] ** 0.5
+            cells = [f"{triad['triad']} {coefficient}", unit, f"{estimate / scale:.7f}", f"{sd / scale:.2g}", "–", "–"]
+            if true is not None:
+                error = (estimate - _entry(true, channel, column)) / sd
+                worst = max(worst, abs(error))
+                cells[4:] = [f"{_entry(true, channel, column) / scale:.7f}", f"{error:+.2f}"]
+            table.add_row(*cells, end_section=index == len(COEFFICIENT_NAMES) - 1)
+    return table, worst
+
+
+def check_table(document: dict[str, Any]) -> Table:
+    """Table of checks, each value next to its limit."""
+    table = Table(title="Checks")
+    for column in ("check", "value", "limit", "unit", "outcome"):
+        table.add_column(column, justify="left" if column in ("check", "unit", "outcome") else "right")
+    for check in document.get("checks", []):
+        limit = check["limit"]
+        bounds = [f"≥ {limit['minimum']:.4g}"] if limit["minimum"] is not None else []
+        bounds += [f"≤ {limit['maximum']:.4g}"] if limit["maximum"] is not None else []
+        outcome = Text("pass", style="green") if check["passed"] else Text("fail", style="red")
+        table.add_row(check["name"], f"{check['value']:.4g}", ", ".join(bounds), limit["unit"], outcome)
+    return table
+
+
+def show_warnings(document: dict[str, Any], to: Console) -> None:
+    """Print the warnings of a result, which a person should read before trusting it."""
+    for warning in document.get("warnings", []):
+        to.print(Text(f"warning: {warning}", style="yellow"), soft_wrap=True)
+
+
+def calibration_table(calibrations: list[dict[str, Any]]) -> Table:
+    """Table of calibrations: their origin, which one counts and by whose choice, and how long."""
+    table = Table()
+    for column in ("calibration", "triad", "made", "method", "verdict", "current", "approval", "valid until"):
+        table.add_column(column, overflow="fold")
+    for one in calibrations:
+        chosen = ("by rule" if one["by_rule"] else "chosen") if one["current"] else ""
+        origin = f"{one['method']}: {one['origin']}" if one["origin"] else one["method"]
+        current = Text(f"{chosen}, not usable" if chosen and one["unusable"] else chosen)
+        until = one["valid_until"] or "–"
+        cells = (one["made_at"][:19], origin, one["verdict"] or "–", current, one["approval"], until[:19])
+        table.add_row(one["id"], one["triad"], *cells)
+    return table
+
+
+def job_table(jobs: list[dict[str, Any]]) -> Table:
+    """Table of jobs, newest first."""
+    table = Table()
+    for column in ("job", "procedure", "unit", "state", "verdict", "stations", "submitted"):
+        table.add_column(column, no_wrap=column == "job")
+    for job in jobs:
+        done = job["progress"]
+        table.add_row(
+            job["id"],
+            job["procedure"],
+            job["unit"],
+            job["state"],
+            job["verdict"] or "–",
+            f"{done['station']}/{done['stations']}",
+            job["created_at"][:19].replace("T", " "),
+        )
+    return table
+
+
+def _entry(triad: dict[str, Any], channel: int, column: int) -> float:
+    return triad["bias"][channel] if column == 0 else triad["matrix"][channel][column - 1]
+
+
+def recording_table(recordings: list[dict[str, Any]]) -> Table:
+    """Table of recordings, newest first."""
+    table = _table("recording", "unit", "station or files", "channels", "rate, Hz", "length, s", "made")
+    for one in recordings:
+        files = ", ".join(str(file.get("name")) for file in one["source"].get("files", []))
+        where = one["station"]["label"] if one["station"] else files or "–"
+        numbers = str(len(one["channels"])), f"{one['rate_hz']:g}", f"{one['duration_s']:g}"
+        table.add_row(one["id"], Text(one["unit"]), Text(where), *numbers, moment(one["created_at"]))
+    return table
+
+
+def result_table(results: list[dict[str, Any]]) -> Table:
+    """Table of results, newest first."""
+    table = _table("result", "procedure or method", "unit", "verdict", "job", "made")
+    for one in results:
+        job = one["lineage"]["job"] or "–"
+        table.add_row(
+            one["id"], Text(one["name"]), Text(one["unit"] or "–"), one["verdict"], job, moment(one["created_at"])
+        )
+    return table
+
+
+def unit_table(units: list[dict[str, Any]]) -> Table:
+    """Table of units with what is current of each."""
+    table = _table("unit", "rate, Hz", "channels", "calibration", "thermal correction", "converter")
+    for one in units:
+        current = [one[name] or "–" for name in ("calibration", "thermal_correction", "converter")]
+        table.add_row(Text(one["serial"]), f"{one['sample_rate_hz']:g}", str(len(one["channels"])), *current)
+    return table
+
+
+def reservation_table(reservations: list[dict[str, Any]]) -> Table:
+    """Table of reservations, newest first."""
+    table = _table("reservation", "of", "holder", "until", "holds now", "note")
+    for one in reservations:
+        of = f"bench {one['bench']}" if one["bench"] else f"unit {one['unit']}"
+        now = "yes" if one["active"] else "no"
+        table.add_row(one["id"], Text(of), Text(one["holder"]), moment(one["until"]), now, Text(one["note"]))
+    return table
+
+
+def queue_table(entries: list[dict[str, Any]]) -> Table:
+    """Table of the jobs that wait for a bench, in the order in which they start."""
+    table = _table("place", "job", "unit", "priority", "queued", "waiting")
+    for one in entries:
+        numbers = str(one["position"]), one["job"], Text(one["unit"]), str(one["priority"])
+        table.add_row(*numbers, moment(one["queued_at"]), Text(one["waiting"]))
+    return table
+
+
+def procedure_table(entries: list[dict[str, Any]]) -> Table:
+    """Table of procedures or methods with the names of their parameters."""
+    table = _table("name", "version", "title", "parameters")
+    for one in entries:
+        table.add_row(
+            one["name"], one["version"], one["title"], Text(", ".join(one["parameters"].get("properties", {})))
+        )
+    return table
+
+
+def parameter_table(entry: dict[str, Any]) -> Table:
+    """Table of the parameters of a procedure or method: default and description of each."""
+    table = _table("parameter", "default", "description", title=entry["title"])
+    for name, schema in entry["parameters"].get("properties", {}).items():
+        default = Text("needed") if "default" not in schema else Text(json.dumps(schema["default"], ensure_ascii=False))
+        table.add_row(name, default, Text(schema.get("description", "")))
+    return table
+
+
+def uncertainty_table(predicted: list[dict[str, Any]]) -> Table:
+    """Table of the uncertainties that a plan is expected to have, and what they come from."""
+    table = _table("quantity", "unit", "expected σ", "from noise", "from the table", title="Expected uncertainties")
+    for one in predicted:
+        figures = (one["standard_uncertainty"], one["from_noise"], one["from_table"])
+        table.add_row(Text(one["name"]), one["unit"], *(f"{figure:.3g}" for figure in figures))
+    return table
+
+
+def outcome_table(plans: list[dict[str, Any]], outcomes: list[dict[str, Any]]) -> Table:
+    """Table of the previews of a batch: duration and warnings of each plan, or why it cannot be run."""
+    table = _table("plan", "procedure", "unit", "duration, h", "outcome")
+    for number, (plan, outcome) in enumerate(zip(plans, outcomes, strict=True), start=1):
+        made, refusal = outcome["preview"], outcome["refusal"]
+        if made is None:
+            table.add_row(str(number), Text(plan["procedure"]), Text(plan["unit"]), "–", Text(refusal["detail"], "red"))
+            continue
+        said = [*made["violations"], *made["warnings"]]
+        text = Text("; ".join(said), "yellow") if said else Text("good")
+        table.add_row(str(number), made["procedure"], Text(made["unit"]), f"{made['duration_s'] / 3600:.2f}", text)
+    return table
+
+
+def _table(*columns: str, title: str | None = None) -> Table:
+    table = Table(title=title)
+    for number, column in enumerate(columns):
+        table.add_column(column, no_wrap=number == 0)
+    return table

@@ -1,0 +1,1 @@
+"""Processes that commands are: servers, workers, supervisors, their companions, and their logs."""

@@ -1,0 +1,97 @@
+"""Destination and format of log lines: one handler for the service's, the HTTP server's and the job engine's.
+
+`BENCH_LOG=json` writes one JSON object a line with what it is about as fields; without it, text for a person.
+"""
+
+import logging
+import re
+import sys
+from datetime import UTC, datetime
+
+from bench_service.access.credentials import without_tokens
+from bench_service.settings import Settings
+from bench_service.telemetry.log_context import AddSubjects
+
+FIELDS = "{asctime} {levelname} {name} {message}"
+OWN_HANDLERS = ("uvicorn", "uvicorn.error", "uvicorn.access", "dbos")
+"""Loggers of libraries that install a handler of their own unless they find one; some put tracebacks into messages."""
+
+
+TRACE = "    | "
+"""Prefix of each line of a traceback: a message with a line break in it cannot look like a line of the log."""
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+"""Control characters, line separators of Unicode, and marks that change the direction of what follows."""
+
+
+def visible(text: str) -> str:
+    """Escape the control characters of a text, so that it stays one line and commands no terminal; hide tokens."""
+    return _CONTROL.sub(lambda found: ascii(found[0])[1:-1], without_tokens(text))
+
+
+class Lines(logging.Formatter):
+    """Format a record as one line for a person; a traceback follows on marked lines of its own."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        about: dict[str, str] = getattr(record, "subjects", {})
+        found = " ".join(f"{name}={value}" for name, value in about.items())
+        message = record.getMessage()
+        first, *more = message.split("\n") if record.name in OWN_HANDLERS else [message]
+        text = f"{_moment(record)} {record.levelname:7} {record.name}: {first}"
+        if found:
+            text += f" [{found}]"
+        if record.exc_info is not None:
+            more += self.formatException(record.exc_info).split("\n")
+        return "\n".join([visible(text), *(TRACE + visible(line) for line in more)])
+
+
+def set_up(settings: Settings, level: str) -> None:
+    """Write lines of at least this level to standard error; the setting `log_level` counts more, where given."""
+    handler = logging.StreamHandler(sys.stderr)
+    handler.addFilter(AddSubjects(bench=settings.bench_id))
+    handler.setFormatter(_json_lines() if settings.log == "json" else Lines())
+    wanted = (settings.log_level or level).upper()
+    root = logging.getLogger()
+    for old in root.handlers[:]:
+        if isinstance(old, logging.StreamHandler) and any(isinstance(f, AddSubjects) for f in old.filters):
+            root.removeHandler(old)
+    root.addHandler(handler)
+    root.setLevel(logging.WARNING)
+    logging.getLogger("bench_service").setLevel(wanted)
+    logging.getLogger("procedures").setLevel(wanted)
+    for name in OWN_HANDLERS:
+        logger = logging.getLogger(name)
+        logger.handlers = [handler]
+        logger.propagate = False
+    logging.getLogger("uvicorn").setLevel(logging.WARNING)
+    logging.getLogger("uvicorn.access").setLevel(logging.INFO if settings.log_access else logging.WARNING)
+    logging.getLogger("uvicorn.error").setLevel("INFO" if wanted == "DEBUG" else logging.WARNING)
+
+
+def _json_lines() -> logging.Formatter:
+    from pythonjsonlogger.json import JsonFormatter
+
+    class JsonLines(JsonFormatter):
+        """Log lines as JSON: the record's own fields, and time, level, logger and message."""
+
+        def format(self, record: logging.LogRecord) -> str:
+            return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", without_tokens(super().format(record)))
+
+        def process_log_record(self, log_data: dict[str, object]) -> dict[str, object]:
+            about = log_data.pop("subjects", None)
+            return {**log_data, **(about if isinstance(about, dict) else {})}
+
+        def formatTime(self, record: logging.LogRecord, datefmt: str | None = None) -> str:  # noqa: N802  inherited
+            return _moment(record)
+
+    renamed = {"asctime": "at", "levelname": "level", "name": "logger"}
+    return JsonLines(FIELDS, style="{", rename_fields=renamed, reserved_attrs=_reserved(), json_ensure_ascii=False)
+
+
+def _reserved() -> list[str]:
+    """Attributes of every record that are no news; `subjects` is not among them."""
+    return [*vars(logging.makeLogRecord({})), "asctime", "message", "color_message", "taskName"]
+
+
+def _moment(record: logging.LogRecord) -> str:
+    at = datetime.fromtimestamp(record.created, UTC)
+    return at.isoformat(timespec="milliseconds").replace("+00:00", "Z")

@@ -1,0 +1,1 @@
+"""SQL of accounts, tokens, sessions and approvals."""

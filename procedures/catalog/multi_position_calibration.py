@@ -1,0 +1,153 @@
+"""Bench calibration in any set of table positions, listed or read from a program of the table's controller.
+
+The thesis's appendix moves the table through fourteen rests by such a program and calibrates from the means; so does
+this procedure by default. Positions are (outer, middle, inner) angles of the table, not the (β, γ) of thesis 5.1.
+"""
+
+from collections.abc import AsyncIterator, Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from procedures import multi_position, steps
+from procedures.analysis.calibration.plan import TriadPlan, basis, predicted_parts, triad_plan
+from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
+from procedures.analysis.calibration.station_plan import windows
+from procedures.analysis.calibration.summary import coefficient_unit
+from procedures.analysis.calibration.table_errors import table_errors
+from procedures.analysis.table_program.dialect import read_program
+from procedures.analysis.table_program.writing import THESIS_POSITIONS
+from procedures.bench import Bench
+from procedures.bench.imu import Stream
+from procedures.core.coefficient_name import CoefficientName
+from procedures.core.errors import BadParameter
+from procedures.core.imu_model import COEFFICIENT_NAMES
+from procedures.core.recording import Recording, Station
+from procedures.core.table_angles import TableAngles
+from procedures.multi_position import FitParameters, Inputs, Result
+from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
+from procedures.site_parameters import TableParameters, declared_table
+
+Angle = Annotated[float, Field(ge=-3600.0, le=3600.0)]
+FOURTEEN = tuple(position[:3] for position in THESIS_POSITIONS[1:-1])
+"""The rests of the thesis's program (appendix Д) without the home position at its beginning and end."""
+
+
+class Params(FitParameters, TableParameters):
+    """Positions, dwell, site and fit; None takes the unit's or the bench's value, or the thesis's positions."""
+
+    positions: tuple[tuple[Angle, Angle, Angle], ...] | None = Field(
+        None, min_length=1, max_length=500, description="(outer, middle, inner) [deg], in order; not beside `program`"
+    )
+    program: str | None = Field(
+        None,
+        max_length=50_000,
+        description="text in the controller's language, as `table_program` reads it; its delays "
+        "are the dwells where `dwell_s` is not given",
+    )
+    dwell_s: float | None = Field(None, ge=1.0, le=86_400.0, description="None: the program's, or the averaging time")
+    settle_s: float = Field(2.0, ge=0.0, le=3600.0)
+
+
+def resolve(params: Params, context: Context) -> Params:
+    """Positions of the thesis's program where none are given; dwell from the unit; site and table from the bench."""
+    if params.program is not None and params.positions is not None:
+        raise BadParameter("positions", len(params.positions), "not beside a program: one of the two")
+    own = {"positions": FOURTEEN} if params.program is None else {}
+    dwell = {} if params.program is not None else {"dwell_s": context.unit.averaging_time_s}
+    return params.filled({**own, **dwell, **declared_table(context)})
+
+
+def schedule(params: Params) -> tuple[Station, ...]:
+    """Stations, one a position, in order. Raises `BadParameter` for a line outside the program's language."""
+    if params.program is not None:
+        rests = [(d.angles, params.dwell_s or d.delay_s) for d in read_program(params.program)]
+    elif params.positions is None or params.dwell_s is None:
+        raise BadParameter("dwell_s", None, "resolve the parameters first: positions and dwell have defaults")
+    else:
+        rests = [(TableAngles(*position), params.dwell_s) for position in params.positions]
+    return tuple(
+        Station(
+            i,
+            f"outer={a.outer_deg:g} middle={a.middle_deg:g} inner={a.inner_deg:g}",
+            a,
+            None,
+            params.settle_s,
+            dwell_s,
+        )
+        for i, (a, dwell_s) in enumerate(rests)
+    )
+
+
+def predict(params: Params, context: Context) -> Prediction:
+    """Duration and the uncertainty of every coefficient. Raises `Undetermined` saying which position to add."""
+    params = resolve(params, context)
+    stations = schedule(params)
+    for triad, inputs in _inputs(params, context).items():
+        multi_position.require_determined(params, triad, inputs)
+    plans = [_plan(triad, params, context) for triad in params.triads]
+    uncertainties = tuple(u for plan in plans for u in _predicted(plan))
+    terms = ("the predicted uncertainties are without the further terms, which take some from b and K",)
+    duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1])
+    return Prediction(duration_s, uncertainties, terms if params.terms else (), basis(plans) if uncertainties else "")
+
+
+async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
+    """Move, settle, record, position after position."""
+    for station in stations:
+        yield await steps.record_station(bench, station)
+
+
+def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
+    """Least squares over the means of the positions. Raises `UnfitRecording`, `Undetermined`."""
+    params = resolve(params, context)
+    return multi_position.calibrated(recordings, params, _inputs(params, context), context.unit)
+
+
+def _inputs(params: Params, context: Context) -> dict[str, Inputs]:
+    site = params.site(context)
+    uncertainty = params.table(site)
+    angles = [s.angles for s in schedule(params) if s.angles is not None]
+    forces = reference_vectors("accelerometer", angles, site)
+    found: dict[str, Inputs] = {}
+    for triad in params.triads:
+        vectors, of_gravity = reference_vectors(triad, angles, site), triad == "accelerometer"
+        errors = table_errors(angles, vectors, uncertainty, of_gravity=of_gravity)
+        found[triad] = Inputs(vectors, errors, reference_magnitude(triad, site), None if of_gravity else forces)
+    return found
+
+
+def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
+    site = params.site(context)
+    return triad_plan(
+        triad, context.unit, schedule(params), context.bench.axis_motion, site, params.table(site), params.weighting
+    )
+
+
+def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
+    parts, unit = predicted_parts(plan), INPUT_UNITS[plan.triad]
+    if parts is None:
+        return []
+    rows = [(name, coefficient_unit(name, unit, unit)) for name in COEFFICIENT_NAMES]
+    return [
+        PredictedUncertainty(CoefficientName(plan.triad, name), of, float(np.hypot(n, t)), n, t)
+        for (name, of), n, t in zip(rows, parts[0].tolist(), parts[1].tolist(), strict=True)
+    ]
+
+
+PROCEDURE = Procedure(
+    "multi_position_calibration",
+    "Calibration in any positions",
+    "1.0.0",
+    Params,
+    Result,
+    resolve,
+    schedule,
+    predict,
+    acquire,
+    analyse,
+    multi_position.report,
+    multi_position.calibrations,
+    quantities=lambda params, _: multi_position.quantities(params),
+)

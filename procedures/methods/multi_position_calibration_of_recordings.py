@@ -1,0 +1,148 @@
+"""Calibration of both triads, or one, from recordings at rest in any positions, of any job or import.
+
+The positions are the stations' table angles, angles given here, or the directions of "up" in the unit's axes for the
+accelerometers alone (thesis 3.3.3-3.3.6).
+"""
+
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from procedures import multi_position
+from procedures.analysis.calibration.reference import reference_magnitude, reference_vectors
+from procedures.analysis.calibration.table_errors import TableUncertainty, direction_errors, table_errors
+from procedures.core import units
+from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.recording import TRIADS
+from procedures.core.site import Site
+from procedures.core.table_angles import TableAngles
+from procedures.core.unit import Unit
+from procedures.multi_position import FitParameters, Inputs, Result
+from procedures.procedure import STATIONS, Evidence, Method, RecordedParameters
+
+Angle = Annotated[float, Field(ge=-3600.0, le=3600.0)]
+Component = Annotated[float, Field(ge=-1e6, le=1e6)]
+Arcsec = Annotated[float, Field(ge=0.0, le=36_000.0)]
+
+
+class Params(FitParameters, RecordedParameters):
+    """Positions and site of the recordings. Latitude and gravity have no default: they depend on the place."""
+
+    gravity_m_s2: float = Field(ge=9.7, le=9.9)
+    gravity_sd_m_s2: float = Field(1e-5, ge=0.0, le=0.01)
+    latitude_deg: float | None = Field(None, ge=-90.0, le=90.0, description="needed by the gyros")
+    azimuth_deg: float = Field(0.0, ge=-360.0, le=360.0, description="heading of the table's zero")
+    azimuth_sd_arcsec: Arcsec = 0.0
+    positions: tuple[tuple[Angle, Angle, Angle], ...] | None = Field(
+        None,
+        min_length=1,
+        max_length=500,
+        description="(outer, middle, inner) [deg], one a recording, in their order; None: the stations' own angles",
+    )
+    directions: tuple[tuple[Component, Component, Component], ...] | None = Field(
+        None,
+        min_length=1,
+        max_length=500,
+        description="up in the unit's axes, of any length, one a recording; accelerometers alone; not beside positions",
+    )
+    direction_sd_arcsec: Arcsec = Field(0.0, description="of each direction, about any axis")
+    orthogonality_sd_arcsec: Arcsec = 0.0
+    pointing_sd_arcsec: Arcsec = 0.0
+    level_sd_arcsec: Arcsec = 0.0
+
+
+def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
+    """Least squares over the means of the recordings. Raises `BadParameter`, `UnfitRecording`, `Undetermined`."""
+    if not evidence.recordings:
+        raise UnfitRecording("there is no recording to calibrate from")
+    if params.directions is not None:
+        inputs = {"accelerometer": _from_directions(params, len(evidence.recordings))}
+    else:
+        inputs = _from_angles(evidence, params)
+    return multi_position.calibrated(evidence.recordings, params, inputs, unit)
+
+
+def _from_directions(params: Params, recordings: int) -> Inputs:
+    if params.positions is not None:
+        raise BadParameter("directions", len(params.directions or ()), "not beside positions: one of the two")
+    if "gyro" in params.triads:
+        raise BadParameter(
+            "triads",
+            params.triads,
+            "('accelerometer',): a direction of up does not show where north is, give positions",
+        )
+    given = np.array(params.directions)
+    _require_one_each("directions", len(given), recordings)
+    lengths = np.linalg.norm(given, axis=1)
+    if np.any(lengths == 0.0):
+        raise BadParameter(f"directions[{int(np.argmin(lengths))}]", (0.0, 0.0, 0.0), "a vector that is not zero")
+    vectors = params.gravity_m_s2 * given / lengths[:, None]
+    relative = params.gravity_sd_m_s2 / params.gravity_m_s2
+    errors = direction_errors(vectors, params.direction_sd_arcsec * units.ARCSEC, relative)
+    return Inputs(vectors, errors, params.gravity_m_s2)
+
+
+def _from_angles(evidence: Evidence, params: Params) -> dict[str, Inputs]:
+    angles = _angles(evidence, params)
+    if params.latitude_deg is None and "gyro" in params.triads:
+        raise BadParameter("latitude_deg", None, "−90 … 90: the gyros are calibrated by the Earth's rate; or triads")
+    site = Site(
+        params.latitude_deg or 0.0,
+        params.gravity_m_s2,
+        params.azimuth_deg,
+        params.azimuth_sd_arcsec,
+        params.gravity_sd_m_s2,
+    )
+    uncertainty = TableUncertainty(
+        params.orthogonality_sd_arcsec,
+        params.pointing_sd_arcsec,
+        params.level_sd_arcsec,
+        params.azimuth_sd_arcsec,
+        params.gravity_sd_m_s2 / params.gravity_m_s2,
+    )
+    forces = reference_vectors("accelerometer", angles, site)
+    return {triad: _inputs(triad, angles, site, uncertainty, forces) for triad in params.triads}
+
+
+def _inputs(triad: str, angles: list[TableAngles], site: Site, uncertainty: TableUncertainty, forces: Array) -> Inputs:
+    vectors, of_gravity = reference_vectors(triad, angles, site), triad == "accelerometer"
+    errors = table_errors(angles, vectors, uncertainty, of_gravity=of_gravity)
+    return Inputs(vectors, errors, reference_magnitude(triad, site), None if of_gravity else forces)
+
+
+def _angles(evidence: Evidence, params: Params) -> list[TableAngles]:
+    if params.positions is not None:
+        _require_one_each("positions", len(params.positions), len(evidence.recordings))
+        return [TableAngles(*position) for position in params.positions]
+    found: list[TableAngles] = []
+    for recording in evidence.recordings:
+        station = recording.info.station
+        if station is None or station.angles is None:
+            raise BadParameter(
+                "positions", None, f"table angles or directions: recording {recording.info.id} has no angles of its own"
+            )
+        found.append(station.angles)
+    return found
+
+
+def _require_one_each(field: str, given: int, recordings: int) -> None:
+    if given != recordings:
+        raise BadParameter(field, f"{given} of them", f"one for each of the {recordings} recordings, in their order")
+
+
+METHOD = Method(
+    "multi_position_calibration_of_recordings",
+    "Calibration in any positions, of recordings",
+    "1.0.0",
+    Params,
+    Result,
+    analyse,
+    multi_position.report,
+    multi_position.calibrations,
+    inspection=lambda params, _: replace(
+        STATIONS, channels=tuple(channel for triad in params.triads for channel in TRIADS[triad])
+    ),
+)

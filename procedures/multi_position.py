@@ -1,0 +1,192 @@
+"""Calibration at any set of positions: parameters, result and analysis that the procedure and the method share.
+
+Twelve coefficients a triad as in `calibration_12_orientations`, with K₂, asymmetry and g-sensitivity beside them where
+they are asked for and the positions determine them (`analysis.calibration.extra_terms`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import Field
+
+from procedures.analysis.calibration.estimator import Weighting
+from procedures.analysis.calibration.extra_terms import ExtraFit, Kind, TermEstimate, fit_terms, require_terms, terms_of
+from procedures.analysis.calibration.misfit import MISFIT_MAX
+from procedures.analysis.calibration.reference import INPUT_UNITS
+from procedures.analysis.calibration.station_means import StationMeans, launch_warnings, station_means
+from procedures.analysis.calibration.summary import TriadSummary
+from procedures.analysis.calibration.table_errors import TableErrors
+from procedures.analysis.calibration.triad_analysis import analyse_inputs, noise_of_means
+from procedures.core.arrays import Array
+from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, triad_calibration
+from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.recording import Recording
+from procedures.core.report import Report, Table
+from procedures.core.unit import Unit
+from procedures.procedure import Outcome, Parameters
+from procedures.reports import calibration as pictures
+
+TriadName = Literal["accelerometer", "gyro"]
+ACCELEROMETER_TERMS: tuple[Kind, ...] = ("quadratic", "asymmetry")
+
+
+class FitParameters(Parameters):
+    """Settings of the fit. Weights as in `calibration_12_orientations`."""
+
+    triads: tuple[TriadName, ...] = Field(("gyro", "accelerometer"), min_length=1, max_length=2)
+    weighting: Weighting = Field(
+        "noise_and_table",
+        description="noise_and_table: joint with the declared errors of the positions; noise: without",
+    )
+    terms: tuple[Kind, ...] = Field(
+        (),
+        max_length=3,
+        description="beside b and K: quadratic K2·v² and asymmetry KA·|v| of the accelerometers, g_sensitivity of the "
+        "gyros; each must be determined by the positions",
+    )
+    scalar_check: bool = Field(False, description="cross-check of the accelerometers with the magnitude alone")
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the residuals' chi-square")
+    condition_max: float = Field(100.0, ge=1.0, le=1e9, description="of the column-scaled design")
+
+    def terms_for(self, triad: str) -> tuple[Kind, ...]:
+        """The terms that are asked of a triad, each once."""
+        own = ACCELEROMETER_TERMS if triad == "accelerometer" else ("g_sensitivity",)
+        return tuple(kind for kind in dict.fromkeys(self.terms) if kind in own)
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Inputs of one triad at the positions, and what is not exact about them."""
+
+    vectors: Array
+    """Shape (n, 3), unit's axes [SI]."""
+    errors: TableErrors
+    magnitude: float
+    forces: Array | None = None
+    """Specific forces at the same positions, (n, 3) [m/s²]; of the gyros alone."""
+
+
+@dataclass(frozen=True)
+class Extended:
+    """A triad's calibration with its further terms, all fitted at once."""
+
+    calibration: TriadCalibration
+    terms: tuple[TermEstimate, ...]
+    condition: float
+    chi_square: float
+    degrees_of_freedom: int
+    p_value: float | None
+    """None: the noise is not known or no equation is spare, so nothing is judged."""
+
+
+class Result(Outcome):
+    """Calibration of each triad, and of those with further terms the extended one, which then counts."""
+
+    triads: tuple[TriadSummary, ...]
+    extended: tuple[Extended, ...] = ()
+
+
+def require_determined(params: FitParameters, triad: str, inputs: Inputs) -> None:
+    """Refuse terms that the positions cannot determine. Raises `Undetermined` with the position to add."""
+    kinds = params.terms_for(triad)
+    if kinds:
+        require_terms(f"the {triad} coefficients", inputs.vectors, terms_of(kinds, inputs.vectors, inputs.forces))
+
+
+def calibrated(
+    recordings: Sequence[Recording], params: FitParameters, inputs: dict[str, Inputs], unit: Unit | None
+) -> Result:
+    """Calibrate the triads of `inputs`. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
+    summaries: list[TriadSummary] = []
+    extended: list[Extended] = []
+    for triad, given in inputs.items():
+        require_determined(params, triad, given)
+        means, record = station_means(recordings, triad), unit.triad(triad) if unit else None
+        scalar = params.scalar_check and triad == "accelerometer"
+        found = analyse_inputs(means, given.vectors, given.errors, given.magnitude, record, scalar, params.weighting)
+        summaries.append(found[0])
+        if kinds := params.terms_for(triad):
+            noise, known = noise_of_means(means, record)
+            terms = terms_of(kinds, given.vectors, given.forces)
+            units = means.output_unit, INPUT_UNITS[triad]
+            whole = fit_terms(
+                f"the {triad} coefficients", given.vectors, means.outputs, noise, given.errors, terms, units, known
+            )
+            extended.append(_extended(triad, means, whole))
+    checks = tuple(c for t in summaries for c in _checks(t, _of(extended, t), params))
+    return Result(
+        checks=checks,
+        verdict=verdict(checks),
+        warnings=launch_warnings(recordings) + _unknown_noise(summaries),
+        triads=tuple(summaries),
+        extended=tuple(extended),
+    )
+
+
+def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
+    """One calibration a triad: with further terms where they were asked for, since b and K are biased without them."""
+    by_triad = {e.calibration.triad: e.calibration for e in result.extended}
+    return tuple(by_triad.get(t.calibration.triad, t.calibration) for t in result.triads)
+
+
+def quantities(params: FitParameters) -> tuple[str, ...]:
+    """Checks and coefficients that a result will have."""
+    checks = (" condition number", " residuals, p-value of chi-square")
+    return tuple(f"{triad}{n}" for triad in params.triads for n in (*checks, *(f".{c}" for c in COEFFICIENT_NAMES)))
+
+
+def report(result: Result) -> Report:
+    """Coefficients, further terms, checks, residuals and magnitudes."""
+    magnitudes = [t.magnitudes for t in result.triads]
+    tables = [pictures.triad_table(t) for t in result.triads]
+    tables += [_term_table(e) for e in result.extended]
+    tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
+    tables += [pictures.magnitude_table(magnitudes, "Magnitudes over the positions")]
+    figures = [f for t in result.triads for f in pictures.triad_figures(t)]
+    return Report(sections=(*tables, *figures, *(pictures.station_table(m) for m in magnitudes)))
+
+
+def _extended(triad: str, means: StationMeans, fit: ExtraFit) -> Extended:
+    calibration = triad_calibration(triad, means.output_unit, INPUT_UNITS[triad], fit.coefficients, fit.covariance)
+    return Extended(calibration, fit.terms, fit.condition, fit.chi_square, fit.degrees_of_freedom, fit.p_value)
+
+
+def _of(extended: Sequence[Extended], summary: TriadSummary) -> Extended | None:
+    return next((e for e in extended if e.calibration.triad == summary.calibration.triad), None)
+
+
+def _checks(t: TriadSummary, extended: Extended | None, params: FitParameters) -> list[Check]:
+    triad = t.calibration.triad
+    condition = t.condition if extended is None else extended.condition
+    checks = [check(f"{triad} condition number", condition, Limit("1", maximum=params.condition_max))]
+    p_value = t.p_value if extended is None else extended.p_value
+    if p_value is not None:
+        limit = Limit("1", minimum=params.residual_p_value_min)
+        checks.append(check(f"{triad} residuals, p-value of chi-square", p_value, limit, note=f"worst: {t.worst}"))
+    elif t.misfit is not None and extended is None:
+        limit = Limit("1", maximum=MISFIT_MAX, source="ours")
+        name = f"{triad} residuals over what noise and positions allow"
+        checks.append(check(name, t.misfit, limit, note=f"worst: {t.worst}"))
+    return checks
+
+
+def _unknown_noise(summaries: Sequence[TriadSummary]) -> tuple[str, ...]:
+    return tuple(
+        f"the noise of the {t.calibration.triad} triad is not known: its uncertainties come from the scatter within "
+        "the recordings and the residuals, which do not show noise slower than the job"
+        for t in summaries
+        if not t.noise_known
+    )
+
+
+def _term_table(extended: Extended) -> Table:
+    rows = tuple(
+        (t.name, t.unit, t.estimate, t.standard_uncertainty, t.p_value, "yes" if t.present else "no")
+        for t in extended.terms
+    )
+    columns = ("term", "unit", "estimate", "± standard uncertainty", "p without it", "present")
+    c = extended.calibration
+    bias = ", ".join(f"{b:.6g}" for b in c.bias_array)
+    note = f"Fitted with b and K at once, which then are other than without the terms: b = ({bias}) {c.output_unit}."
+    return Table(f"Further terms of the {c.triad} triad", columns, rows, note)

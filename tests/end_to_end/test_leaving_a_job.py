@@ -1,0 +1,81 @@
+"""Ctrl-C while a command watches its job, as processes: what becomes of the job, and how it goes on."""
+
+import signal
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Generator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from bench_service.wall_clock import monotonic_s, pause
+from tests.end_to_end.bench_process import BenchProcess
+from tests.kit.command_line import Command, Done, command_in, environment
+
+pytestmark = pytest.mark.timeout(240)
+
+RUN = ("run", "calibration_12_orientations", "--unit", "SIM-0001", "--set", "dwell_s=60.0", "--set", "settle_s=0.5")
+
+
+def stations_done(folder: Path) -> int:
+    """Stations that the only job has done, by the database; looking costs no process."""
+    with suppress(sqlite3.OperationalError), sqlite3.connect(folder / "bench.sqlite", timeout=5) as database:
+        found = database.execute("SELECT stations_done FROM jobs").fetchall()
+        return found[0][0] if found else 0
+    return 0
+
+
+def interrupted(folder: Path, *arguments: str, **settings: str) -> Done:
+    """A command that gets Ctrl-C once its job has done a station; its end."""
+    command = [sys.executable, "-m", "bench_service", *arguments]
+    outside = environment(folder, **settings)
+    with subprocess.Popen(
+        command, env=outside, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as done:
+        until = monotonic_s() + 60
+        while stations_done(folder) < 1:
+            assert done.poll() is None, done.communicate()
+            assert monotonic_s() < until
+            pause(0.05)
+        done.send_signal(signal.SIGINT)
+        out, err = done.communicate(timeout=60)
+        return Done(done.returncode, out, err)
+
+
+def test_a_job_left_with_ctrl_c_is_paused_and_goes_on_only_when_it_is_asked_for(tmp_path: Path) -> None:
+    bench: Command = command_in(tmp_path)
+    left = interrupted(tmp_path, *RUN, BENCH_REAL_TIME_FACTOR="100")
+    (job,) = bench("jobs", "--json").json()["items"]
+    assert left.code == 130
+    assert job["state"] == "paused"
+    assert 1 <= job["progress"]["station"] < 12
+    assert f"job {job['id']} is paused after {job['progress']['station']} of 12 stations" in left.err
+    assert f"bench job resume {job['id']}" in left.err
+    assert bench("run", "no_operation", "--unit", "SIM-0001").code == 0, "no other command takes it up: it would wait"
+    resumed = bench("job", "resume", job["id"], "--json")
+    assert resumed.code in (0, 1), resumed.err
+    assert resumed.json()["job"]["state"] == "succeeded"
+    assert resumed.json()["job"]["attempt"] == 2
+    assert len(resumed.json()["result"]["lineage"]["recordings"]) == 12
+
+
+@pytest.fixture
+def service(tmp_path: Path, free_port: int) -> Generator[BenchProcess]:
+    served = BenchProcess(f"sqlite:///{tmp_path / 'bench.sqlite'}", free_port, tmp_path, real_time_factor="100")
+    served.start()
+    yield served
+    served.end()
+
+
+def test_a_job_of_a_service_goes_on_after_ctrl_c(service: BenchProcess, tmp_path: Path) -> None:
+    address = str(service.client.base_url)
+    left = interrupted(tmp_path, *RUN, "--label", "lot=7", "--server", address)
+    (job,) = service.client.get("/api/v1/jobs").json()["items"]
+    assert left.code == 130
+    assert f"`bench job wait {job['id']} --server {address}`" in left.err
+    assert (job["state"], job["pause_requested"], job["labels"]) == ("running", False, {"lot": "7"})
+    waited = command_in(tmp_path)("job", "wait", job["id"], "--server", address.removeprefix("http://"), "--json")
+    assert waited.json()["job"]["state"] == "succeeded"
+    assert waited.code == {"pass": 0, "fail": 1}[waited.json()["job"]["verdict"]]

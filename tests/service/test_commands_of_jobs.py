@@ -1,0 +1,185 @@
+"""Commands that ask a service about jobs, plans and evidence, over HTTP, in this process."""
+
+import json
+import os
+import socket
+from collections.abc import Callable, Generator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from bench_service.cli.asking import leaving
+from bench_service.cli.commands import run_command_line
+from bench_service.cli.options import console, errors
+from bench_service.cli.processes.serving import serving
+from bench_service.settings import Settings
+from bench_service.wall_clock import monotonic_s, pause
+from tests.kit.command_line import Done, one_line
+
+Bench = Callable[..., Done]
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Generator[str]:
+    """A service on a loopback port that drives a bench at 200 times real time."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+    url = f"sqlite:///{tmp_path_factory.mktemp('served') / 'bench.sqlite'}"
+    with serving(Settings(database_url=url, port=port, real_time_factor=200.0)):
+        yield f"http://127.0.0.1:{port}"
+
+
+@pytest.fixture
+def bench(address: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Bench:
+    """``bench … --server address``."""
+    for each in (console, errors):
+        monkeypatch.setattr(each, "_width", 200)
+
+    def run(*arguments: object) -> Done:
+        capsys.readouterr()
+        code = run_command_line(Settings.model_validate({}), [*map(str, arguments), "--server", address])
+        printed = capsys.readouterr()
+        return Done(code, printed.out, printed.err)
+
+    return run
+
+
+def test_jobs_are_queued_ordered_paused_and_cancelled(bench: Bench) -> None:
+    job = ("run", "static_run", "--unit", "SIM-0001", "--no-wait", "--json")
+    first = bench(*job, "--set", "duration_s=36000", "--by", "Olena").json()["job"]
+    second = bench(*job, "--priority", 20, "--key", "one").json()["job"]
+    assert bench(*job, "--priority", 20, "--key", "one").json()["job"]["id"] == second["id"], "the key makes one job"
+    third = bench(*job, "--priority", 30, "--label", "lot=7").json()["job"]
+    waiting = [entry["job"] for entry in bench("queue", "--json").json()["entries"]]
+    assert waiting[-2:] == [second["id"], third["id"]]
+    assert bench("job", "priority", third["id"], 1).code == 0
+    assert third["id"] in bench("queue").out.split(second["id"])[0]
+    shown = bench("job", "show", first["id"]).out
+    assert "Olena" in shown
+    assert '{"duration_s": 36000}' in shown
+    assert f"job {second['id']} is paused" in bench("job", "pause", second["id"]).out
+    assert f"job {second['id']} is queued" in bench("job", "resume", second["id"], "--no-wait").out
+    one_line(bench("job", "answer", third["id"], "--done"), "asks nothing")
+    assert [j["id"] for j in bench("jobs", "--label", "lot=7", "--json").json()["items"]] == [third["id"]]
+    for made in (third, second, first):
+        assert bench("job", "cancel", made["id"]).code == 0
+    ended = bench("job", "wait", first["id"])
+    assert ended.code == 2
+    assert f"bench: job {first['id']} cancelled" in ended.err
+
+
+def test_a_reservation_is_made_listed_and_ended(bench: Bench) -> None:
+    reserved = bench("reserve", "--unit", "SIM-0001", "--holder", "Olena", "--minutes", 5, "--json").json()
+    assert reserved["id"] in bench("reservations", "--active").out
+    assert bench("unreserve", reserved["id"]).code == 0
+    assert reserved["id"] not in bench("reservations", "--active").out
+    assert reserved["id"] in bench("reservations").out
+
+
+def test_a_stop_is_released_with_a_name_and_a_remark(bench: Bench, address: str) -> None:
+    release = ("release", "--remark", "looked at the table", "--by", "Olena")
+    one_line(bench(*release), "is not stopped")
+    httpx.post(f"{address}/api/v1/benches/sim/stop", json={"reason": "a test"}).raise_for_status()
+    until = monotonic_s() + 20
+    while not httpx.get(f"{address}/api/v1/benches/sim").json()["safety"]["safe"]:
+        assert monotonic_s() < until
+        pause(0.05)
+    done = bench(*release)
+    assert done.code == 0, done.err
+    assert "the bench goes on" in done.out
+    assert httpx.get(f"{address}/api/v1/benches/sim/stops").json()["items"][0]["released_by"] == "Olena"
+
+
+def test_a_plan_is_previewed_and_many_at_once(bench: Bench, tmp_path: Path) -> None:
+    one = bench("preview", "calibration_12_orientations", "--unit", "SIM-0001", "--set", "dwell_s=30")
+    assert one.code == 0, one.err
+    assert "12 stations" in one.out
+    assert "Expected uncertainties" in one.out
+    plans = [
+        {"procedure": "no_operation", "unit": "SIM-0001"},
+        {"procedure": "static_run", "unit": "SIM-0001", "parameters": {"duration_s": -1}},
+        {"procedure": "none", "unit": "SIM-0001"},
+        {"procedure": "no_operation", "unit": "OTHER"},
+    ]
+    file = tmp_path / "plans.json"
+    file.write_text(json.dumps(plans))
+    many = bench("preview", "--plans", file, "--json")
+    assert many.code == 1
+    good, *bad = many.json()
+    assert good["preview"]["procedure"] == "no_operation"
+    assert [one["refusal"]["status"] for one in bad] == [422, 404, 422]
+    assert bad[0]["refusal"]["errors"][0]["field"] == "parameters.duration_s"
+    assert all(one["preview"] is None for one in bad)
+    one_line(bench("preview", "--plans", file, "no_operation"), "either")
+
+
+def test_a_batch_gives_what_single_previews_give(bench: Bench, tmp_path: Path) -> None:
+    dwells = (20.0, 35.0, 50.0)
+    name = "calibration_12_orientations"
+    plans = [{"procedure": name, "unit": "SIM-0001", "parameters": {"dwell_s": dwell}} for dwell in dwells]
+    (tmp_path / "plans.json").write_text(json.dumps(plans))
+    many = [one["preview"] for one in bench("preview", "--plans", tmp_path / "plans.json", "--json").json()]
+    alone = ["preview", name, "--unit", "SIM-0001", "--json", "--set"]
+    assert many == [bench(*alone, f"dwell_s={dwell}").json() for dwell in dwells]
+
+
+def test_the_catalogue_and_what_is_stored_are_listed(bench: Bench) -> None:
+    done = bench("run", "no_operation", "--unit", "SIM-0001", "--label", "lot=8", "--json").json()
+    assert "static_run" in bench("procedures").out
+    assert "duration_s" in bench("procedures", "static_run").out
+    assert "noise_analysis" in bench("methods").out
+    one_line(bench("methods", "none"), "noise_analysis")
+    assert "SIM-0001" in bench("units").out
+    assert bench("units", "SIM-0001").json()["serial"] == "SIM-0001"
+    assert bench("recordings", "--label", "lot=8", "--json").json() == {"items": [], "next": None}
+    (result,) = bench("results", "--label", "lot=8", "--json").json()["items"]
+    assert result["id"] == done["result"]["id"]
+    assert "verdict pass" in bench("results", result["id"]).out
+    assert done["job"]["id"] in [j["id"] for j in bench("jobs", "--text", "no_op", "--json").json()["items"]]
+    one_line(bench("jobs", "--since", "yesterday"), "since")
+
+
+class Impatient:
+    """A person who presses Ctrl-C again at the second request."""
+
+    def __init__(self, client: httpx.Client) -> None:
+        self._client = client
+        self._asked = 0
+        self.base_url = client.base_url
+        self.build_request = client.build_request
+
+    def send(self, request: httpx.Request) -> httpx.Response:
+        self._asked += 1
+        if self._asked > 2:
+            raise KeyboardInterrupt
+        return self._client.send(request)
+
+
+def test_a_station_that_is_given_up_leaves_the_pause_asked_for(bench: Bench, address: str) -> None:
+    run = ("run", "static_run", "--unit", "SIM-0001", "--no-wait", "--json", "--set", "duration_s=36000")
+    job = bench(*run).json()["job"]
+    said: list[str] = []
+    with httpx.Client(base_url=address) as client:
+        while client.get(f"/api/v1/jobs/{job['id']}").json()["state"] == "queued":
+            pause(0.02)
+        leaving.leave(Impatient(client), job, None, said.append)  # pyright: ignore[reportArgumentType]
+        assert client.get(f"/api/v1/jobs/{job['id']}").json()["pause_requested"]
+    assert "Ctrl-C again" in said[0]
+    assert "Nothing goes on with it by itself" in said[1]
+    bench("job", "cancel", job["id"])
+
+
+def test_the_shell_completes_commands_and_procedures(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def answered(*arguments: str) -> str:
+        assert run_command_line(Settings.model_validate({}), list(arguments)) == 0
+        return capsys.readouterr().out
+
+    assert answered("--version").startswith("bench 0.")
+    assert "_BENCH_COMPLETE" in answered("completion", "bash")
+    asked = {"_BENCH_COMPLETE": "complete_bash", "COMP_WORDS": "bench run stat", "COMP_CWORD": "2"}
+    monkeypatch.setattr(os, "environ", {**os.environ, **asked})
+    assert answered().split() == ["static_run"]
