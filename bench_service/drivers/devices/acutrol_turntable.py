@@ -86,7 +86,7 @@ class AcutrolTurntable:
         except BaseException:
             self._end(demand)
             raise
-        self._turning = asyncio.create_task(self._follow(turn, index, states[index].position_deg, demand))
+        self._turning = asyncio.create_task(self._follow(turn, index, [s.position_deg for s in states], demand))
 
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
         """Refuse; see the port: how this controller begins a sinusoid is not known. Raises `OutOfRange`."""
@@ -225,10 +225,11 @@ class AcutrolTurntable:
             await self._clock.sleep(POLL_S)
         return True
 
-    async def _follow(self, turn: Turn, index: int, start_deg: float, demand: int) -> None:
+    async def _follow(self, turn: Turn, index: int, start: list[float], demand: int) -> None:
         """Count the turns of an axis in rate mode, stop it before their end, and lead it to the angle of the start."""
         try:
             count, sign = TurnCount(True), 1.0 if turn.turns > 0 else -1.0
+            start_deg = start[index]
             count.restore(start_deg)
             until_stop = abs(turn.angle_deg) - 0.5 * turn.rate_deg_s * turn.ramp_s
             last = self._clock.now_s()
@@ -246,28 +247,27 @@ class AcutrolTurntable:
             await self._clock.sleep(max(0.0, left_s))
             await self._link.demand("rate", index, 0.0)
             await self._wait_for_rest(None, turn.ramp_s, demand)
-            await self._return(turn, index, start_deg, demand)
+            await self._return(turn, index, start, demand)
         except BaseException:
             await self._stop_axis(index)
             raise
         finally:
             self._end(demand)
 
-    async def _return(self, turn: Turn, index: int, start_deg: float, demand: int) -> None:
+    async def _return(self, turn: Turn, index: int, start: list[float], demand: int) -> None:
         """Lead the axis that has turned to its start: with slip rings the nearest turn of it, else the counted one."""
         axis, state = self._axes()[index], (await self._states())[index]
         continuous = getattr(self._section, turn.axis).continuous
-        nearest = state.position_deg + wrapped(start_deg - state.position_deg)
-        end = nearest if continuous else start_deg + turn.angle_deg
+        nearest = state.position_deg + wrapped(start[index] - state.position_deg)
+        end = nearest if continuous else start[index] + turn.angle_deg
         away = abs(end - state.position_deg)
         if away > 10.0 + 0.5 * turn.rate_deg_s:
             raise DeviceFault(f"the {turn.axis} axis stopped {away:g} deg from the end of its turns")
         await self._link.limit("position", index, axis.rate_deg_s, axis.acceleration_deg_s2)
         await self._link.demand("position", index, wrapped(end) if self._counts[index].counts else end)
         await self._link.mode("position", [index])
-        positions = [s.position_deg for s in await self._states()]
-        positions[index] = end
-        await self._wait_for_rest(positions, _duration_s(away, axis.rate_deg_s, axis.acceleration_deg_s2), demand)
+        ends = [end if k == index else angle for k, angle in enumerate(start)]
+        await self._wait_for_rest(ends, _duration_s(away, axis.rate_deg_s, axis.acceleration_deg_s2), demand)
 
     async def _stop_axis(self, index: int) -> None:
         """Take the rate away from an axis whose turns are not followed any more; quiet where that fails as well."""
