@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bench_service.drivers.bench_file.document import BenchFile
-from bench_service.drivers.interface.sections import Wire
+from bench_service.drivers.interface.address import Address
 from bench_service.drivers.served_unit_file import write_unit_file
 from bench_service.model.errors import Misconfigured
 from bench_service.wall_clock import monotonic_s
@@ -40,12 +40,12 @@ def served_bench(file: BenchFile, faults: Path | None = None) -> ServedBench:
     return bench
 
 
-def _device(kind: "Kind", section: Wire) -> ServedDevice:
-    language = str(getattr(section, "driver", ""))
+def _device(kind: "Kind", section: Any) -> ServedDevice:
+    language: str = section.driver
     if language not in LANGUAGES.get(kind, ()):
         spoken = ", ".join(LANGUAGES.get(kind, ())) or "none"
         raise Misconfigured(f"{kind}.driver = {language!r}: this protocol is not served; of a {kind} there is {spoken}")
-    address = section.address
+    address: Address = section.address
     if address.scheme == "serial" or (address.scheme == "udp" and language != "framed"):
         raise Misconfigured(f"{kind}.address = {address}: simulators serve on tcp, and a framed unit on udp")
     return ServedDevice(language, address.host, address.port, address.scheme == "udp", _options(kind, section))
