@@ -9,7 +9,7 @@ from bench_service.drivers.bench_file.document import BenchFile
 from bench_service.drivers.interface.address import Address
 from bench_service.drivers.served_unit_file import write_unit_file
 from bench_service.model.errors import Misconfigured
-from bench_service.wall_clock import monotonic_s
+from bench_service.wall_clock import monotonic_s, pause_async
 from simulators.served.bench import LANGUAGES, ServedBench, ServedConfig, ServedDevice
 from simulators.served.faults import Fault
 from simulators.served.unit_frames import CountFrames
@@ -32,7 +32,7 @@ def served_bench(file: BenchFile, faults: Path | None = None) -> ServedBench:
         raise Misconfigured(f"{file.path}: no device has an address, so there is nothing to serve")
     try:
         config = ServedConfig(_world(file, "chamber" in devices), devices, file.time_factor, _plan(faults))
-        bench = ServedBench(config, monotonic_s)
+        bench = ServedBench(config, monotonic_s, pause_async)
     except (ValueError, TypeError, OSError) as error:
         raise Misconfigured(f"{file.path}: {error}") from error
     _agree_on_frames(file, bench)
@@ -101,8 +101,6 @@ def _agree_on_frames(file: BenchFile, bench: ServedBench) -> None:
 
 async def serve(bench: ServedBench, ended: Callable[[], bool], say: Callable[[str], object], look_s: float) -> None:
     """Open the ports, let the world go on until `ended`, close. Raises `Misconfigured` for a port that is taken."""
-    from bench_service.wall_clock import pause_async
-
     try:
         numbers = await bench.open()
     except OSError as error:
