@@ -7,8 +7,9 @@ from fastapi import Request as HttpRequest
 from pydantic import BaseModel, Field, ValidationError
 
 from bench_service.api.http.dependencies import Service
-from bench_service.api.http.errors import Problem, problem_of, problems, status_of
+from bench_service.api.http.errors import Problem, problem_of, problems
 from bench_service.api.http.fields import NAME, Request
+from bench_service.api.http.status import status_of
 from bench_service.jobs.planning import Plan
 from bench_service.mapping import copied
 from bench_service.model.errors import ServiceError

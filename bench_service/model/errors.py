@@ -1,4 +1,4 @@
-"""Refusals of the service layer. No status codes here: `bench_service.api.http.errors` has the table.
+"""Refusals of the service layer. No status codes here: `bench_service.api.http.status` has the table.
 
 ServiceError
 ├── NotFound             no such job, recording, result, unit, bench, procedure, method

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from bench_service.cli import access_commands
-from bench_service.cli.client import connect
+from bench_service.cli.asking.client import connect
 from bench_service.cli.commands import run_command_line
+from bench_service.cli.groups import access as access_commands
+from bench_service.cli.processes.serving import check_address
 from bench_service.cli.refusal import Refused
-from bench_service.cli.serving import check_address
 from bench_service.settings import Settings
 from tests.kit.people import PASSWORD, cheap_passwords
 

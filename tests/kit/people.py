@@ -11,8 +11,8 @@ import pytest
 from argon2 import PasswordHasher
 
 from bench_service.access import passwords
-from bench_service.cli.client import connect
-from bench_service.cli.serving import serving
+from bench_service.cli.asking.client import connect
+from bench_service.cli.processes.serving import serving
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from tests.kit.registered import register_bench

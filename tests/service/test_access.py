@@ -16,7 +16,7 @@ from bench_service.access import service as access_service
 from bench_service.access.credentials import IDLE, LONGEST
 from bench_service.access.lockout import FREE
 from bench_service.api.access import identify
-from bench_service.cli.logs import Lines, set_up
+from bench_service.cli.processes.logs import Lines, set_up
 from bench_service.wall_clock import monotonic_s, now, pause
 from tests.kit.people import CSRF, PASSWORD, SEEN_S, House, house
 

@@ -5,7 +5,7 @@ from collections.abc import Generator
 import httpx
 import pytest
 
-from bench_service.cli.serving import serving
+from bench_service.cli.processes.serving import serving
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from tests.kit.people import House, free_port, house

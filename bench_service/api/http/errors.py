@@ -14,57 +14,17 @@ from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from bench_service.api.http.headers import SECURITY_HEADERS
+from bench_service.api.http.status import status_of
 from bench_service.formats.plain_json import A_NUMBER, NOT_SO_DEEP, is_finite, shown
 from bench_service.model.errors import (
-    AlreadyReserved,
-    BenchBusy,
-    CalibrationRefused,
-    IdempotencyConflict,
-    IllegalTransition,
     LockedOut,
-    NameTaken,
-    NotAllowed,
-    NotDriving,
-    NotFound,
-    NotMounted,
     NotReady,
-    NotSafe,
-    NotUnderstood,
     Overloaded,
     ServiceError,
     SeveralStops,
-    StorageFailure,
-    StorageFull,
-    WrongPassword,
 )
 from procedures.bench.errors import BenchError
 from procedures.core.errors import BadParameter, DomainError, Undetermined
-
-STATUS: dict[type[Exception], int] = {
-    NotFound: 404,
-    IllegalTransition: 409,
-    IdempotencyConflict: 409,
-    BenchBusy: 409,
-    AlreadyReserved: 409,
-    NameTaken: 409,
-    CalibrationRefused: 409,
-    NotAllowed: 403,
-    WrongPassword: 401,
-    LockedOut: 429,
-    NotDriving: 503,
-    NotReady: 503,
-    Overloaded: 503,
-    NotMounted: 422,
-    NotSafe: 409,
-    SeveralStops: 409,
-    NotUnderstood: 409,
-    DomainError: 422,
-    BenchError: 502,
-    StorageFull: 507,
-    StorageFailure: 503,
-    ServiceError: 500,
-}
-"""Status codes by error class; an error has the status of its nearest ancestor here."""
 
 
 class AccessRefused(HTTPException):
@@ -182,11 +142,6 @@ class RefuseNul:
             await refusal(scope, receive, send)
             return
         await self._app(scope, receive, send)
-
-
-def status_of(error: Exception) -> int:
-    """Return the status code of a known error."""
-    return next(STATUS[cls] for cls in type(error).__mro__ if cls in STATUS)
 
 
 def problem_of(request: Request, error: DomainError | ServiceError | ValidationError) -> Problem:

@@ -1,0 +1,57 @@
+"""The one table from errors to status codes."""
+
+from bench_service.model.errors import (
+    AlreadyReserved,
+    BenchBusy,
+    CalibrationRefused,
+    IdempotencyConflict,
+    IllegalTransition,
+    LockedOut,
+    NameTaken,
+    NotAllowed,
+    NotDriving,
+    NotFound,
+    NotMounted,
+    NotReady,
+    NotSafe,
+    NotUnderstood,
+    Overloaded,
+    ServiceError,
+    SeveralStops,
+    StorageFailure,
+    StorageFull,
+    WrongPassword,
+)
+from procedures.bench.errors import BenchError
+from procedures.core.errors import DomainError
+
+STATUS: dict[type[Exception], int] = {
+    NotFound: 404,
+    IllegalTransition: 409,
+    IdempotencyConflict: 409,
+    BenchBusy: 409,
+    AlreadyReserved: 409,
+    NameTaken: 409,
+    CalibrationRefused: 409,
+    NotAllowed: 403,
+    WrongPassword: 401,
+    LockedOut: 429,
+    NotDriving: 503,
+    NotReady: 503,
+    Overloaded: 503,
+    NotMounted: 422,
+    NotSafe: 409,
+    SeveralStops: 409,
+    NotUnderstood: 409,
+    DomainError: 422,
+    BenchError: 502,
+    StorageFull: 507,
+    StorageFailure: 503,
+    ServiceError: 500,
+}
+"""Status codes by error class; an error has the status of its nearest ancestor here."""
+
+
+def status_of(error: Exception) -> int:
+    """Return the status code of a known error."""
+    return next(STATUS[cls] for cls in type(error).__mro__ if cls in STATUS)
