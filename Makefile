@@ -4,7 +4,7 @@ BIN    := $(VENV)/bin
 PORT   ?= 8000
 VALIDATIONS := wires calibration multi_position allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
 FOREIGN := basil edie instro ixcom visa
-BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners)
+BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners)
 
 .DEFAULT_GOAL := help
 .PHONY: help run test bench chaos format check validate rights lock clean foreign

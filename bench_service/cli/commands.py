@@ -46,6 +46,7 @@ PANELS = {
         benches.release,
         benches.queue,
         benches.check_file,
+        benches.simulate,
     ),
     "Jobs": (plans.procedures, plans.preview, jobs.run, jobs.jobs),
     "Evidence": (

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
+from simulators.clock import Wait
 from simulators.imu.device import SimImu
 from simulators.served.acutrol import AcutrolLanguage
 from simulators.served.at_once import at_once
@@ -76,12 +77,12 @@ class Port(Protocol):
 class ServedBench:
     """World behind ports. `open` and `close` belong to one event loop."""
 
-    def __init__(self, config: ServedConfig, now_s: Callable[[], float]) -> None:
-        """Build the world; `now_s`: real time."""
-        self.config = config
+    def __init__(self, config: ServedConfig, now_s: Callable[[], float], wait: Wait) -> None:
+        """Build the world; `now_s`: real time; `wait`: waits real seconds."""
+        self.config, self._wait = config, wait
         self.clock = PacedClock(config.world.rate_hz)
         self.bench: SimulatedBench = build(config.world, clock=self.clock, table=ControlledTable)
-        self.pace = Pace(self.clock, config.factor, now_s)
+        self.pace = Pace(self.clock, config.factor, now_s, wait)
         self.plan = FaultPlan(tuple(config.faults))
         self.ports: dict[str, Port] = {}
         self.frames: CountFrames | IxcomFrames | None = None
@@ -112,9 +113,11 @@ class ServedBench:
         for port in self.ports.values():
             await port.close()
 
-    async def failed(self) -> None:
-        """Wait until the world cannot go on, and raise why."""
-        await asyncio.gather(*self._tasks)
+    def check(self) -> None:
+        """Raise why the world does not go on, where it does not."""
+        for task in self._tasks:
+            if task.done() and not task.cancelled():
+                task.result()
 
     def break_now(self, fault: Fault) -> None:
         """Let a fault of a device come true now."""
@@ -144,41 +147,45 @@ class ServedBench:
         while True:
             for fault in self.plan.due(self.clock.now_s()):
                 self.break_now(fault)
-            await asyncio.sleep(LOOK_S)  # noqa: TID251  the served world's own pace
+            await self._wait(LOOK_S)
 
     def _port(self, name: str, device: ServedDevice) -> Port:
         options = device.options
         if name == "unit_link":
             return self._unit_port(device)
         if name == "supply":
-            return LinePort(name, Lines(b"\n", ScpiLanguage(self.bench.supply).answer), self.plan)
+            return LinePort(name, Lines(b"\n", ScpiLanguage(self.bench.supply).answer), self.plan, self._wait)
         if name == "chamber":
             kind = str(options.get("type", TYPE))
             if self.bench.chamber is None:
                 raise ValueError("chamber: the world has none; it needs thermal = True")
-            return LinePort(name, ChamberTalker(Controller(self.bench.chamber), kind), self.plan, masters=5)
+            return LinePort(name, ChamberTalker(Controller(self.bench.chamber), kind), self.plan, self._wait, masters=5)
         language = AcutrolLanguage(
             self.table,
             options.get("numbers", (1, 2, 3)),
             options.get("prefix_bytes", 8),
             options.get("ending", b"\r\n"),
         )
-        return LinePort(name, Lines(b"\r\n", language.answer), self.plan)
+        return LinePort(name, Lines(b"\r\n", language.answer), self.plan, self._wait)
 
-    def _unit_port(self, device: ServedDevice) -> Port:
+    def frames_of(self, name: str) -> CountFrames | IxcomFrames:
+        """Frames that the unit sends on this bench. Raises `ValueError` where it sends none."""
         imu, unit = self.bench.imu, self.config.world.unit
         if not isinstance(imu, SimImu):
-            raise ValueError("unit_link: a converter alone is not served")
-        rate, channels = imu.rate_hz, (*unit_channels(unit), *temperature_channels(unit))
-        if device.language == "ixcom":
-            frames: IxcomFrames | CountFrames = IxcomFrames(channels, rate)
-        else:
-            frames = CountFrames(channels, rate, 11 if self.config.world.thermal else 6)
-        stream = Stream(frames, rate, lambda: imu.since_launch_s, self.config.valid_after_s)
+            raise ValueError(f"{name}: a converter alone is not served")
+        channels = (*unit_channels(unit), *temperature_channels(unit))
+        if self.config.devices[name].language == "ixcom":
+            return IxcomFrames(channels, imu.rate_hz)
+        return CountFrames(channels, imu.rate_hz, 11 if self.config.world.thermal else 6)
+
+    def _unit_port(self, device: ServedDevice) -> Port:
+        frames, imu = self.frames_of("unit_link"), self.bench.imu
+        assert isinstance(imu, SimImu)
+        stream = Stream(frames, imu.rate_hz, lambda: imu.since_launch_s, self.config.valid_after_s)
         stream.plan, self.frames = self.plan, frames
         imu.listen(stream)
         if isinstance(frames, IxcomFrames):
-            return IxcomPort(stream, unit.serial, rate)
+            return IxcomPort(stream, self.config.world.unit.serial, imu.rate_hz)
         if device.datagrams:
             return DatagramPort(stream, frames.length)
         return FramePort(stream)

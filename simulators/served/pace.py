@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Callable
 
-from simulators.clock import SimClock
+from simulators.clock import SimClock, Wait
 
 STEP_S = 0.002
 """Real time between two steps of the world [s]."""
@@ -34,11 +34,11 @@ class PacedClock(SimClock):
 class Pace:
     """Moves a clock by real time. What a slow machine cannot make up for is given up and counted."""
 
-    def __init__(self, clock: PacedClock, factor: float, now_s: Callable[[], float]) -> None:
-        """Set up; `factor`: bench seconds in a real one; `now_s`: real time."""
+    def __init__(self, clock: PacedClock, factor: float, now_s: Callable[[], float], wait: Wait) -> None:
+        """Set up; `factor`: bench seconds in a real one; `now_s`: real time; `wait`: waits real seconds."""
         if not 0.0 < factor <= 10_000.0:
             raise ValueError(f"time_factor = {factor!r} must be above 0 and at most 10000")
-        self._clock, self._factor, self._now_s = clock, factor, now_s
+        self._clock, self._factor, self._now_s, self._wait = clock, factor, now_s, wait
         self.behind_s = 0.0
         """Bench time that was given up because the machine was too slow [s]."""
 
@@ -48,7 +48,7 @@ class Pace:
         rate = self._clock.rate_hz * self._factor
         most = max(1, int(LONGEST_S * rate))
         while True:
-            await asyncio.sleep(STEP_S)  # noqa: TID251  the served world's own pace
+            await self._wait(STEP_S)
             due = int((self._now_s() - begin) * rate) - done
             if due > most:
                 self.behind_s += (due - most) / self._clock.rate_hz

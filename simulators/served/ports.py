@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Protocol
 
+from simulators.clock import Wait
 from simulators.served.faults import Fault, FaultPlan
 
 MOST_WAITING = 8192
@@ -25,7 +26,9 @@ class Talker(Protocol):
 class LinePort:
     """Port of a device that answers requests. A second master finds its line closed at once."""
 
-    def __init__(self, device: str, talker: Talker, plan: FaultPlan, masters: int = 1) -> None:
+    def __init__(self, device: str, talker: Talker, plan: FaultPlan, wait: Wait, masters: int = 1) -> None:
+        """Set up; `wait`: waits real seconds, as a slow device does; `masters`: most lines at once."""
+        self._wait = wait
         self.device, self._talker, self._plan, self._masters = device, talker, plan, masters
         self._server: asyncio.Server | None = None
         self._lines: set[asyncio.StreamWriter] = set()
@@ -87,7 +90,7 @@ class LinePort:
         if fault is None:
             writer.write(answer)
         elif fault.kind == "slow":
-            await asyncio.sleep(fault.seconds)  # noqa: TID251  a slow device
+            await self._wait(fault.seconds)
             writer.write(answer)
         elif fault.kind == "half":
             writer.write(answer[: max(1, len(answer) // 2)])

@@ -17,8 +17,20 @@ ERRORS = {
     -221: "Settings conflict",
     -350: "Queue overflow",
 }
-LONG = {"SYSTEM": "SYST", "ERROR": "ERR", "VOLTAGE": "VOLT", "CURRENT": "CURR", "OUTPUT": "OUTP", "MEASURE": "MEAS"}
-LONG |= {"PROTECTION": "PROT", "TRIPPED": "TRIP", "STATE": "STAT", "LEVEL": "LEV", "SOURCE": "SOUR"}
+LONG = {
+    "SYSTEM": "SYST",
+    "ERROR": "ERR",
+    "VOLTAGE": "VOLT",
+    "CURRENT": "CURR",
+    "OUTPUT": "OUTP",
+    "MEASURE": "MEAS",
+    "PROTECTION": "PROT",
+    "TRIPPED": "TRIP",
+    "STATE": "STAT",
+    "LEVEL": "LEV",
+    "SOURCE": "SOUR",
+}
+"""Long form of a word -> its short one."""
 OPTIONAL = ("SOUR", "LEV", "IMM", "AMPL", "STAT", "DC")
 """Words of a header that may be left out."""
 

@@ -61,7 +61,7 @@ class ControlledTable(SimTurntable):
         return self.true_encoders_deg()
 
     def true_encoders_deg(self) -> list[float]:
-        """What encoders that are not stuck read."""
+        """Readings that encoders give while they are not stuck."""
         angles = self.read_angles()
         read = [angles.outer_deg, angles.middle_deg, angles.inner_deg]
         return [

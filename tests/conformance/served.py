@@ -56,7 +56,7 @@ class Served:
         asyncio.set_event_loop(self._loop)
 
         async def begin() -> None:
-            self.bench = ServedBench(self.config, time.monotonic)
+            self.bench = ServedBench(self.config, time.monotonic, asyncio.sleep)
             self.numbers = await self.bench.open()
             self._begun.set()
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from bench_service.drivers.devices.table_axes import TurnProgress
 from procedures.bench.errors import BenchError, DeviceBusy, DeviceFault, Disconnected, OutOfRange, Stopped
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
@@ -197,3 +198,45 @@ def test_the_narrower_limit_holds_and_is_found_at_the_device(tmp_path: Path) -> 
     wide = {"number": 2, "minimum_deg": -300.0, "maximum_deg": 300.0, "rate_deg_s": 90.0, "acceleration_deg_s2": 90.0}
     with table("acutrol", tmp_path, middle=wide) as rig:
         asyncio.run(scene(rig))
+
+
+@pytest.mark.parametrize("pause_s", [0.01, 2.9, 7.3, 31.0])
+def test_turns_are_counted_over_pauses_of_their_readings(pause_s: float) -> None:
+    """A rate of 50 deg/s read seldom, by a clock that is 1 % wrong: 31 s are 4.3 turns, and 15 deg of error."""
+    progress, now = TurnProgress(170.0, -50.0, 100.0), 0.0
+    for _ in range(5):
+        now += pause_s
+        encoder = (170.0 - 50.0 * now + 180.0) % 360.0 - 180.0
+        assert progress.read(encoder, 100.0 + 1.01 * now) == pytest.approx(-50.0 * now, abs=1e-9)
+
+
+def test_an_encoder_of_one_turn_is_counted_where_there_are_no_slip_rings(tmp_path: Path) -> None:
+    """The inner axis goes to 320 deg and back: its count is kept, and no step is longer than 120 deg."""
+
+    async def scene(rig: TableRig) -> None:
+        await rig.port.move_to(TableAngles(0, 0, 320))
+        assert _angles(await rig.port.read())[2] == pytest.approx(320.0, abs=POINTING_DEG)
+        demanded = [float(r.split(",")[1]) for r in rig.demands() or [] if r.startswith(":demand:position 3")]
+        assert demanded == pytest.approx([106.66667, 213.33333 - 360.0, 320.0 - 360.0], abs=1e-4)
+
+    with table("acutrol", tmp_path, encoder="single_turn") as rig:
+        assert rig.served is not None
+        rig.served.do(_read_within_one_turn)
+        asyncio.run(scene(rig))
+
+
+def _read_within_one_turn(bench) -> None:
+    """Have the served inner axis read, and be asked, within half a turn: the nearest turn is meant."""
+    table, load = bench.table, bench.table.load
+    read = table.true_encoders_deg
+
+    def within() -> list[float]:
+        return [a - 360.0 * round(a / 360.0) for a in read()]
+
+    def nearest(kind: str, axis: int, value: float) -> None:
+        here = read()[axis]
+        load(kind, axis, value + 360.0 * round((here - value) / 360.0) if kind == "position" else value)
+        if kind == "position":
+            table.axes[axis].position_deg = value
+
+    table.encoders_deg, table.load = within, nearest

@@ -56,8 +56,8 @@ def test_the_makers_own_client_drives_the_served_ixcom_unit() -> None:
     assert len(counters) == 200
     assert np.all(np.diff(counters) % 256 == 1)
     np.testing.assert_allclose(np.diff(times), 1.0 / 400.0, atol=2e-6)
-    # At zero angles y is up, and the output is b + K·g. A mean of half a second is off by a pulse over that time, and by
-    # the noise, below 1e-3 m/s² for this unit; 0.02 m/s² is far above both.
+    # At zero angles y is up, and the output is b + K·g. A mean of half a second is off by a pulse over that time, and
+    # by the noise, below 1e-3 m/s² for this unit; 0.02 m/s² is far above both.
     expected = np.array(bias) + np.array(matrix) @ [0.0, 9.8105, 0.0]
     pulse = max(c.scale for c in unit_channels(default_unit())[3:]) / 0.5
     np.testing.assert_allclose(force.mean(axis=0), expected, atol=0.02 + pulse)

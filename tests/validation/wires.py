@@ -4,6 +4,7 @@
 """
 
 import asyncio
+import logging
 import sys
 import tempfile
 import time
@@ -119,6 +120,7 @@ def main() -> int:
     """Run all parts; 1 if one did not hold."""
     frames = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
     rng = np.random.Generator(np.random.PCG64(20261130))
+    logging.disable(logging.WARNING)
     with tempfile.TemporaryDirectory() as folder:
         checks = parsers(frames, rng) + streams(frames, rng) + faults_everywhere(Path(folder))
     for check in checks:

@@ -131,3 +131,17 @@ def _only_stop(stops: list[dict[str, Any]], bench: str) -> str:
         raise Refused(f"bench {bench} is not stopped: nothing is to be released")
     named = "; ".join(f"{stop['id']}: {stop['reason']}" for stop in stops)
     raise Refused(f"several stops of bench {bench} stand; the one that is meant is to be named: {named}")
+
+
+def simulate(
+    bench_file: Annotated[Path, typer.Option("--bench-file", dir_okay=False, help="Bench file with the addresses")],
+    faults: Annotated[Path | None, typer.Option(dir_okay=False, help="Plan of faults, tables [[fault]]")] = None,
+) -> None:
+    """Serve the devices of a bench file as simulators on its addresses, in the makers' bytes, until SIGTERM or SIGINT.
+
+    One world stands behind them, at the seed and time_factor of the file's simulation. A device that it calls
+    "simulated" is not served.
+    """
+    from bench_service.cli.processes.simulating import simulate as serve_simulators
+
+    serve_simulators(bench_file, faults, announce)

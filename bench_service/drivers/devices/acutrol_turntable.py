@@ -7,7 +7,7 @@ import asyncio
 from math import sqrt
 
 from bench_service.drivers.devices.acutrol_link import AcutrolLink, AcutrolSection
-from bench_service.drivers.devices.table_axes import AXES, TurnCount, angles_of, declared, steps, wrapped
+from bench_service.drivers.devices.table_axes import AXES, TurnCount, TurnProgress, angles_of, declared, steps, wrapped
 from bench_service.drivers.interface.driver import DeviceDriver, DriverContext, Found, narrowed
 from bench_service.drivers.protocols.acutrol import AxisState
 from procedures.bench.description import AxisLimits
@@ -24,6 +24,8 @@ AT_REST = 3
 """Number of readings in a row that make rest."""
 STATUS_EVERY = 20
 """Number of readings of a motion after which the interlocks are read again."""
+MOST_LEFT_DEG = 170.0
+"""Largest angle between the stop of turns and their end: beyond it the shorter way would be another number of turns."""
 STOPPED = "the table was stopped by another demand"
 
 
@@ -86,7 +88,7 @@ class AcutrolTurntable:
         except BaseException:
             self._end(demand)
             raise
-        self._turning = asyncio.create_task(self._follow(turn, index, states[index].position_deg, demand))
+        self._turning = asyncio.create_task(self._follow(turn, index, [s.position_deg for s in states], demand))
 
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
         """Refuse; see the port: how this controller begins a sinusoid is not known. Raises `OutOfRange`."""
@@ -225,49 +227,49 @@ class AcutrolTurntable:
             await self._clock.sleep(POLL_S)
         return True
 
-    async def _follow(self, turn: Turn, index: int, start_deg: float, demand: int) -> None:
+    async def _follow(self, turn: Turn, index: int, start: list[float], demand: int) -> None:
         """Count the turns of an axis in rate mode, stop it before their end, and lead it to the angle of the start."""
         try:
-            count, sign = TurnCount(True), 1.0 if turn.turns > 0 else -1.0
-            count.restore(start_deg)
+            sign = 1.0 if turn.turns > 0 else -1.0
+            progress = TurnProgress(start[index], sign * turn.rate_deg_s, self._clock.now_s())
             until_stop = abs(turn.angle_deg) - 0.5 * turn.rate_deg_s * turn.ramp_s
-            last = self._clock.now_s()
             while True:
                 states, now = await self._link.states(), self._clock.now_s()
-                if (now - last) * turn.rate_deg_s > 170.0:
-                    raise DeviceFault(
-                        f"the {turn.axis} axis was not read for {now - last:.1f} s: its turns are not known"
-                    )
-                last = now
-                left_s = (until_stop - sign * (count.read(states[index].position_deg) - start_deg)) / turn.rate_deg_s
+                left_s = (until_stop - sign * progress.read(states[index].position_deg, now)) / turn.rate_deg_s
                 if left_s <= POLL_S:
                     break
                 await self._clock.sleep(min(POLL_S, left_s))
             await self._clock.sleep(max(0.0, left_s))
             await self._link.demand("rate", index, 0.0)
+            stopped = self._clock.now_s()
             await self._wait_for_rest(None, turn.ramp_s, demand)
-            await self._return(turn, index, start_deg, demand)
+            rested = self._clock.now_s()
+            not_turned = progress.rate_deg_s * (rested - stopped - 0.5 * turn.ramp_s)
+            states = await self._states()
+            progress.read(states[index].position_deg, rested, not_turned)
+            await self._return(turn, index, start, turn.angle_deg - progress.turned_deg, demand)
         except BaseException:
             await self._stop_axis(index)
             raise
         finally:
             self._end(demand)
 
-    async def _return(self, turn: Turn, index: int, start_deg: float, demand: int) -> None:
-        """Lead the axis that has turned to its start: with slip rings the nearest turn of it, else the counted one."""
-        axis, state = self._axes()[index], (await self._states())[index]
-        continuous = getattr(self._section, turn.axis).continuous
-        nearest = state.position_deg + wrapped(start_deg - state.position_deg)
-        end = nearest if continuous else start_deg + turn.angle_deg
-        away = abs(end - state.position_deg)
-        if away > 10.0 + 0.5 * turn.rate_deg_s:
-            raise DeviceFault(f"the {turn.axis} axis stopped {away:g} deg from the end of its turns")
+    async def _return(self, turn: Turn, index: int, start: list[float], left_deg: float, demand: int) -> None:
+        """Lead the axis that has turned by what is left of its turns, the others compared with where they stood."""
+        axis, here = self._axes()[index], (await self._states())[index].position_deg
+        if abs(left_deg) > MOST_LEFT_DEG:
+            raise DeviceFault(f"the {turn.axis} axis stopped {left_deg:g} deg before the end of its turns")
+        end = here + left_deg
         await self._link.limit("position", index, axis.rate_deg_s, axis.acceleration_deg_s2)
-        await self._link.demand("position", index, wrapped(end) if self._counts[index].counts else end)
+        await self._link.demand("position", index, self._demanded(index, end))
         await self._link.mode("position", [index])
-        positions = [s.position_deg for s in await self._states()]
-        positions[index] = end
-        await self._wait_for_rest(positions, _duration_s(away, axis.rate_deg_s, axis.acceleration_deg_s2), demand)
+        ends = [end if k == index else angle for k, angle in enumerate(start)]
+        await self._wait_for_rest(ends, _duration_s(abs(left_deg), axis.rate_deg_s, axis.acceleration_deg_s2), demand)
+
+    def _demanded(self, index: int, angle_deg: float) -> float:
+        """Angle as the controller takes it: of one turn where its encoder reads within one."""
+        within_one = self._counts[index].counts or getattr(self._section, AXES[index]).continuous
+        return wrapped(angle_deg) if within_one else angle_deg
 
     async def _stop_axis(self, index: int) -> None:
         """Take the rate away from an axis whose turns are not followed any more; quiet where that fails as well."""

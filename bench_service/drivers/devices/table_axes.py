@@ -64,6 +64,29 @@ class TurnCount:
         self.angle_deg, self.known = angle_deg, True
 
 
+@dataclass
+class TurnProgress:
+    """Angle that an axis has turned at a known rate, over an encoder that may repeat each turn.
+
+    A reading is taken to be the turn nearest to what rate and time make due, so that the count bears a pause in the
+    readings of any length, as long as rate and clock are right to within half a turn.
+    """
+
+    start_deg: float
+    rate_deg_s: float
+    """Demanded rate, signed [deg/s]."""
+    since_s: float
+    """Bench time of the newest reading [s]."""
+    turned_deg: float = 0.0
+
+    def read(self, encoder_deg: float, now_s: float, less_deg: float = 0.0) -> float:
+        """Angle turned by a new reading, signed [deg]. `less_deg`: how much less than the rate's was turned since."""
+        due = self.turned_deg + self.rate_deg_s * (now_s - self.since_s) - less_deg
+        self.turned_deg = due + wrapped(encoder_deg - self.start_deg - due)
+        self.since_s = now_s
+        return self.turned_deg
+
+
 def steps(start_deg: Sequence[float], end_deg: Sequence[float], counted: Sequence[bool]) -> list[list[float]]:
     """Angles to go through, the last one `end_deg`: no axis with an encoder of one turn by more than a step at once."""
     longest = max(

@@ -7,7 +7,7 @@ LONGEST_ANSWER = 4096
 
 
 class NoFrame(ValueError):
-    """What has arrived cannot become an answer."""
+    """Bytes have arrived that cannot become an answer."""
 
 
 @dataclass(frozen=True)

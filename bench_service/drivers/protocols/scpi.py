@@ -1,11 +1,13 @@
 """SCPI of a power supply: statements and answers as text. Queries of protection and mode differ by maker: settings."""
 
+import re
 from dataclasses import dataclass
 from math import isfinite
 
 from bench_service.drivers.answers import BadAnswer, Refusal, shown
 
 ENDING = b"\n"
+ERROR_CODE = re.compile(r"[+-]?[0-9]{1,6}")
 IDENTITY_QUERY = "*IDN?"
 ERROR_QUERY = "SYST:ERR?"
 
@@ -112,8 +114,7 @@ def error(answer: bytes) -> tuple[int, str]:
     """Oldest error of the queue, 0 where it is empty. Raises `BadAnswer`."""
     found = text(answer)
     code, comma, words = found.partition(",")
-    sign_free = code.strip().lstrip("+-")
-    if not comma or not sign_free.isdigit() or len(sign_free) > 6:
+    if not comma or not ERROR_CODE.fullmatch(code.strip()):
         raise BadAnswer(f"{found!r} is no entry of an error queue")
     return int(code), words.strip().strip('"')
 
