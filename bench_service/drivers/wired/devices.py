@@ -58,7 +58,7 @@ class WiredDevices:
     def compare(self, by: str) -> tuple[str, ...]:
         """Compare the real devices with the register, which then takes over what they say; see the port."""
         state = self._register.read()
-        kinds = [kind for kind in SAFE if kind in self._file.real()]
+        kinds: list[Kind] = [kind for kind in SAFE if kind in self._file.real()]
         if state is None or not kinds:
             return ()
         try:
@@ -99,7 +99,7 @@ class WiredDevices:
         for device in SAFE_ORDER:
             if device in unsafe and device not in real:
                 link.note(f"{device}.make_safe", {}, **SAFE_STATE[device](link.state))
-        kinds = [kind for kind in SAFE if kind in unsafe and kind in real]
+        kinds: list[Kind] = [kind for kind in SAFE if kind in unsafe and kind in real]
         devices = opened(self._file, kinds, context_of(self._file))
         work: dict[Kind, Callable[[], Coroutine[Any, Any, None]]] = {
             kind: partial(_led_to_safety, device) for kind, device in devices.items()

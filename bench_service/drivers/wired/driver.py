@@ -143,7 +143,7 @@ class BenchFileDriver:
         context = DriverContext(
             file.id, wall, file.folder, unit, lambda: link.state.powered, lambda e, more: self._note(job, e, more)
         )
-        kinds = [kind for kind in file.real() if _is_wanted(kind, needs)]
+        kinds: list[Kind] = [kind for kind in file.real() if _is_wanted(kind, needs)]
         devices = opened(file, kinds, context)
         bench = Bench(description, wall, *(devices.get(kind) for kind in ("turntable", "unit_link", "supply")))  # pyright: ignore[reportArgumentType]
         bench.chamber, bench.current_source = devices.get("chamber"), devices.get("current_source")
@@ -164,7 +164,8 @@ class BenchFileDriver:
 
     def _add_simulated(self, bench: Bench, unit: str, seed: int, needs: BenchNeeds, wall: WallBenchClock) -> None:
         """Fill the places of simulated devices from one world, and let it feel the real ones."""
-        description = self._description if bench.turntable is None else _free_axes(self._description)
+        has_table = not self._file.within("turntable")
+        description = _free_axes(self._description) if has_table else self._description
         world = self._simulated.world(unit, seed, needs, description, wall)
         seen = ObservedBench(world, CatchUp(world.clock))
         bench.clock = MixedClock(wall, world.clock)

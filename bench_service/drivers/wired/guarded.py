@@ -19,7 +19,7 @@ class Guarded:
     """A device whose `make_safe` ends with a reading; every other verb is the device's own."""
 
     def __init__(self, kind: Kind, section: DeviceSection, device: Any) -> None:
-        self._kind = kind
+        self._kind: Kind = kind
         self._section = section
         self._device = device
 

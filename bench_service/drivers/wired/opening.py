@@ -8,7 +8,7 @@ from typing import Any
 
 from bench_service.drivers.bench_file.document import BenchFile
 from bench_service.drivers.bench_file.unit_files import read_units
-from bench_service.drivers.interface.driver import DriverContext, Found, Kind, WireDevice, differences
+from bench_service.drivers.interface.driver import DriverContext, Found, Kind, differences
 from bench_service.drivers.interface.registry import driver
 from bench_service.drivers.interface.sections import DeviceSection, Wire
 from bench_service.drivers.wall_bench_clock import WallBenchClock
@@ -93,7 +93,7 @@ def _context_of_survey(file: BenchFile, wanted: Iterable[Kind]) -> DriverContext
     return replace(context_of(file), unit=units[0] if units else None)
 
 
-async def _ask(kind: Kind, device: WireDevice | Any) -> tuple[Found, Any]:
+async def _ask(kind: Kind, device: Any) -> tuple[Found, Any]:
     try:
         found = await device.connect()
         return found, await device.read() if kind in READ else None
