@@ -142,7 +142,7 @@ def test_no_demand_goes_out_twice_and_no_answer_is_taken_for_another(tmp_path: P
     async def scene(rig: TableRig) -> None:
         assert rig.served is not None
         await rig.port.read()
-        rig.served.plan(Fault("turntable", kind, at=at, seconds=0.5))
+        rig.served.plan(Fault("turntable", kind, at=at, seconds=0.7))
         before = len(rig.demands() or [])
         moved = await asyncio.gather(rig.port.move_to(TableAngles(3, 4, 5)), return_exceptions=True)
         if moved == [None]:
@@ -157,7 +157,7 @@ def test_no_demand_goes_out_twice_and_no_answer_is_taken_for_another(tmp_path: P
         await rig.port.move_to(TableAngles(1, 2, 3))
         assert _angles(await rig.port.read()) == pytest.approx((1.0, 2.0, 3.0), abs=POINTING_DEG)
 
-    with table("acutrol", tmp_path, answer_s=0.25) as rig:
+    with table("acutrol", tmp_path, answer_s=0.4) as rig:
         asyncio.run(scene(rig))
 
 
