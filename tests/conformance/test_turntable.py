@@ -240,3 +240,51 @@ def _read_within_one_turn(bench) -> None:
             table.axes[axis].position_deg = value
 
     table.encoders_deg, table.load = within, nearest
+
+
+def test_made_safe_with_the_servo_off_where_the_section_says_so(tmp_path: Path) -> None:
+    async def scene(rig: TableRig) -> None:
+        assert rig.served is not None
+        move = asyncio.create_task(rig.port.move_to(TableAngles(100, 0, 0)))
+        while abs(rig.rates_deg_s()[0]) < 30.0:
+            await asyncio.sleep(0)
+        await rig.port.make_safe()
+        await asyncio.wait([move])
+        assert rig.served.do(lambda bench: [axis.mode for axis in bench.table.axes]) == ["off", "off", "off"]
+        assert not (await rig.port.read()).moving
+        await rig.port.move_to(TableAngles(0, 0, 0))
+
+    with table("acutrol", tmp_path, on_safe="off") as rig:
+        asyncio.run(scene(rig))
+
+
+def test_an_interlock_that_opens_during_a_move_ends_it(tmp_path: Path) -> None:
+    async def scene(rig: TableRig) -> None:
+        assert rig.served is not None
+        move = asyncio.create_task(rig.port.move_to(TableAngles(0, 0, 300)))
+        while abs(rig.rates_deg_s()[2]) < 30.0:
+            await asyncio.sleep(0)
+        rig.served.do(lambda bench: bench.table.open_interlock(2))
+        with pytest.raises(DeviceFault, match="interlock 3 of the turntable is open: a person looks why"):
+            await move
+        await rig.port.make_safe()
+        words = {word.name: word.raw for word in (await rig.port.read()).status}
+        assert words["interlock 3"] == "open"
+
+    with table("acutrol", tmp_path) as rig:
+        asyncio.run(scene(rig))
+
+
+def test_made_safe_while_an_open_interlock_brakes_it(tmp_path: Path) -> None:
+    async def scene(rig: TableRig) -> None:
+        assert rig.served is not None
+        await rig.port.command_turn(Turn("outer", 2, 50.0, 1.0))
+        while abs(rig.rates_deg_s()[0]) < 40.0:
+            await asyncio.sleep(0)
+        rig.served.do(lambda bench: bench.table.open_interlock(0))
+        await rig.port.make_safe()
+        assert not (await rig.port.read()).moving
+        assert max(abs(rate) for rate in rig.rates_deg_s()) < 1e-3
+
+    with table("acutrol", tmp_path) as rig:
+        asyncio.run(scene(rig))

@@ -114,11 +114,12 @@ class AcutrolTurntable:
         self._busy = False
         if await self._rests():
             return
-        for index, axis in enumerate(self._axes()):
-            await self._link.limit("rate", index, axis.rate_deg_s, axis.acceleration_deg_s2)
-            await self._link.demand("rate", index, 0.0)
-        await self._link.mode("rate")
         longest = max(axis.rate_deg_s / axis.acceleration_deg_s2 for axis in self._axes())
+        try:
+            await self._brake()
+        except DeviceFault:  # an open interlock refuses, and brakes by itself: rest is what counts
+            await self._wait_for_rest(None, longest, self._demand)
+            return
         await self._wait_for_rest(None, longest, self._demand)
         if self._section.on_safe == "off":
             await self._link.mode("off")
@@ -126,6 +127,12 @@ class AcutrolTurntable:
         for index, state in enumerate(await self._link.states()):
             await self._link.demand("position", index, state.position_deg)
         await self._link.mode("position")
+
+    async def _brake(self) -> None:
+        for index, axis in enumerate(self._axes()):
+            await self._link.limit("rate", index, axis.rate_deg_s, axis.acceleration_deg_s2)
+            await self._link.demand("rate", index, 0.0)
+        await self._link.mode("rate")
 
     def close(self) -> None:
         """Drop the line; see `WireDevice`."""
