@@ -288,3 +288,20 @@ def test_made_safe_while_an_open_interlock_brakes_it(tmp_path: Path) -> None:
 
     with table("acutrol", tmp_path) as rig:
         asyncio.run(scene(rig))
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.002, 0.005, 0.01, 0.02, 0.04])
+def test_a_demand_that_is_still_being_given_does_not_outlive_make_safe(rig: TableRig, after_s: float) -> None:
+    async def scene() -> None:
+        await rig.port.read()
+        move = asyncio.create_task(rig.port.move_to(TableAngles(40, 30, 20)))
+        await asyncio.sleep(after_s)
+        await rig.port.make_safe()
+        await asyncio.wait([move])
+        before = _angles(await rig.port.read())
+        await rig.clock.sleep(2.0)
+        reading = await rig.port.read()
+        assert not reading.moving
+        assert _angles(reading) == pytest.approx(before, abs=POINTING_DEG)
+
+    asyncio.run(scene())
