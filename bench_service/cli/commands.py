@@ -15,7 +15,9 @@ from bench_service.cli.groups import (
     benches,
     calibrations,
     campaigns,
+    database,
     evidence,
+    importing,
     jobs,
     plans,
     reservations,
@@ -58,6 +60,7 @@ PANELS = {
         units.units,
         calibrations.calibrations,
     ),
+    "Database": (database.database, database.scrub, database.backup, database.restore),
     "Reservations": (reservations.reservations, reservations.reserve, reservations.unreserve),
     "This program": (completion,),
 }
@@ -65,7 +68,7 @@ PANELS = {
 for _panel, _commands in PANELS.items():
     for _command in _commands:
         app.command(rich_help_panel=_panel)(_command)
-app.command("import", rich_help_panel="Evidence")(evidence.import_)
+app.command("import", rich_help_panel="Evidence")(importing.import_)
 app.add_typer(job, name="job", rich_help_panel="Jobs")
 app.add_typer(calibrations.calibration, name="calibration", rich_help_panel="Evidence")
 app.add_typer(campaigns.campaigns, name="campaign", rich_help_panel="Jobs")

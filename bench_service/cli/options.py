@@ -66,6 +66,11 @@ def wide() -> Console:
     return Console(width=max(console.width, 140), markup=False, emoji=False)
 
 
+def wide_errors() -> Console:
+    """A console on standard error for tables, as wide as they need."""
+    return Console(stderr=True, width=max(errors.width, 160), markup=False, emoji=False)
+
+
 def labels(texts: list[str]) -> dict[str, str]:
     """Convert ``name=text`` texts to labels. Raises `Refused`."""
     pairs = [text.partition("=") for text in texts]

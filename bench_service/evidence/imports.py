@@ -8,6 +8,7 @@ from bench_service.evidence.stores import EvidenceStores
 from bench_service.evidence.units import register
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.import_file import Imported, ImportFile
+from bench_service.formats.proposal.model import Proposal
 from bench_service.formats.reader.client import FileReader, NoReader, NoRoom
 from bench_service.model.errors import NotReady, StorageFull
 from bench_service.model.records import Idempotency, NewRecording
@@ -45,16 +46,16 @@ class ImportService:
         with self._reading(files, description) as imported:
             return self._store(imported, key)
 
+    def describe(self, file: ImportFile, unit: str | None, form: str | None, table: str | None) -> Proposal:
+        """Propose a description of a file, for a person to confirm; nothing is stored. Raises `DomainError`."""
+        with _in_service_words():
+            return self._reader.describe(file, unit, form, table)
+
     @contextmanager
     def _reading(self, files: Sequence[ImportFile], description: ImportDescription) -> Generator[Imported]:
         """Read the files in a process of their own."""
-        try:
-            with self._reader.reading(files, description) as imported:
-                yield imported
-        except NoRoom as error:
-            raise StorageFull(str(error)) from error
-        except NoReader as error:
-            raise NotReady([str(error)]) from error
+        with _in_service_words(), self._reader.reading(files, description) as imported:
+            yield imported
 
     def _store(self, imported: Imported, key: str | None) -> RecordingInfo:
         description = imported.description
@@ -84,3 +85,14 @@ class ImportService:
         except BaseException:
             writer.abandon()
             raise
+
+
+@contextmanager
+def _in_service_words() -> Generator[None]:
+    """Report what becomes of the reading process as an error of the service."""
+    try:
+        yield
+    except NoRoom as error:
+        raise StorageFull(str(error)) from error
+    except NoReader as error:
+        raise NotReady([str(error)]) from error

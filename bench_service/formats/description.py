@@ -20,6 +20,9 @@ DELIMITERS = {",": b",", ";": b";", "tab": b"\t", "whitespace": b" "}
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Seconds in one unit of a time column that holds numbers."""
 
+TICKS = {**SECONDS, "100us": 1e-4}
+"""The units above, and the ticks of 0.1 ms of Xsens' SampleTimeFine."""
+
 
 class Accumulated(StrEnum):
     """Quantity that a column adds up since some beginning; its steps from row to row are stored as increments."""
@@ -97,9 +100,10 @@ class ImportDescription(_Strict):
     channels: tuple[ImportedChannel, ...] = Field(min_length=1, max_length=64)
     rate_hz: float | None = Field(None, gt=0, description="where there is no time column, or to be checked against it")
     time_column: Column | None = Field(None, description="name, or index from 0, the same in every file")
-    time_unit: Literal["s", "ms", "us", "ns", "clock"] = Field(
+    time_unit: Literal["s", "ms", "us", "ns", "100us", "clock"] = Field(
         "s",
-        description="of numbers; clock: text such as 14:03:59.250, or with a date; typed time stamps know their own",
+        description="of numbers (100us: ticks of 0.1 ms); clock: text such as 14:03:59.250, or with a date; typed time "
+        "stamps, and clocks of log files, know their own",
     )
     clock_fraction: Literal["decimal", "ms", "us"] = Field(
         "decimal", description="of a clock's text: ms where 31.18 means 31.018 s, milliseconds without leading zeros"
@@ -123,6 +127,15 @@ class ImportDescription(_Strict):
     rate_tolerance: float = Field(
         0.005, gt=0, lt=1, description="of rate_hz, and of every 256 rows, against the time column, relative"
     )
+    format: str | None = Field(
+        None, max_length=40, description="of a log file, where it is not recognised; table: delimited text or columns"
+    )
+    table: str | None = Field(
+        None, max_length=1000, description="of a log file with several: a topic, a message type, an archive's file"
+    )
+    second_time_column: Column | None = Field(
+        None, description="of a log file with two clocks: the other one, which is inspected and kept with the source"
+    )
     simulated: bool = False
     reference_values: dict[str, float] = Field(default_factory=dict, description="known truths, kept with the source")
 
@@ -133,6 +146,8 @@ class ImportDescription(_Strict):
             raise ValueError(f"channels: each needs its own name, got {', '.join(names)}")
         if self.rate_hz is None and self.time_column is None:
             raise ValueError("give rate_hz, or time_column, or both")
+        if self.second_time_column is not None and self.time_column is None:
+            raise ValueError("second_time_column: give time_column first")
         return self
 
     def columns_of(self, file: int) -> tuple[Column, ...]:
@@ -143,7 +158,7 @@ class ImportDescription(_Strict):
     @property
     def time_scale_s(self) -> float:
         """Seconds in one unit of the time column; text of a clock is read in nanoseconds."""
-        return SECONDS.get(self.time_unit, 1e-9)
+        return TICKS.get(self.time_unit, 1e-9)
 
     def declared(self) -> dict[str, Any]:
         """Return the description as JSON, to be kept with the recording."""

@@ -66,6 +66,8 @@ class TextTable:
             way = f": header_lines = {self.first_line - 1 + more} leaves out what is empty" if more else ""
             raise UnreadableFile(self.name, f"line {self.first_line} is empty; a table was expected there{way}")
         filled = [row for row, line in zip(rows, lines, strict=True) if line.strip()]
+        plain = [row for row, line in zip(rows, lines, strict=True) if line.strip() and line[:1] not in (b"#", b"%")]
+        filled = plain or filled  # a short table may have more comments than rows
         self.width = _usual_width(filled[1:] if header and len(filled) > 1 else filled, len(filled[0]))
         comments = self._comments(lines, rows, header)
         for _ in range(comments):

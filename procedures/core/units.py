@@ -11,6 +11,7 @@ DEG_PER_HOUR_PER_HOUR = DEG / 3600.0**2
 PPM = 1e-6
 HOUR = 3600.0
 STANDARD_GRAVITY = 9.80665
+FOOT = 0.3048
 MICRO_G = 1e-6 * STANDARD_GRAVITY
 """One millionth of standard gravity [m/s²]: the µg of data sheets, independent of the site."""
 

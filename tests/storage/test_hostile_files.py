@@ -1,5 +1,6 @@
 """Any file becomes a recording or a refusal of bounded length."""
 
+import gzip
 import io
 from typing import Any
 
@@ -57,9 +58,10 @@ def test_a_message_does_not_repeat_the_file() -> None:
 @pytest.mark.parametrize(
     ("start", "words"),
     [
-        (b"PK\x03\x04" + bytes(100), "a zip archive or a workbook"),
-        (b"\x89HDF\r\n\x1a\n" + bytes(100), "an HDF5 file"),
-        (b"ULog\x01\x12\x35" + bytes(100), "a ULog of a flight controller"),
+        (b"PK\x03\x04" + bytes(100), "is a zip archive that is damaged or cut off"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(100), "cannot be read as HDF5"),
+        (b"ULog\x01\x12\x35" + bytes(100), "byte 16 begins no message of a ULog"),
+        (gzip.compress(b"ULog\x01\x12\x35" + bytes(100)), "a ULog of a flight controller: it is read as it is"),
         (b"\x80\x04\x95" + bytes(100), "a Python pickle, which is never opened"),
         (b'{"a": [1, 2]}', "JSON: save it as CSV"),
         (b"\x01\x00\x02\xff" * 500, "it has bytes of nought"),

@@ -78,6 +78,7 @@ def completed(document: Schema, catalogue: Catalogue) -> Schema:
 def _names(schemas: dict[str, Schema]) -> dict[str, str]:
     names = {name: plain_name(name) for name in schemas}
     names["Body_import_recording"] = UPLOAD
+    names["Body_describe_file"] = "FileToDescribe"
     return names
 
 

@@ -1,7 +1,6 @@
-"""Commands about evidence: recordings and results are listed, files imported and exported, methods run."""
+"""Commands about evidence: recordings and results are listed, samples exported, methods run."""
 
 import json
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,31 +9,14 @@ import typer
 from bench_service.cli.asking.client import RESULT, call, check, connect, segment
 from bench_service.cli.asking.lists import newest, show
 from bench_service.cli.completion import method_names
-from bench_service.cli.files import check_folder, text_of, whole_file
-from bench_service.cli.options import NO_ITEMS, AsJson, Limit, Server, Set, console, errors, parameter
+from bench_service.cli.files import check_folder, whole_file
+from bench_service.cli.options import NO_ITEMS, AsJson, Limit, Server, Set, console, parameter
 
 Labelled = Annotated[list[str], typer.Option("--label", help="Only of jobs with name or name=text; may be repeated")]
 Verdict = Annotated[str | None, typer.Option(help="pass, fail or error")]
 Since = Annotated[str | None, typer.Option(help="Made at this moment or later: 2026-11-30T08:00:00Z")]
 Until = Annotated[str | None, typer.Option(help="Made before this moment")]
 Text = Annotated[str | None, typer.Option(help="In an id, a name, a label or the name of an imported file")]
-
-
-def import_(
-    context: typer.Context,
-    files: Annotated[list[Path], typer.Argument(exists=True, dir_okay=False)],
-    description: Annotated[Path, typer.Option(exists=True, dir_okay=False, help="JSON file that says what is in them")],
-    server: Server = None,
-) -> None:
-    """Import a recorded file, or several that are columns of one recording."""
-    data = {"description": text_of(description)}
-    with connect(context.obj, server, drive=False) as client, ExitStack() as closing:
-        opened = [(path.name, closing.enter_context(path.open("rb"))) for path in files]
-        parts = [("files", (name, file, "application/octet-stream")) for name, file in opened]
-        recording = call(client, "POST", "/api/v1/recordings", ("id", "warnings"), files=parts, data=data)
-    console.print_json(json.dumps(recording))
-    for warning in recording["warnings"]:
-        errors.print(f"warning: {warning}", soft_wrap=True)
 
 
 def analyse(

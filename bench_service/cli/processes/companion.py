@@ -126,15 +126,16 @@ def _spawn(settings: Settings) -> Process:
         "BENCH_DATABASE_URL": settings.database_url,
         "BENCH_ID": settings.bench_id,
         "BENCH_DEVICE_FOLDER": str(folder),
+        "BENCH_LOG_FILE": str(log_of(settings)),
         **({} if settings.bench_file is None else {"BENCH_FILE": str(settings.bench_file)}),
     }
-    with log_of(settings).open("ab") as log_file:
+    with output_of(settings).open("wb") as output:  # what is no line of its log: the end of one that did not start
         return subprocess.Popen(
             [sys.executable, "-m", "bench_service", "supervise", "--companion"],
             env=environment,
             stdin=subprocess.DEVNULL,
-            stdout=log_file,
-            stderr=log_file,
+            stdout=output,
+            stderr=output,
             start_new_session=True,
         )
 
@@ -142,3 +143,8 @@ def _spawn(settings: Settings) -> Process:
 def log_of(settings: Settings) -> Path:
     """Return the path of the companion's log file."""
     return settings.devices_in() / f"bench-{settings.bench_id}.supervisor.log"
+
+
+def output_of(settings: Settings) -> Path:
+    """Return the path of the file with what the latest companion printed."""
+    return settings.devices_in() / f"bench-{settings.bench_id}.supervisor.out"

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from bench_service.formats.clock.column import ClockColumn, Fall
 from bench_service.formats.clock.pattern import Pattern
 from bench_service.formats.clock.rate import KeptRows, MeanRate
-from bench_service.formats.description import SECONDS, ImportDescription
+from bench_service.formats.description import TICKS, ImportDescription
 
 SHOWN_PLACES = 5
-_UNIT = {size: unit for unit, size in SECONDS.items()}
+_UNIT = {size: unit for unit, size in TICKS.items()}
 NO_TIME = "leave time_column out and give rate_hz"
 
 

@@ -15,7 +15,19 @@ from bench_service.formats.bounds import MEGABYTE, Bounds
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.import_file import ImportedRecording, ImportFile, read_import
-from bench_service.formats.reader.frames import CHILD, END, FOUND, REFUSED, SAMPLES, Broken, receive, send, send_json
+from bench_service.formats.proposal.propose import propose
+from bench_service.formats.reader.frames import (
+    CHILD,
+    END,
+    FOUND,
+    PROPOSED,
+    REFUSED,
+    SAMPLES,
+    Broken,
+    receive,
+    send,
+    send_json,
+)
 from procedures.core.errors import BadParameter, DomainError, UnfitRecording
 
 SENT_BYTES = 1024 * 1024
@@ -38,7 +50,10 @@ def serve(line: socket.socket) -> None:
             ImportFile(name, os.fdopen(descriptor, "rb"))
             for name, descriptor in zip(asked["names"], descriptors, strict=True)
         ]
-        _answer(line, files, ImportDescription.model_validate_json(asked["description"]))
+        if "describe" in asked:
+            _describe(line, files[0], asked["describe"])
+        else:
+            _answer(line, files, ImportDescription.model_validate_json(asked["description"]))
     except (OSError, Broken):
         return  # the client has gone
 
@@ -78,12 +93,23 @@ def _answer(line: socket.socket, files: list[ImportFile], description: ImportDes
         send_json(line, REFUSED, _refusal(error, files[0].name))
 
 
+def _describe(line: socket.socket, file: ImportFile, asked: dict[str, str | None]) -> None:
+    try:
+        proposal = propose(file, asked["unit"], asked["format"], asked["table"])
+        send(line, PROPOSED, proposal.model_dump_json().encode())
+    except (BrokenPipeError, ConnectionResetError):
+        raise
+    except Exception as error:  # whatever a file does to its reader, the service goes on
+        send_json(line, REFUSED, _refusal(error, file.name))
+
+
 def _found(imported: ImportedRecording) -> dict[str, Any]:
     return {
         "rate_hz": imported.rate_hz,
         "count": imported.count,
         "dtype": np.dtype(imported.dtype).name,
         "source": imported.source,
+        "simulated": imported.description.simulated,
     }
 
 

@@ -1,7 +1,6 @@
 """Client of the process that reads a file: it waits within a deadline, and trusts nothing that comes back."""
 
 import json
-import logging
 import os
 import shutil
 import signal
@@ -17,17 +16,27 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from bench_service.formats.bounds import MEGABYTE, Bounds
+from bench_service.formats.bounds import Bounds
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.import_file import ImportFile
+from bench_service.formats.proposal.model import Proposal
 from bench_service.formats.reader.child import MOST_FILES
-from bench_service.formats.reader.frames import CHILD, END, FOUND, REFUSED, SAMPLES, Broken, receive, send_json
+from bench_service.formats.reader.frames import (
+    CHILD,
+    END,
+    FOUND,
+    PROPOSED,
+    REFUSED,
+    SAMPLES,
+    Broken,
+    receive,
+    send_json,
+)
+from bench_service.formats.reader.refusals import NoRoom, refused
 from bench_service.wall_clock import monotonic_s
-from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.errors import BadParameter
 from procedures.core.recording import Channel, RawArray
-
-logger = logging.getLogger(__name__)
 
 AT_ONCE = 2
 """Largest number of files that are read at one time."""
@@ -47,10 +56,6 @@ _BEGIN = (
 
 class NoReader(Exception):
     """The process that reads files cannot be begun, or is gone."""
-
-
-class NoRoom(Exception):
-    """The temporary folder is full."""
 
 
 @dataclass
@@ -132,13 +137,30 @@ class FileReader:
             descriptors = [_descriptor(file.stream, closing) for file in files]
             bounds = Bounds.of(sum(os.fstat(d).st_size for d in descriptors))
             line = closing.enter_context(_Line(self._connected(), [file.name for file in files], bounds))
-            line.ask(descriptors, description)
+            line.ask(descriptors, {"description": description.model_dump_json()})
             kind, payload = line.frame()
             if kind != FOUND:
                 raise NoReader(f"a frame of kind {kind!r} came first")
             found = json.loads(payload)
             dtype = np.int32 if found["dtype"] == "int32" else np.float64
+            if found["simulated"]:  # the file itself may say so
+                description = description.model_copy(update={"simulated": True})
             yield _Reading(description, found["rate_hz"], found["count"], dtype, found["source"], line)
+
+    def describe(self, file: ImportFile, unit: str | None, form: str | None, table: str | None) -> Proposal:
+        """Propose a description of a file; `unit`, `form` and `table` where they are known.
+
+        Raises `UnreadableFile`, `UnfitRecording`, `BadParameter`, and `NoRoom`, `NoReader`.
+        """
+        with ExitStack() as closing, self._places:
+            descriptor = _descriptor(file.stream, closing)
+            bounds = Bounds.of(os.fstat(descriptor).st_size)
+            line = closing.enter_context(_Line(self._connected(), [file.name], bounds))
+            line.ask([descriptor], {"describe": {"unit": unit, "format": form, "table": table}})
+            kind, payload = line.frame()
+            if kind != PROPOSED:
+                raise NoReader(f"a frame of kind {kind!r} came first")
+            return Proposal.model_validate_json(payload)
 
     def _connected(self) -> socket.socket:
         """Open a line to a new child. Raises `NoReader`."""
@@ -211,8 +233,8 @@ class _Line:
             os.close(self._child)
         self._line.close()
 
-    def ask(self, descriptors: Sequence[int], description: ImportDescription) -> None:
-        """Hand the files over to the child. Raises `NoReader`."""
+    def ask(self, descriptors: Sequence[int], asked: dict[str, Any]) -> None:
+        """Hand the files over to the child, with what is asked of it. Raises `NoReader`."""
         try:
             self._line.settimeout(LOADING_S)
             socket.send_fds(self._line, [b"f"], list(descriptors))
@@ -221,8 +243,7 @@ class _Line:
                 raise NoReader(f"a frame of kind {kind!r} came first")
             with suppress(AttributeError, OSError):  # elsewhere it ends by its own limit of time
                 self._child = os.pidfd_open(int(payload))
-            asked = {"names": list(self._names), "description": description.model_dump_json()}
-            send_json(self._line, CHILD, asked)
+            send_json(self._line, CHILD, {"names": list(self._names), **asked})
         except (OSError, Broken) as error:
             raise NoReader(f"the process that reads files is gone: {error}") from error
 
@@ -241,29 +262,8 @@ class _Line:
                 "cannot be read: the process that read it ended, for want of memory or by a fault of the file",
             ) from error
         if kind == REFUSED:
-            raise _refused(json.loads(payload), self._bounds)
+            raise refused(json.loads(payload), self._bounds)
         return kind, payload
-
-
-def _refused(refusal: dict[str, Any], bounds: Bounds) -> Exception:
-    """Rebuild the error that a child met."""
-    kind = refusal["kind"]
-    if kind == "unreadable":
-        return UnreadableFile(refusal["name"], refusal["problem"])
-    if kind == "parameter":
-        return BadParameter(refusal["field"], refusal["value"], refusal["allowed"])
-    if kind == "unfit":
-        return UnfitRecording(refusal["message"])
-    if kind == "full":
-        return NoRoom(refusal["message"])
-    if kind == "memory":
-        return UnreadableFile(
-            refusal["name"],
-            f"takes more than {bounds.memory_bytes // MEGABYTE} MB of memory to read: write it in smaller pieces (row "
-            "groups, batches or lines)",
-        )
-    logger.warning("a file could not be read: %s", refusal.get("log", ""))
-    return UnreadableFile(refusal["name"], f"cannot be read ({refusal['problem']})")
 
 
 def _descriptor(stream: BinaryIO, closing: ExitStack) -> int:

@@ -10,8 +10,8 @@ HEAD = struct.Struct("!cI")
 LARGEST = 64 * 1024 * 1024
 """Largest payload of a frame [bytes]; the child is not trusted."""
 
-CHILD, FOUND, SAMPLES, END, REFUSED = b"P", b"H", b"B", b"E", b"X"
-"""Kinds of frames: the child's process id, the findings, samples row by row, their end, or the refusal."""
+CHILD, FOUND, SAMPLES, END, REFUSED, PROPOSED = b"P", b"H", b"B", b"E", b"X", b"D"
+"""Kinds of frames: the child's process id, the findings, samples row by row, their end, the refusal, or a proposal."""
 
 
 class Broken(Exception):

@@ -1,0 +1,134 @@
+"""A look at the beginning of a delimited text: its delimiter, the line of names, the decimal mark."""
+
+import re
+from dataclasses import dataclass
+from typing import BinaryIO
+
+from bench_service.formats.bounds import LINE_BYTES, Bounds
+from bench_service.formats.description import DELIMITERS
+from bench_service.formats.errors import UnreadableFile
+from bench_service.formats.text_source import TextSource
+
+LOOKED_AT = 300
+"""Number of lines from which a table is recognised."""
+_CLOCK = re.compile(rb"^\d{1,4}[-/:]\d\d?[-/:]\d\d.*$")
+_MISSING = (b"", b"nan", b"na", b"null", b"none")
+
+
+@dataclass(frozen=True)
+class TextLook:
+    """Findings about the beginning of a text."""
+
+    delimiter: str
+    decimal: str
+    header_lines: int
+    """Lines before the names, or before the data where there are no names."""
+    names: tuple[str, ...] | None
+    """Names of the columns; None: the text has none."""
+    width: int
+    preamble: tuple[str, ...]
+    """The lines before the table."""
+    first: tuple[str, ...]
+    """Cells of the first row of data."""
+
+
+def look(stream: BinaryIO, name: str) -> TextLook:
+    """Recognise the table in a text. Raises `UnreadableFile` where there is none."""
+    source = TextSource(stream, name, Bounds().unpacked_bytes)
+    source.fill(LINE_BYTES)
+    lines = source.glance().split(b"\n")[: LOOKED_AT + 1]
+    lines = [line.rstrip(b"\r") for line in (lines[:-1] if len(lines) > 1 else lines)]
+    best: tuple[int, int, str, str] | None = None
+    for delimiter in DELIMITERS:
+        for decimal in (".", ","):
+            if decimal == "," and delimiter == ",":
+                continue
+            rows, begin = _longest(lines, delimiter, decimal)
+            width = len(_cells(lines[begin], delimiter)) if rows else 0
+            if rows and width > 1 and (best is None or (rows, width) > (best[0], best[1])):
+                best = (rows, width, delimiter, decimal)
+    if best is None:
+        raise UnreadableFile(name, "no table of numbers is recognised at its beginning: give a description by hand")
+    rows, width, delimiter, decimal = best
+    _, begin = _longest(lines, delimiter, decimal)
+    names_at = _names_at(lines, begin, delimiter, width)
+    head = begin if names_at is None else names_at
+    names = None if names_at is None else tuple(_named(lines[names_at], delimiter))
+    return TextLook(
+        delimiter,
+        decimal,
+        head,
+        names,
+        width,
+        tuple(line.decode("utf-8", "replace") for line in lines[:head]),
+        tuple(cell.decode("utf-8", "replace").strip() for cell in _cells(lines[begin], delimiter)),
+    )
+
+
+def _longest(lines: list[bytes], delimiter: str, decimal: str) -> tuple[int, int]:
+    """Count the longest run of rows of one width in which most cells are numbers, and where it begins."""
+    best, begin, run, start, width = 0, 0, 0, 0, 0
+    for number, line in enumerate(lines):
+        cells = _cells(line, delimiter)
+        if _is_data(cells, decimal) and (not run or len(cells) == width):
+            start = start if run else number
+            run, width = run + 1, len(cells)
+            if run > best:
+                best, begin = run, start
+        elif line.strip():
+            run = 0
+            if _is_data(cells, decimal):
+                run, start, width = 1, number, len(cells)
+    return best, begin
+
+
+def _is_data(cells: list[bytes], decimal: str) -> bool:
+    if not cells or cells[0][:1] in (b"#", b"%", b"/"):
+        return False
+    numbers = sum(_is_number(cell, decimal) for cell in cells)
+    return (
+        numbers > 0 and numbers >= 0.5 * len(cells) and (_is_number(cells[0], decimal) or bool(_CLOCK.match(cells[0])))
+    )
+
+
+def _is_number(cell: bytes, decimal: str) -> bool:
+    bare = cell.strip().strip(b'"').strip()
+    if bare.lower() in _MISSING:
+        return bare != b""
+    if decimal == ",":
+        if b"." in bare:
+            return False
+        bare = bare.replace(b",", b".")
+    try:
+        float(bare)
+    except ValueError:
+        return False
+    return True
+
+
+def _cells(line: bytes, delimiter: str) -> list[bytes]:
+    return line.split() if delimiter == "whitespace" else line.split(DELIMITERS[delimiter])
+
+
+def _named(line: bytes, delimiter: str) -> list[str]:
+    bare = (
+        line.decode("utf-8-sig", "replace").lstrip("#% \t")
+        if line[:1] in (b"#", b"%")
+        else line.decode("utf-8-sig", "replace")
+    )
+    cells = bare.split() if delimiter == "whitespace" else bare.split(DELIMITERS[delimiter].decode())
+    return [cell.strip().strip('"').strip() for cell in cells]
+
+
+def _names_at(lines: list[bytes], begin: int, delimiter: str, width: int) -> int | None:
+    """Find the line of names right before the data; blank lines may lie between."""
+    at = begin - 1
+    while at >= 0 and not lines[at].strip():
+        at -= 1
+    if at < 0:
+        return None
+    names = _named(lines[at], delimiter)
+    while names and not names[-1]:
+        names.pop()
+    words = sum(not _is_number(name.encode(), ".") for name in names)
+    return at if len(names) in (width, width - 1) and words > 0.5 * len(names) else None

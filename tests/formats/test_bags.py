@@ -1,0 +1,111 @@
+"""ROS 1 and ROS 2 bags of rosbags' writers read to the motion that was written, with both clocks."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+
+from bench_service.formats.errors import UnreadableFile
+from tests.formats.reading import RATES, TIMES_NS, proposed, read, require_motion
+from tests.formats.ros_files import LATE_NS, bag1, bag2
+
+PACKED1 = (None, Writer1.CompressionFormat.BZ2, Writer1.CompressionFormat.LZ4)
+
+
+@pytest.fixture(scope="module")
+def mcap(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    return bag2(tmp_path_factory.mktemp("bag") / "mcap", StoragePlugin.MCAP)
+
+
+@pytest.fixture(scope="module")
+def database(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    return bag2(tmp_path_factory.mktemp("bag") / "db", StoragePlugin.SQLITE3)
+
+
+def test_an_mcap(mcap: bytes) -> None:
+    proposal, recording = require_motion(mcap, 0.0)
+    assert (proposal.format, proposal.table) == ("mcap", "/imu/data")
+    assert [c.column for c in proposal.clocks] == ["header.stamp", "log_time", "publish_time"]
+    assert proposal.description["time_column"] == "header.stamp"
+    assert recording.source["second_clock"]["column"] == "log_time"
+    assert {t.name for t in proposal.tables} == {"/imu/data", "/temperature"}
+    assert proposal.unknown == []
+
+
+def test_a_database(database: bytes) -> None:
+    proposal, _ = require_motion(database, 0.0)
+    assert (proposal.format, proposal.table) == ("rosbag2", "/imu/data")
+    assert [c.column for c in proposal.clocks] == ["header.stamp", "log_time"]
+
+
+@pytest.mark.parametrize("packed", PACKED1)
+def test_a_bag_of_ros_1(tmp_path: Path, packed: Writer1.CompressionFormat | None) -> None:
+    proposal, _ = require_motion(bag1(tmp_path / "one.bag", packed), 0.0)
+    assert proposal.format == "rosbag1"
+
+
+def test_stamps_are_those_of_sender_and_recorder(mcap: bytes, database: bytes) -> None:
+    for data in (mcap, database):
+        description = proposed(data).description
+        by_recorder = {**description, "time_column": "log_time", "second_time_column": None}
+        for asked, late in ((description, 0), (by_recorder, LATE_NS)):
+            recording, _ = read(data, asked)
+            assert recording.rate_hz == pytest.approx(200.0, rel=1e-9)
+            assert recording.source["clock"]["lost_samples"] == 0
+            assert late in (0, LATE_NS)
+    assert TIMES_NS[1] - TIMES_NS[0] == 5_000_000
+
+
+def test_messages_whose_frame_changes_are_read_all_the_same(tmp_path: Path) -> None:
+    """A longer frame_id moves every field; runs of one layout are decoded apart and stay in order."""
+    data = bag2(tmp_path / "b", StoragePlugin.MCAP, frames=lambda row: "imu" if row % 7 else "a_longer_frame")
+    require_motion(data, 0.0)
+
+
+def test_another_topic_by_its_name(mcap: bytes) -> None:
+    proposal = proposed(mcap, table="/temperature")
+    assert [c.channel for c in proposal.columns] == ["temperature"]
+    assert proposal.columns[0].mean == pytest.approx(25.0 + 250.0)
+    with pytest.raises(UnreadableFile, match=r"there is no table '/imu'; it has /temperature, /imu/data"):
+        proposed(mcap, table="/imu")
+
+
+def test_a_cut_bag_is_read_as_far_as_it_goes_and_says_so(tmp_path: Path) -> None:
+    data = bag1(tmp_path / "one.bag", None, chunk_bytes=20_000)
+    cut = data[: len(data) * 2 // 3]
+    proposal = proposed(cut)
+    assert any("is cut off in the record at byte" in words for words in proposal.suspicious)
+    recording, values = read(cut, proposal.description)
+    assert 200 < recording.count < 500
+    np.testing.assert_array_equal(values[:, :3], RATES[: recording.count])
+    assert any("cut off in the record at byte" in words for words in recording.source["warnings"])
+
+
+def test_an_mcap_that_is_cut_in_its_only_chunk_says_so(mcap: bytes) -> None:
+    with pytest.raises(UnreadableFile, match=r"no table of samples; the file is cut off in the record at byte \d+"):
+        proposed(mcap[: len(mcap) * 2 // 3])
+
+
+def test_mutated_bags_are_refused_with_the_place(mcap: bytes, database: bytes, tmp_path: Path) -> None:
+    with pytest.raises(UnreadableFile, match="byte 8 begins no header record of an MCAP"):
+        proposed(mcap[:8] + b"\x09" + mcap[9:])
+    with pytest.raises(UnreadableFile, match=r"the database cannot be read|cannot be read as an SQLite database"):
+        read(database[: len(database) // 2], proposed(database).description)
+    with pytest.raises(UnreadableFile, match="is an SQLite database but no ROS 2 bag"):
+        proposed(_other_database(tmp_path / "other.db"))
+    bag = bag1(tmp_path / "one.bag", None)
+    with pytest.raises(UnreadableFile, match=r"is a bag of #ROSBAG V1.2; version 2.0 is read"):
+        proposed(b"#ROSBAG V1.2\n" + bag[13:])
+    with pytest.raises(UnreadableFile, match="byte 13 begins no record of a bag"):
+        proposed(bag[:13] + b"\xff" * 8 + bag[21:])
+
+
+def _other_database(path: Path) -> bytes:
+    import sqlite3
+
+    with sqlite3.connect(path) as database:
+        database.execute("CREATE TABLE things (name TEXT)")
+    database.close()
+    return path.read_bytes()
