@@ -84,4 +84,4 @@ foreign: $(addprefix .foreign/,$(addsuffix /.ready,$(FOREIGN)))  ## environments
 	@touch $@
 
 clean:  ## remove the environment and the demo's data
-	rm -rf $(VENV) .foreign .venv-audit .bench
+	rm -rf $(VENV) .venv-audit .foreign .bench

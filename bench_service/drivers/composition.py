@@ -3,7 +3,9 @@
 Light imports: simulators and drivers are loaded where they are used.
 """
 
+from functools import lru_cache, partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bench_service.bench.devices import BenchDevices
 from bench_service.bench.driver import BenchDriver
@@ -12,6 +14,9 @@ from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredDevices
 from bench_service.model.errors import Misconfigured
 from bench_service.settings import Settings
+
+if TYPE_CHECKING:
+    from bench_service.drivers.bench_file.document import BenchFile
 
 
 def driver_of(settings: Settings, asking: Asking) -> BenchDriver:
@@ -41,7 +46,8 @@ def driver_of(settings: Settings, asking: Asking) -> BenchDriver:
 def devices_of(folder: Path, bench_id: str, bench_file: Path | None = None) -> BenchDevices:
     """The devices of a bench on this host: by a bench file, given or remembered by their register; else simulated.
 
-    Raises `Misconfigured` for a bench file that cannot be used.
+    Their state can be read whatever becomes of the file. It is read when the devices are first commanded or compared,
+    and kept: a change of it holds from the process's next start.
     """
     register = DeviceRegister(folder, bench_id)
     if bench_file is None:
@@ -49,15 +55,23 @@ def devices_of(folder: Path, bench_id: str, bench_file: Path | None = None) -> B
         if state is None or not state.bench_file:
             return RegisteredDevices(register)
         bench_file = Path(state.bench_file)
-    from bench_service.drivers.bench_file.document import read_bench_file
     from bench_service.drivers.wired.devices import WiredDevices
 
-    file = read_bench_file(bench_file)
-    return WiredDevices(file, register) if file.id == bench_id else RegisteredDevices(register)
+    return WiredDevices(partial(_kept, bench_file.absolute()), register)
+
+
+@lru_cache(maxsize=16)
+def _kept(path: Path) -> "BenchFile":
+    """A bench file as this process read it first. One that cannot be read is tried again."""
+    from bench_service.drivers.bench_file.document import read_bench_file
+
+    return read_bench_file(path)
 
 
 def own_devices(settings: Settings) -> BenchDevices:
-    """The devices of the settings' own bench."""
+    """The devices of the settings' own bench. Raises `Misconfigured` for a bench file that cannot be used."""
+    if settings.bench_file is not None:
+        _require_id(_kept(settings.bench_file.absolute()).id, settings)
     return devices_of(settings.devices_in(), settings.bench_id, settings.bench_file)
 
 

@@ -120,13 +120,8 @@ def _make_safe(folder: Path, bench: str) -> tuple[bool, str]:
     """Make safe over the devices' own link, where no other process has it; numerics are loaded here, and only here."""
     from bench_service.bench.make_safe import over_new_link
     from bench_service.drivers.composition import devices_of
-    from bench_service.model.errors import Misconfigured
 
-    try:
-        devices = devices_of(folder, bench)
-    except Misconfigured as error:
-        return False, f"bench {bench}: {error}"
-    obstacle = over_new_link(devices, f"bench stop by {_person()}")
+    obstacle = over_new_link(devices_of(folder, bench), f"bench stop by {_person()}")
     return obstacle is None, "" if obstacle is None else f"bench {bench}: {obstacle}"
 
 

@@ -19,6 +19,7 @@ from bench_service.drivers.registered import SAFE as SAFE_STATE
 from bench_service.drivers.wired.opening import SAFE, context_of, opened, survey
 from bench_service.drivers.wired.parallel import in_parallel, named
 from bench_service.drivers.wired.read_back import as_read, differences
+from bench_service.model.errors import Misconfigured
 from procedures.bench import SAFE_ORDER
 from procedures.bench.errors import BenchError, DeviceBusy, DeviceFault
 
@@ -47,9 +48,21 @@ def safe_state(kind: str, section: DeviceSection | None, state: DeviceState) -> 
 class WiredDevices:
     """The devices of a bench file on this host."""
 
-    def __init__(self, file: BenchFile, register: DeviceRegister) -> None:
-        self._file = file
+    def __init__(self, read: Callable[[], BenchFile], register: DeviceRegister) -> None:
+        """Set up; `read`: returns the bench file, or raises `Misconfigured`, when devices are first reached."""
+        self._read = read
         self._register = register
+
+    @property
+    def _file(self) -> BenchFile:
+        """The bench file. Raises `BenchError` where it cannot be used."""
+        try:
+            file = self._read()
+        except Misconfigured as error:
+            raise BenchError(f"the devices are real, and cannot be reached: {error}") from error
+        if file.id != self._register.bench_id:
+            raise BenchError(f"{file.path} is of bench {file.id!r}, and these devices of {self._register.bench_id!r}")
+        return file
 
     def device_state(self) -> DeviceState | None:
         """Read the register; asks no device."""
@@ -57,8 +70,8 @@ class WiredDevices:
 
     def compare(self, by: str) -> tuple[str, ...]:
         """Compare the real devices with the register, which then takes over what they say; see the port."""
-        state = self._register.read()
-        kinds: list[Kind] = [kind for kind in SAFE if kind in self._file.real()]
+        state, file = self._register.read(), self._file
+        kinds: list[Kind] = [kind for kind in SAFE if kind in file.real()]
         if state is None or not kinds:
             return ()
         try:
@@ -66,8 +79,8 @@ class WiredDevices:
         except DeviceBusy:
             return ()
         try:
-            readings = survey(self._file, kinds).readings
-            found = differences(link.state, readings, described(self._file, None))
+            readings = survey(file, kinds).readings
+            found = differences(link.state, readings, described(file, None))
             if found:
                 link.note("bench.compared", {"differences": found}, **as_read(readings))
             return found
@@ -82,9 +95,10 @@ class WiredDevices:
         state = self._register.read()
         if state is not None and state.safe:
             return state
+        file = self._file
         link = self._register.open(by, None if state is None else state.job)
         try:
-            failures = self._make_safe(link, unsafe_devices(state))
+            failures = self._make_safe(file, link, unsafe_devices(state))
             fault = "; ".join(map(str, failures))
             link.note(f"bench.make_safe.{'failed' if fault else 'done'}", {}, fault=fault)
             if failures:
@@ -93,14 +107,14 @@ class WiredDevices:
         finally:
             link.close()
 
-    def _make_safe(self, link: DeviceLink, unsafe: frozenset[str]) -> list[Exception]:
+    def _make_safe(self, file: BenchFile, link: DeviceLink, unsafe: frozenset[str]) -> list[Exception]:
         """Make devices safe; simulated ones, of a process that is gone, are safe with it."""
-        real = self._file.real()
+        real = file.real()
         for device in SAFE_ORDER:
             if device in unsafe and device not in real:
                 link.note(f"{device}.make_safe", {}, **SAFE_STATE[device](link.state))
         kinds: list[Kind] = [kind for kind in SAFE if kind in unsafe and kind in real]
-        devices = opened(self._file, kinds, context_of(self._file))
+        devices = opened(file, kinds, context_of(file))
         work: dict[Kind, Callable[[], Coroutine[Any, Any, None]]] = {
             kind: partial(_led_to_safety, device) for kind, device in devices.items()
         }

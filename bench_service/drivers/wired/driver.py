@@ -71,7 +71,7 @@ class BenchFileDriver:
         self._asking = asking
         self._units = read_units(file.folder / "units")
         self._found: dict[Kind, Found] = {}
-        self._devices = WiredDevices(file, register)
+        self._devices = WiredDevices(lambda: file, register)
         self._description = described(file, simulated.description)
         for kind, failure in self._look().items():
             log.warning("bench %s: the %s is not reached: %s", file.id, named(kind), failure)
