@@ -271,8 +271,8 @@ CASES: dict[str, tuple[str, str, Callable[[Path, int], Path], Job]] = {
 
 def cdr_ratio(rows: int) -> float:
     """Time of rosbags' generic decoding of CDR over that of ours, messages in memory."""
-    from bench_service.formats.logs.ros_messages import Decoder, Topic
-    from bench_service.formats.logs.ros_types import distribution
+    from bench_service.formats.logs.ros.definitions import distribution
+    from bench_service.formats.logs.ros.messages import Decoder, Topic
     from tests.formats import ros_files
 
     messages = [data for _, data in _messages(rows, ros_files.ROS2, ros1=False)]
