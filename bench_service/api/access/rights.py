@@ -36,6 +36,7 @@ RIGHTS: dict[str, Right] = {
     "analyse_again": Right.ENGINEER,
     "run_method": Right.ENGINEER,
     "import_recording": Right.ENGINEER,
+    "describe_file": Right.ENGINEER,
     "declare_unit": Right.ENGINEER,
     "choose_correction": Right.ENGINEER,
     "enter_calibration": Right.ENGINEER,
