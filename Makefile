@@ -2,11 +2,13 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := calibration multi_position allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit
+VALIDATIONS := calibration multi_position allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit access
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners formats)
 
+COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
+
 .DEFAULT_GOAL := help
-.PHONY: help run test bench chaos format check validate rights lock clean
+.PHONY: help run test browser bench chaos soak format check validate rights lock audit images clean
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -25,8 +27,19 @@ run: $(VENV)/.ready  ## calibrate and verify the simulated unit, then keep servi
 test: $(VENV)/.ready  ## the whole test suite
 	@$(BIN)/python -m pytest -n 2 --dist worksteal --durations=40 --durations-min=1
 
+$(VENV)/.browser: .ci/browser.lock $(VENV)/.ready
+	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --require-hashes -r .ci/browser.lock
+	@touch $@
+
+browser: $(VENV)/.browser  ## the pages in a real Chromium, installed first where it is missing
+	@$(BIN)/python -m tests.browser.chromium; case $$? in 0) ;; 3) exit 0;; *) exit 1;; esac; \
+	$(BIN)/python -m pytest tests/browser --browser -n 2 --dist loadfile
+
 chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books; press stop while something is in its way
 	@kept=0; $(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both || kept=1; $(BIN)/python -m tests.chaos.stop_matrix --runs 5 || kept=1; exit $$kept
+
+soak: $(VENV)/.ready  ## mixed load for MINUTES (60): memory, descriptors, threads and logs must stay level
+	@$(BIN)/python -m tests.soak --minutes $(or $(MINUTES),60)
 
 format: $(VENV)/.ready  ## format the code, put imports in order, mend what ruff can mend safely
 	@$(BIN)/ruff check --fix-only --quiet . ; $(BIN)/ruff format --quiet .
@@ -40,11 +53,26 @@ validate: $(VENV)/.ready  ## Monte Carlo against theory over 1000 simulated unit
 bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 	@kept=0; for part in $(BENCHMARKS); do $(BIN)/python -m $$part || kept=1; done; exit $$kept
 
+lock: $(VENV)/.ready  ## compile requirements.lock anew, with its part for run time and the tools of the audit
+	@$(COMPILE) --extra dev --extra formats pyproject.toml -o requirements.lock
+	@$(COMPILE) --extra formats -c requirements.lock pyproject.toml -o .ci/runtime.lock
+	@$(COMPILE) --extra dev --extra formats --extra browser -c requirements.lock pyproject.toml -o .ci/browser.lock
+	@$(COMPILE) .ci/audit.in -o .ci/audit.lock
+
+.venv-audit/.ready: .ci/audit.lock $(VENV)/.ready
+	@test -x .venv-audit/bin/python || $(PYTHON) -m venv .venv-audit
+	@VIRTUAL_ENV=$(CURDIR)/.venv-audit $(BIN)/uv pip install --quiet --require-hashes -r .ci/audit.lock
+	@touch $@
+
+audit: .venv-audit/.ready  ## licences and bill of materials into build/, and known vulnerabilities where an index answers
+	@$(BIN)/python .ci/audit.py --tools .venv-audit/bin
+
+images: $(VENV)/.ready  ## pin the images of docker-compose.yml by digest and build, where a container engine is
+	@$(BIN)/python .ci/images.py
+
 rights: $(VENV)/.ready  ## write docs/rights.md anew, from the routes and their rights
 	@$(BIN)/python -m tests.kit.rights_page
 
-lock: $(VENV)/.ready  ## compile requirements.lock anew
-	@$(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header --extra dev --extra formats pyproject.toml -o requirements.lock
 
 clean:  ## remove the environment and the demo's data
-	rm -rf $(VENV) .bench
+	rm -rf $(VENV) .venv-audit .bench

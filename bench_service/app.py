@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncGenerator, Callable
 from contextlib import ExitStack, asynccontextmanager
+from datetime import timedelta
 from functools import partial
 from importlib.metadata import version
 
@@ -10,13 +11,26 @@ from fastapi import Depends, FastAPI
 from starlette.concurrency import run_in_threadpool
 from threadpoolctl import threadpool_limits
 
-from bench_service.api import audit, audit_chain, health, metrics, procedures, recordings, reservations, results, trends
+from bench_service.api import (
+    audit,
+    audit_chain,
+    database,
+    health,
+    metrics,
+    procedures,
+    recordings,
+    reservations,
+    results,
+    trends,
+)
 from bench_service.api.access import guard, identify
 from bench_service.api.access import routes as access
 from bench_service.api.benches import routes as benches
 from bench_service.api.campaigns import routes as campaigns
 from bench_service.api.campaigns import schedules
-from bench_service.api.http import bodies, door, errors, headers, queries, request_id, transfer
+from bench_service.api.feed import news
+from bench_service.api.feed import routes as feed
+from bench_service.api.http import bodies, door, endings, errors, headers, queries, request_id, transfer
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs import routes as jobs
 from bench_service.api.openapi import document
@@ -43,16 +57,30 @@ from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.worker import Worker
-from bench_service.pages import access_pages, campaign_pages, docs, figures, images, static_files
+from bench_service.notifications.opening import open_notifier
+from bench_service.pages import (
+    access_pages,
+    campaign_pages,
+    console_pages,
+    docs,
+    figures,
+    images,
+    languages,
+    static_files,
+    stop_pages,
+)
 from bench_service.pages import routes as pages
 from bench_service.pages.drawing_process import open_drawing
-from bench_service.persistence import BenchLease, acquire_lease, engine_database, lease_holder, open_stores
+from bench_service.pages.errors import ErrorPages
+from bench_service.persistence import BenchLease, Database, acquire_lease, engine_database, lease_holder, open_stores
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.database import as_storage_error
 from bench_service.persistence.evidence.analysis_run import open_run
-from bench_service.service import BenchService
+from bench_service.persistence.upkeep.contents import DatabaseContents
+from bench_service.service import LEAST_FREE_BYTES, BenchService
 from bench_service.settings import Settings
+from bench_service.telemetry.audit_retention import AuditRetention
 from bench_service.telemetry.code_version import code_version
 from bench_service.telemetry.tracing import traces_to
 
@@ -74,11 +102,13 @@ ROUTERS = (
     schedules,
     access,
     audit,
+    database,
     audit_chain,
     health,
     metrics,
+    feed,
 )
-PAGES = (static_files, docs, access_pages, images, pages, campaign_pages)
+PAGES = (static_files, languages, docs, access_pages, images, stop_pages, console_pages, pages, campaign_pages)
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apart: bool = False) -> BenchService:
@@ -91,10 +121,10 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     files = BenchFiles(settings)
     rescued = files.rescue() if drive else None
     threadpool_limits(1)  # the matrices have at most 72 rows: BLAS threads would only spin against the bench's own
-    stores, database = open_stores(settings.database_url)
-    closing.callback(database.dispose)
+    stores, opened = open_stores(settings.database_url, settings.copies_in())
+    closing.callback(opened.dispose)
     driver = _driver(settings, partial(AskedOperator, stores.prompts)) if drive else None
-    holder = partial(lease_holder, database, settings.database_url)
+    holder = partial(lease_holder, opened, settings.database_url)
     planner = Planner(
         stores.units,
         BenchDirectory(stores.benches, stores.units, driver, settings.bench_id, drawn_unit, holder),
@@ -122,27 +152,56 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         guard.begin()
         closing.callback(guard.end)
         closing.callback(files.keep_books(stores).end)
+        if settings.notify is not None:
+            closing.callback(open_notifier(settings, stores, database.free_bytes, LEAST_FREE_BYTES).end)
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
-    addresses = StopAddresses(SqlStopAddresses(database).all, settings.stop_secret_in())
-    addresses.begin()
-    closing.callback(addresses.end)
-    roads = StopRoads(settings.devices_in(), addresses.road, addresses.host)
-    processes = WorkProcesses(open_run, settings.database_url, code) if apart else None
-    if processes is not None:
-        drawing = WorkProcesses(open_drawing, at_once=1, waiting=DRAWINGS)
-        figures.draw_in(drawing)
-        for undo in (processes.close, drawing.close, partial(figures.draw_in, None)):
-            closing.callback(undo)
+    roads = _roads(settings, opened, closing)
+    processes = _work_apart(settings, code, closing) if apart else None
+    whole = DatabaseContents(opened), settings.scrub_at
     service = BenchService(
-        stores, driver, planner, worker, code, safety, board, database.free_bytes, traces, roads, rescued, processes
+        stores,
+        driver,
+        planner,
+        worker,
+        code,
+        safety,
+        board,
+        opened.free_bytes,
+        traces,
+        roads,
+        rescued,
+        processes,
+        *whole,
     )
+    if settings.audit_days is not None:
+        retention = AuditRetention(stores.audit, timedelta(days=settings.audit_days))
+        retention.begin()
+        closing.callback(retention.end)
     service.access.book.begin()
     closing.callback(service.access.book.end)
     closing.callback(service.stop)
     service.register()
     return service
+
+
+def _roads(settings: Settings, opened: Database, closing: ExitStack) -> StopRoads:
+    """The ways of a stop to the benches of this host and of others."""
+    addresses = StopAddresses(SqlStopAddresses(opened).all, settings.stop_secret_in())
+    addresses.begin()
+    closing.callback(addresses.end)
+    return StopRoads(settings.devices_in(), addresses.road, addresses.host)
+
+
+def _work_apart(settings: Settings, code: str, closing: ExitStack) -> WorkProcesses:
+    """Processes for analyses; figures are drawn in another one from now on."""
+    processes = WorkProcesses(open_run, settings.database_url, code)
+    drawing = WorkProcesses(open_drawing, at_once=1, waiting=DRAWINGS)
+    figures.draw_in(drawing)
+    for undo in (processes.close, drawing.close, partial(figures.draw_in, None)):
+        closing.callback(undo)
+    return processes
 
 
 def _devices(settings: Settings, bench_id: str) -> BenchDevices:
@@ -206,6 +265,7 @@ def create_app(
     )
     app.state.service = service
     app.state.hub = EventHub(service.stores.jobs, service.live, event_stream.FRAMES)
+    app.state.news = news.NewsDesk(service)
     app.state.max_import_bytes = max_import_bytes
     app.state.import_threads = CapacityLimiter(IMPORT_THREADS)
     for module in ROUTERS:
@@ -216,10 +276,12 @@ def create_app(
     transfer.install(app)
     app.add_middleware(bodies.Bounded)
     errors.install(app)
+    endings.install(app)
     app.add_middleware(identify.Identified, rules=identify.Identification(rules, service.access.book, proxies))
     app.add_middleware(door.Doorkeeper, door=rules)
     metrics.install(app, service)
     app.add_middleware(audit.Audited, trail=service.stores.audit)
+    app.add_middleware(ErrorPages)
     app.add_middleware(headers.SecurityHeaders)
     app.add_middleware(request_id.RequestId)
     service.traces.instrument(app)

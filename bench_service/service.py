@@ -1,5 +1,6 @@
 """One service of a process: the services of each noun, and its life from registration to its end."""
 
+import logging
 from collections.abc import Callable, Sequence
 
 from bench_service.access.book import AccessBook
@@ -7,6 +8,7 @@ from bench_service.access.service import AccessService
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import LiveBoard
 from bench_service.bench.make_safe import Rescue
+from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.safety import SafetyService
 from bench_service.bench.stop.road import StopRoads
 from bench_service.campaigns.service import CampaignService
@@ -14,7 +16,9 @@ from bench_service.campaigns.stores import Stores
 from bench_service.evidence.analyses import AnalysisService
 from bench_service.evidence.imports import ImportService
 from bench_service.evidence.units import register
+from bench_service.evidence.upkeep import NightlyScrub, UpkeepService
 from bench_service.evidence.work_processes import WorkProcesses
+from bench_service.jobs.history import is_empty, missing_history
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue_service import QueueService
 from bench_service.jobs.service import JobService
@@ -23,7 +27,9 @@ from bench_service.jobs.worker import Worker
 from bench_service.model.errors import NotDriving, NotReady
 from bench_service.model.records import reasons_of
 from bench_service.telemetry.tracing import Traces
+from bench_service.telemetry.upkeep import DatabasePort, NoDatabase
 
+log = logging.getLogger(__name__)
 LEAST_FREE_BYTES = 200_000_000
 """Free bytes on the database's disk below which the service is not ready: an hour of samples is about 17 MB."""
 
@@ -45,12 +51,15 @@ class BenchService:
         roads: StopRoads | None = None,
         rescued: Rescue | None = None,
         processes: WorkProcesses | None = None,
+        database: DatabasePort | None = None,
+        scrub_at: str = "",
     ) -> None:
         """Set up with `driver` of this process's own bench; None: it plans and queues for benches that workers drive.
 
         `free_bytes`: room on the database's disk, where that is known. `roads`: the ways of a stop to its bench; None:
         through the database alone. `rescued`: the result of making devices safe at start. `processes`: where
-        analyses are computed; None: in the caller's thread.
+        analyses are computed; None: in the caller's thread. `database`: the database as a whole; None: not known.
+        `scrub_at`: the time of the nightly check, "HH:MM"; empty: none.
         """
         self.access = AccessService(stores.access, AccessBook(stores.access))
         self.safety = safety
@@ -72,6 +81,10 @@ class BenchService:
         self._worker = worker
         self._free_bytes = free_bytes
         self._rescued = rescued
+        self.upkeep = UpkeepService(stores, database or NoDatabase(), f"the service, {ProcessIdentity.own()}")
+        self._missing = ""
+        """The sentence on a history that the devices remember and the database does not; empty: there is none."""
+        self._nightly = NightlyScrub(self.upkeep, scrub_at)
 
     def register(self) -> None:
         """Register the bench and its units, and discard orphaned imports."""
@@ -83,6 +96,9 @@ class BenchService:
             register(self.stores.units, unit)
         self.stores.benches.put_bench(self._driver.description, [unit.serial for unit in mounted])
         if self._worker is not None:
+            self._missing = missing_history(self.safety.known(self._driver.description.id).devices, self.stores.jobs)
+            if self._missing:
+                log.warning("bench %s: %s", self._driver.description.id, self._missing)
             self.safety.at_start(self._driver.description.id, self._rescued)
 
     def begin(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
@@ -93,6 +109,7 @@ class BenchService:
         if self._worker is not None:
             self._worker.begin([lambda: (self.catalogue.procedures, self.catalogue.methods), *warm_up])
             self.campaigns.conductor.begin()
+            self._nightly.begin()
 
     def at_failed_start(self, then: Callable[[], object]) -> None:
         """Have `then` called where the job engine does not start. To be called before `begin`."""
@@ -115,7 +132,7 @@ class BenchService:
         every reason, `StorageFailure` where the database does not answer.
         """
         self.stores.jobs.counts()
-        reasons: list[str] = []
+        reasons = list(self.upkeep.troubles())
         free = self._free_bytes()
         if free is not None and free < LEAST_FREE_BYTES:
             reasons.append(f"the disk is nearly full: {free} bytes are free, {LEAST_FREE_BYTES} are needed")
@@ -125,10 +142,13 @@ class BenchService:
             raise NotReady(reasons)
         standing = ((bench, self.stores.benches.standing_stops(bench)) for bench in self.benches.ids())
         stopped = (f"bench {bench} is stopped: {reasons_of(stops)}" for bench, stops in standing if stops)
-        return (*stopped, *self.catalogue.notes())
+        self._missing = self._missing if self._missing and is_empty(self.stores.jobs) else ""
+        missing = (self._missing,) if self._missing else ()
+        return (*stopped, *missing, *self.catalogue.notes(), *self.upkeep.notes())
 
     def stop(self) -> None:
         """End the service: the running job is left for the next start, and the bench made safe."""
+        self._nightly.end()
         self.campaigns.conductor.stop()
         if self._worker is not None:
             self._worker.shut_down()

@@ -69,6 +69,12 @@ class Settings(BaseModel):
     """Folder where a simulated bench's devices keep their state; None: with the SQLite file, in .bench/ for Postgres.
 
     A folder of the bench's own host, the same for every process of that bench."""
+    backup_folder: Path | None = None
+    """Folder for the copy that is made before a newer version changes the database's tables; None: next to an SQLite
+    file, in the device folder for Postgres."""
+    scrub_at: str = Field("03:30", pattern=r"^(|([01][0-9]|2[0-3]):[0-5][0-9])$")
+    """Time of day, on this host's clock, of the nightly check of the database by a process that drives a bench; empty:
+    none."""
     stop_listen: str = Field("127.0.0.1:0", pattern=r"^(|\S+:\d{1,5})$")
     """Address at which a bench's supervisor takes stops from other hosts, `host:port`, port 0 for any; empty: none.
 
@@ -85,14 +91,20 @@ class Settings(BaseModel):
     """True where `bench serve` drives its bench; false: an API alone, for benches that workers drive."""
     retry_scale: float = Field(1.0, gt=0, le=1)
     """Factor on the pauses before a retry after a fault of the bench (10 s, 30 s, 60 s, …)."""
+    audit_days: float | None = Field(None, ge=1)
+    """Retention of the audit trail [d]: older entries are removed, and leave a checkpoint; None: all are kept."""
     log: Literal["text", "json"] = "text"
     """Format of the log's lines."""
     log_level: Literal["debug", "info", "warning", "error"] | None = None
     """Lowest level that is logged; None: info for a service, warning for a command that works in this process."""
+    log_file: Path | None = None
+    """File for the log's lines, begun anew at 10 MB, with the five before it kept; None: standard error."""
     log_access: bool = False
     """True where every request is a line of the log."""
     traces_url: str | None = Field(None, pattern=r"^https?://\S+$")
     """Address for traces (OTLP over HTTP, protobuf); None: none, unless OTEL_EXPORTER_OTLP_ENDPOINT gives one."""
+    notify: Path | None = None
+    """TOML file of mail servers and webhooks that get messages (`docs/who-is-told.md`); None: nobody is told."""
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported [MB]."""
 
@@ -105,6 +117,12 @@ class Settings(BaseModel):
     def stop_secret_in(self) -> Path:
         """The file of the secret under which a stop goes to another host."""
         return self.stop_secret_file or self.devices_in() / "bench-stop.secret"
+
+    def copies_in(self) -> Path | None:
+        """The folder of copies made before a migration; None: next to the SQLite file."""
+        if self.backup_folder is not None or self.database_url.startswith("sqlite"):
+            return self.backup_folder
+        return self.devices_in()
 
     def token(self) -> str | None:
         """The token of `token_file`; None where the settings name none. Raises `BadSettings`."""

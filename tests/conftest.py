@@ -15,10 +15,28 @@ import sqlalchemy as sa
 from hypothesis import settings
 
 from bench_service.persistence import open_stores
+from tests.browser.chromium import missing
 from tests.shared_data import SHARED_DATA
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--browser", action="store_true", help="run the pages in Chromium, too (make browser)")
+    parser.addoption("--pictures", metavar="FOLDER", help="keep a picture of each page in each dress there")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    left_out = collection_path.name == "browser" and not config.getoption("--browser")
+    return True if left_out else None
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    if not config.getoption("--browser"):
+        lacks = missing()
+        why = f" ({lacks})" if lacks else ""
+        terminalreporter.write_line(f"left out: the pages in a real Chromium{why}; `make browser` runs them")
 
 
 @pytest.fixture(scope="session")

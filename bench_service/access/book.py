@@ -5,7 +5,8 @@ has it look at once. While the database is away the last state stands: a known s
 """
 
 import logging
-from concurrent.futures import Future
+from concurrent.futures import Future, InvalidStateError
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime, timedelta
 from threading import Event, Lock, Thread
@@ -126,7 +127,8 @@ class AccessBook:
             except Exception:  # a defect here must not leave requests waiting
                 log.exception("accounts and tokens could not be read")
             for each in waiting:
-                each.set_result(None)
+                with suppress(InvalidStateError):  # whoever waited has gone
+                    each.set_result(None)
 
     def _look(self, at_once: bool) -> None:
         if at_once or self._store.revision() != self._state.revision:

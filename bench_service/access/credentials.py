@@ -6,18 +6,15 @@ hash. A password has few bits: see `bench_service.access.passwords`.
 
 import hashlib
 import hmac
-import re
 import secrets
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 from bench_service.access.roles import Role
+from bench_service.telemetry.redaction import PREFIX
 
 NAME = r"^[a-z0-9][a-z0-9._@+-]{0,63}$"
 """Pattern of the names of accounts, tokens and teams: small letters, so that no two names look the same."""
-PREFIX = "bench_"
-"""Beginning of every token, by which a person or a scanner of files knows it."""
-_SECRET = re.compile(r"bench_[A-Za-z0-9_-]{43}")
 IDLE = timedelta(hours=12)
 """Time after which a session that is not used ends."""
 LONGEST = timedelta(days=7)
@@ -100,13 +97,3 @@ def digest_of(secret: str) -> str:
 def csrf_of(key: bytes, subject: str) -> str:
     """The value that the pages of a session repeat with each change: nobody can make it who cannot read a page."""
     return hmac.new(key, f"csrf:{subject}".encode(), "sha256").hexdigest()
-
-
-def names_token(text: str) -> bool:
-    """Return whether a text contains a token."""
-    return _SECRET.search(text) is not None
-
-
-def without_tokens(text: str) -> str:
-    """Replace every token in a text: for log lines and the audit trail."""
-    return _SECRET.sub(f"{PREFIX}[hidden]", text)

@@ -21,6 +21,12 @@ from bench_service.access.roles import RANK, Right, Role
 from bench_service.access.stores import AccessStore, Approval
 from bench_service.model.errors import IllegalTransition, LockedOut, NotAllowed, WrongPassword
 from bench_service.wall_clock import new_id, now
+from procedures.core.errors import BadParameter
+
+SERVICE_TOKEN = "service-token"
+"""Name of the program that has the token of `BENCH_TOKEN_FILE`."""
+RESERVED = (SERVICE_TOKEN, "retention", "local")
+"""Names in the audit trail that nobody else may have."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +94,7 @@ class AccessService:
 
     def add_account(self, name: str, role: Role, team: str, password: str | None, by: str) -> Account:
         """Add an account; the first one switches log-in on, and is an admin's. Raises `NameTaken`, `BadParameter`."""
+        _check_free(name)
         if password is not None:
             passwords.check_rule(name, password)
         account = Account(name, role, team, now(), by, password is not None)
@@ -116,7 +123,8 @@ class AccessService:
         self.book.read_again()
 
     def add_token(self, name: str, role: Role, team: str, lasting: timedelta, by: str) -> NewToken:
-        """Make a token. Raises `NameTaken`."""
+        """Make a token. Raises `NameTaken`, `BadParameter`."""
+        _check_free(name)
         secret, at = new_token(), now()
         token = AccessToken(new_id(), name, role, team, digest_of(secret), at, by, at + lasting)
         self._store.add_token(token)
@@ -175,6 +183,11 @@ class AccessService:
         if identity.proof is Proof.PROXY:
             return identity.credential in state.accounts
         return identity.proof is not Proof.NONE or not state.accounts
+
+
+def _check_free(name: str) -> None:
+    if name in RESERVED:
+        raise BadParameter("name", name, f"another name: the service itself signs as {', '.join(RESERVED)}")
 
 
 def require(identity: Identity, right: Right) -> None:

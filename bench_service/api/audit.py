@@ -11,16 +11,24 @@ from pydantic import BaseModel, Field
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from bench_service.access.credentials import without_tokens
 from bench_service.api.access.identify import found_of
 from bench_service.api.http.bodies import is_json
-from bench_service.api.http.dependencies import NO_CONTROL_CHARACTERS, REQUESTED_BY, WHO_LENGTH, After, Limit, Service
+from bench_service.api.http.dependencies import (
+    NO_CONTROL_CHARACTERS,
+    REQUESTED_BY,
+    WHO_LENGTH,
+    After,
+    Limit,
+    Service,
+    as_utf8,
+)
 from bench_service.api.http.errors import FieldError, problems, respond
 from bench_service.background import in_background
 from bench_service.formats.plain_json import faults, mended, shown
 from bench_service.mapping import copied
 from bench_service.telemetry.audit import AuditEntry, AuditTrail, record
 from bench_service.telemetry.log_context import request_id
+from bench_service.telemetry.redaction import without_tokens
 
 router = APIRouter(prefix="/api/v1/audit", tags=["audit"])
 
@@ -86,7 +94,7 @@ class Audited:
             await self._app(scope, receive, send)
             return
         request = Request(scope)
-        who = request.headers.get(REQUESTED_BY)
+        who = as_utf8(request.headers.get(REQUESTED_BY))
         if who is not None and not (0 < len(who) <= WHO_LENGTH and NO_CONTROL_CHARACTERS.match(who)):
             field = FieldError(field=REQUESTED_BY, message=f"1 … {WHO_LENGTH} characters, no control characters")
             await respond(request, 422, f"{field.field}: {field.message}", "Invalid", [field])(scope, receive, send)
@@ -136,15 +144,9 @@ class _Act:
 
     @property
     def who(self) -> str:
-        """The proved name; else the name that the client gives itself, or the address from which it asks."""
+        """The proved name; where nobody logs in the one that a client gives itself; else its address."""
         client = self.request.client
-        return self._proven()[0] or self._claimed or (client.host if client else "local")
-
-    def _proven(self) -> tuple[str | None, str]:
-        """The proved name and its proof, as far as there is one."""
-        found = found_of(self.request.scope)
-        identity = found.identity or found.stopper
-        return (None, "") if identity is None else (identity.proven_name, identity.proof.value)
+        return found_of(self.request.scope).name(self._claimed) or (client.host if client else "local")
 
     def body(self, message: Message) -> None:
         """Note a piece of the body that passes."""
@@ -156,11 +158,12 @@ class _Act:
     def detail(self) -> dict[str, Any]:
         """The request's details for the audit entry; never the contents of files, nor what could not be read back."""
         found: dict[str, Any] = {"request": request_id(), "path": shown(self.request.scope["path"])}
-        name, proof = self._proven()
-        if name is not None:
-            found["proof"] = proof
-            if self._claimed is not None and self._claimed != name:
-                found["claimed"] = self._claimed
+        sender = found_of(self.request.scope)
+        identity = sender.identity or sender.stopper
+        if identity is not None and identity.proven:
+            found["proof"] = identity.proof.value
+        if self._claimed not in (None, sender.name(self._claimed)):
+            found["claimed"] = self._claimed
         if self.request.url.query:
             found["query"] = self.request.url.query[:500]
         body = self._document()

@@ -65,6 +65,9 @@ class Snapshot(Collector):
         free = self._tallies.store.free_bytes()
         if free is not None:
             yield GaugeMetricFamily("bench_free_disk_bytes", "Room on the disk of the database's file", free)
+        yield GaugeMetricFamily(
+            "bench_database_bytes", "Size of the database", self._service.upkeep.size().stored_bytes
+        )
 
     def _jobs(self) -> Iterator[Metric]:
         tallies = self._tallies

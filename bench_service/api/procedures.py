@@ -10,14 +10,20 @@ from bench_service.api.http.dependencies import Service
 from bench_service.api.http.errors import Problem, problem_of, problems
 from bench_service.api.http.fields import NAME, Request
 from bench_service.api.http.status import status_of
+from bench_service.evidence.admission import Turns
 from bench_service.jobs.planning import Plan
 from bench_service.mapping import copied
 from bench_service.model.errors import ServiceError
+from bench_service.service import BenchService
 from procedures.core.errors import DomainError
 from procedures.core.recording import Station
 from procedures.procedure import Context, Method, Outcome, Parameters, PredictedUncertainty, Procedure
 
 router = APIRouter(prefix="/api/v1", tags=["procedures"])
+
+
+PREVIEWS = Turns("previews", at_once=4, waiting=60)
+"""Previews: a plan is worked out by this process's own interpreter, which also drives the bench."""
 
 
 class ProcedureView(BaseModel):
@@ -101,8 +107,12 @@ def read_procedure(name: str, service: Service) -> ProcedureView:
 
 
 @router.post("/procedures/{name}/preview", responses=problems(404, 413))
-def preview(name: str, request: PreviewRequest, service: Service) -> Preview:
+async def preview(name: str, request: PreviewRequest, service: Service) -> Preview:
     """Preview stations, duration, predicted uncertainties and warnings of a plan; violations of axis limits."""
+    return await PREVIEWS.run(_preview, name, request, service)
+
+
+def _preview(name: str, request: PreviewRequest, service: BenchService) -> Preview:
     plan = service.planner.plan(name, request.unit, request.parameters, request.bench)
     return _preview(name, request.unit, plan)
 

@@ -9,13 +9,17 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, Field, ValidationError
 
+from bench_service.api.http.admitted_stream import AdmittedStream, place_in_turn
 from bench_service.api.http.bodies import refuse_unfit
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.queries import Searched
+from bench_service.evidence.admission import Places
+from bench_service.evidence.recordings import require_undamaged
 from bench_service.formats.description import ImportDescription
-from bench_service.formats.export import ExportFormat, export, extract
+from bench_service.formats.export import ExportFormat, Extract, export, export_bytes, extract
 from bench_service.formats.import_file import ImportFile
+from bench_service.formats.overview import overview
 from bench_service.formats.plain_json import shown
 from bench_service.formats.proposal.model import Proposal
 from bench_service.mapping import copied
@@ -64,6 +68,8 @@ class RecordingPage(BaseModel):
     next: str | None
 
 
+EXPORTS = Places("exports", most=8, most_bytes=100_000_000)
+"""Exports at a time: each holds a chunk of samples and its form in the file."""
 BYTES = {"type": "string", "format": "binary"}
 DATA: dict[int | str, dict[str, object]] = {
     200: {
@@ -99,8 +105,8 @@ def read_recording(recording_id: str, service: Service) -> RecordingView:
     return RecordingView.of(stored, service.stores.results.of_recording(recording_id))
 
 
-@router.get("/{recording_id}/data", response_class=StreamingResponse, responses={**problems(404), **DATA})
-def read_data(
+@router.get("/{recording_id}/data", response_class=StreamingResponse, responses={**problems(404, 409), **DATA})
+async def read_data(
     recording_id: str,
     service: Service,
     form: Annotated[ExportFormat, Query(alias="format")] = ExportFormat.ARROW,
@@ -108,18 +114,84 @@ def read_data(
     start_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="From the first sample")] = None,
     stop_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="Not included")] = None,
 ) -> StreamingResponse:
-    """Stream the raw samples, whole or by channel and time; none are held in memory, however long the recording."""
-    recordings = service.stores.recordings
-    stored = recordings.get(recording_id)
+    """Stream the raw samples, whole or by channel and time; none are held in memory, however long the recording.
+
+    Refused with 409 where a stored sample of that part is damaged, and with 503 where too many others wait.
+    """
     names = None if channels is None else channels.split(",")
-    part = extract(stored.info, stored.dtype, names, start_s, stop_s)
+    part = await to_thread.run_sync(_part, service, recording_id, names, start_s, stop_s)
+    give_back = await place_in_turn(EXPORTS, export_bytes(form))
+    try:
+        stream = await to_thread.run_sync(_exported, service, part, form)
+    except BaseException:
+        give_back()
+        raise
+    stream.give_back = give_back
+    return stream
+
+
+def _part(
+    service: BenchService, recording_id: str, names: list[str] | None, start_s: float | None, stop_s: float | None
+) -> Extract:
+    stored = service.stores.recordings.get(recording_id)
+    return extract(stored.info, stored.dtype, names, start_s, stop_s)
+
+
+def _exported(service: BenchService, part: Extract, form: ExportFormat) -> AdmittedStream:
+    recordings, recording_id = service.stores.recordings, part.info.id
+    require_undamaged(recordings, recording_id, part.start, part.stop)
     blocks = recordings.read(recording_id, [c.name for c in part.info.channels], part.start, part.stop)
     file_name = f"{recording_id}.{form.value}"
-    return StreamingResponse(
+    return AdmittedStream(
         export(part, blocks, form),
         media_type=form.media_type,
         headers={"Content-Disposition": f'attachment; filename="{file_name}"'},
     )
+
+
+class OverviewChannel(BaseModel):
+    """One channel of an overview, one number for each bin."""
+
+    name: str
+    unit: str
+    minimum: list[float]
+    mean: list[float]
+    maximum: list[float]
+
+
+class OverviewView(BaseModel):
+    """A stretch of a recording as a plot needs it: values in nominal rate units, in bins of equal length."""
+
+    edges_s: list[float] = Field(description="Edges of the bins since the first sample, one more than there are bins")
+    channels: list[OverviewChannel]
+
+
+@router.get("/{recording_id}/overview", responses=problems(404))
+def read_overview(
+    recording_id: str,
+    service: Service,
+    channels: Annotated[str | None, Query(max_length=4000, description="Names, separated by commas")] = None,
+    start_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="From the first sample")] = None,
+    stop_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="Not included")] = None,
+    bins: Annotated[int, Query(ge=1, le=5000)] = 800,
+) -> OverviewView:
+    """Read least, mean and greatest values of a stretch in bins: what a plot needs, however long the recording."""
+    recordings = service.stores.recordings
+    stored = recordings.get(recording_id)
+    part = extract(stored.info, stored.dtype, None if channels is None else channels.split(","), start_s, stop_s)
+    blocks = recordings.read(recording_id, [c.name for c in part.info.channels], part.start, part.stop)
+    made = overview(part, blocks, bins)
+    shown = [
+        OverviewChannel(
+            name=channel.name,
+            unit=channel.rate_unit,
+            minimum=made.minimum[:, k].tolist(),
+            mean=made.mean[:, k].tolist(),
+            maximum=made.maximum[:, k].tolist(),
+        )
+        for k, channel in enumerate(part.info.channels)
+    ]
+    return OverviewView(edges_s=made.edges.tolist(), channels=shown)
 
 
 @router.post(

@@ -14,6 +14,7 @@ from bench_service.evidence.analyses import AnalysisRequest
 from bench_service.mapping import copied
 from bench_service.model.records import StoredResult
 from procedures.core.limits import Verdict
+from procedures.core.report import Figure, Table
 
 router = APIRouter(prefix="/api/v1", tags=["analyses"])
 
@@ -65,6 +66,20 @@ class ResultView(BaseModel):
         return copied(cls, result, lineage=Lineage.of(result), page=f"/results/{result.id}")
 
 
+class ReportSection(BaseModel):
+    """A section of a report: a table or a figure, the other is null."""
+
+    table: Table | None
+    figure: Figure | None
+
+
+class ReportView(BaseModel):
+    """A result as people read it, in the order in which they meet it."""
+
+    summary: str
+    sections: list[ReportSection]
+
+
 class ResultPage(BaseModel):
     """One page of results, newest first."""
 
@@ -100,6 +115,19 @@ def list_results(
     """List the results, newest first."""
     page = service.stores.results.list(unit=unit, name=name, search=search, after=after, limit=limit)
     return ResultPage(items=[ResultView.of(result) for result in page.items], next=page.next)
+
+
+@router.get("/results/{result_id}/report", responses=problems(404))
+def read_report(result_id: str, service: Service) -> ReportView:
+    """Read a result's report for people: its tables and figures as data."""
+    report = service.catalogue.report(service.stores.results.get(result_id))
+    sections = [
+        ReportSection(table=None, figure=section)
+        if isinstance(section, Figure)
+        else ReportSection(table=section, figure=None)
+        for section in report.sections
+    ]
+    return ReportView(summary=report.summary, sections=sections)
 
 
 @router.get("/results/{result_id}", responses=problems(404))

@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Protocol
 
 from bench_service.model.job import Job
-from bench_service.wall_clock import now, pause_async
+from bench_service.wall_clock import new_id, now, pause_async
 from procedures.bench import Operator
 from procedures.bench.errors import Stopped
 from procedures.core.table_angles import TableAngles
@@ -24,15 +24,29 @@ class Answer:
     by: str = ""
 
 
+@dataclass(frozen=True)
+class Prompt:
+    """A request to the person at the bench."""
+
+    id: str
+    text: str
+    at: datetime
+    angles_deg: tuple[float, float, float] | None = None
+    """Table angles of the wanted attitude, outer, middle, inner [deg]; None: it is about no attitude."""
+
+
 class PromptStore(Protocol):
     """One open request per job. Request and answer are events of the job too."""
 
-    def ask(self, job_id: str, text: str, at: datetime) -> None:
-        """Store a person's request; it replaces an earlier request of the job."""
+    def ask(self, job_id: str, prompt: Prompt) -> None:
+        """Store a request to a person; it replaces an earlier request of the job."""
         ...
 
-    def answer(self, job_id: str, answer: Answer, at: datetime) -> Job:
-        """Store the answer to the open request. Raises `IllegalTransition` where none is open, `NotFound`."""
+    def answer(self, job_id: str, prompt_id: str, answer: Answer, at: datetime) -> Job:
+        """Store the answer to a request.
+
+        Raises `IllegalTransition` where no request is open or another one than the answer names, `NotFound`.
+        """
         ...
 
     def answered(self, job_id: str) -> Answer | None:
@@ -57,7 +71,8 @@ class AskedOperator:
 
     async def set_by_hand(self, angles: TableAngles, request: str) -> None:
         """Send the request, and wait for the answer without a limit. Raises `Stopped` where the person refuses."""
-        self._prompts.ask(self._job_id, request, now())
+        wanted = (angles.outer_deg, angles.middle_deg, angles.inner_deg)
+        self._prompts.ask(self._job_id, Prompt(new_id(), request, now(), wanted))
         try:
             while (answer := self._prompts.answered(self._job_id)) is None:
                 await pause_async(LOOK_S)

@@ -29,7 +29,10 @@ class BenchRegistry(Protocol):
     def benches(self) -> tuple[BenchDescription, ...]: ...
 
     def stop_bench(self, stop: BenchStop) -> None:
-        """Add a stop to the bench. Repeated with the same id it changes nothing."""
+        """Add a stop to the bench. Repeated with the same id it changes nothing.
+
+        Raises `TooManyStops` where so many stand that one more is not stored.
+        """
         ...
 
     def stop_bench_once(self, stop: BenchStop) -> None:

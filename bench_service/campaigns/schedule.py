@@ -18,6 +18,9 @@ FIELDS = 5
 LOOK_BACK = timedelta(days=2)
 """Time back over which the latest missed start is searched first: of many missed starts the latest counts."""
 
+AHEAD = timedelta(hours=1)
+"""A clock that was set back by more than this was wrong before; by less, it was put right a little."""
+
 
 class Missed(StrEnum):
     """The rule for a start that was missed because no service was running."""
@@ -141,3 +144,18 @@ def latest_due(schedule: Schedule, at: datetime) -> datetime:
         if latest > schedule.next_at or begin == schedule.next_at:
             break
     return latest
+
+
+def brought_back(schedule: Schedule, at: datetime) -> datetime | None:
+    """The next start of a schedule whose clock was ahead when its present one was worked out; None where it was not.
+
+    While the clock runs on, the next start is always the first one after now. A later one was worked out by a clock
+    that was ahead. A start that was handled meanwhile is not repeated, and a clock that was set back by less than
+    `AHEAD` repeats nothing: then the schedule waits until the clock is there again.
+    """
+    if schedule.next_at is None or (schedule.last_at is not None and at < schedule.last_at <= at + AHEAD):
+        return None
+    first = next(
+        (start for start in starts_after(schedule.cron, schedule.time_zone, at) if start != schedule.last_at), None
+    )
+    return first if first is not None and first < schedule.next_at else None

@@ -4,26 +4,30 @@ At most one run starts however many starts were due, for the latest of them. It 
 it was planned; later than that it was missed, and the schedule's rule decides if one run makes up for it. While the
 schedule's previous run is open, its rule decides if the new one waits or is left out. The next start moves on in the
 transaction that stores the run, so of several processes one starts it. A clock that is set back repeats no start:
-a start that was handled is in the schedule's past.
+a start that was handled is in the schedule's past. A clock that was far ahead, and is right again, has moved the next
+start with it: that is seen within a minute, and the start brought back (`schedule.brought_back`).
 """
 
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
+from math import inf
 
 from bench_service.campaigns import transitions
 from bench_service.campaigns.campaign import Campaign
 from bench_service.campaigns.run import CampaignRun, RunRequest
-from bench_service.campaigns.schedule import Missed, Overlap, Schedule, latest_due, next_start
+from bench_service.campaigns.schedule import Missed, Overlap, Schedule, brought_back, latest_due, next_start
 from bench_service.campaigns.stores import Stores
 from bench_service.mapping import copied
 from bench_service.model.errors import IdempotencyConflict, NotFound, ServiceError, StorageFailure, StorageFull
 from bench_service.model.records import Idempotency, Page
 from bench_service.model.request import fingerprint
-from bench_service.wall_clock import new_id, now
+from bench_service.wall_clock import monotonic_s, new_id, now
 from procedures.core.errors import DomainError
 
+LOOK_S = 60.0
+"""Interval between two looks at the starts that are to come [s]."""
 log = logging.getLogger(__name__)
 
 
@@ -55,6 +59,7 @@ class Scheduler:
         self._stores = stores
         self._campaign_of = campaign_of
         self._prepared = prepared
+        self._looked_s = -inf
 
     def add(self, request: ScheduleRequest, key: str | None = None) -> Schedule:
         """Add a campaign's schedule. Raises `BadParameter` for a time that never comes, and its run's refusals.
@@ -111,11 +116,31 @@ class Scheduler:
     def fire_due(self) -> None:
         """Start all due schedules. One that cannot be read does not keep the others from starting."""
         at = now()
+        self._after_a_clock_that_was_ahead(at)
         for schedule in self._stores.campaigns.due_schedules(at):
             try:
                 self.fire(schedule, at)
             except DomainError as error:
                 log.error("schedule %s cannot be kept: %s", schedule.id, error)
+
+    def _after_a_clock_that_was_ahead(self, at: datetime) -> None:
+        """Bring back the next starts that a clock far ahead has moved into the future; looked at once a minute."""
+        if monotonic_s() < self._looked_s + LOOK_S:
+            return
+        self._looked_s = monotonic_s()
+        for schedule in self._stores.campaigns.waiting_schedules(at):
+            try:
+                earlier = brought_back(schedule, at)
+            except DomainError:  # it cannot be read: said when it is due
+                continue
+            if earlier is None or schedule.next_at is None:
+                continue
+            why = (
+                f"the clock was ahead: the next start was {schedule.next_at.isoformat()}, and is {earlier.isoformat()}"
+            )
+            log.warning("schedule %s: %s", schedule.id, why)
+            changed = replace(schedule, next_at=earlier, last_outcome=f"{schedule.last_outcome}; {why}".lstrip("; "))
+            self._stores.campaigns.save_schedule(changed, schedule.next_at, None)
 
     def fire(self, schedule: Schedule, at: datetime) -> bool:
         """Apply a due schedule's rules; False where another process was faster. Raises `StorageFailure`."""

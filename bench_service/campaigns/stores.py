@@ -81,6 +81,10 @@ class CampaignStore(Protocol):
         """Enabled schedules whose next start is not after `at`."""
         ...
 
+    def waiting_schedules(self, at: datetime) -> tuple[Schedule, ...]:
+        """Enabled schedules whose next start is after `at`."""
+        ...
+
     def save_schedule(self, schedule: Schedule, expected_next_at: datetime | None, run: CampaignRun | None) -> bool:
         """Replace a schedule and add the run that it starts, in one transaction.
 

@@ -15,6 +15,7 @@ from bench_service.cli.groups import (
     benches,
     calibrations,
     campaigns,
+    database,
     evidence,
     importing,
     jobs,
@@ -57,6 +58,7 @@ PANELS = {
         units.units,
         calibrations.calibrations,
     ),
+    "Database": (database.database, database.scrub, database.backup, database.restore),
     "Reservations": (reservations.reservations, reservations.reserve, reservations.unreserve),
     "This program": (completion,),
 }

@@ -4,15 +4,30 @@ Every method is one transaction: it commits, or it raises and nothing of it rema
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bench_service.model.errors import DamagedRecording
 from bench_service.model.records import NewRecording, Page, StoredRecording
 from bench_service.model.search import EVERYTHING, Search
 from procedures.core.recording import RawArray, Recording, RecordingInfo
+
+NAMED = 10
+"""Damaged chunks that a refusal names."""
+
+
+@dataclass(frozen=True)
+class DamagedChunk:
+    """A chunk of a recording whose samples start…stop (half open) cannot be had as they were stored."""
+
+    number: int
+    start: int
+    stop: int
+    why: str
 
 
 class RecordingWriter(Protocol):
@@ -68,6 +83,13 @@ class RecordingStore(Protocol):
         """Raw samples start…stop (half open) of some channels, chunk by chunk. Raises `NotFound`, `MissingChannel`."""
         ...
 
+    def damage(self, recording_id: str, start: int, stop: int) -> Iterator[DamagedChunk]:
+        """Compare the chunks that hold samples start…stop (half open) with their hashes; yield the damaged ones.
+
+        Raises `NotFound`.
+        """
+        ...
+
     def checkpoint(self, job_id: str) -> dict[str, Any] | None:
         """State of the simulated world after the job's last complete recording."""
         ...
@@ -79,3 +101,16 @@ class RecordingStore(Protocol):
     def interrupt_open(self, job_id: str) -> int:
         """Close a job's open recordings after a crash (see `RecordingWriter.abandon`). Returns their number."""
         ...
+
+
+def require_undamaged(recordings: RecordingStore, recording_id: str, start: int, stop: int) -> None:
+    """Check the chunks that hold samples start…stop (half open). Raises `DamagedRecording`, naming all of them."""
+    found = list(recordings.damage(recording_id, start, stop))
+    if not found:
+        return
+    named = "; ".join(f"chunk {c.number}, samples {c.start} to {c.stop - 1}: {c.why}" for c in found[:NAMED])
+    more = f"; and {len(found) - NAMED} more" if len(found) > NAMED else ""
+    raise DamagedRecording(
+        f"recording {recording_id} is damaged: {named}{more}. Other samples can be exported by start_s and stop_s; a "
+        "copy of the database from before the damage has them all"
+    )

@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pyarrow import csv
 
-from bench_service.formats.chunk import sample_type
+from bench_service.formats.chunk import RAW_BYTES, sample_type
 from procedures.core.errors import BadParameter
 from procedures.core.recording import RawArray, RecordingInfo
 
@@ -35,6 +35,10 @@ class ExportFormat(StrEnum):
             "parquet": "application/vnd.apache.parquet",
             "csv": "text/csv; charset=utf-8",
         }[self.value]
+
+
+HELD = {ExportFormat.ARROW: 4, ExportFormat.PARQUET: 5, ExportFormat.CSV: 8}
+"""Times a chunk's raw bytes that an export of it holds: as read, as columns, and as text or as a page of the file."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,11 @@ def _sample(info: RecordingInfo, field: str, moment_s: float) -> int:
     if not 0.0 <= moment_s <= info.duration_s * (1 + 1e-12):
         raise BadParameter(field, moment_s, f"0 … {info.duration_s:g}, the length of the recording in seconds")
     return min(info.count, math.ceil(moment_s * info.rate_hz - 1e-6))
+
+
+def export_bytes(form: ExportFormat) -> int:
+    """Estimate the memory that an export holds at a time [bytes], a chunk's samples and their form in the file."""
+    return RAW_BYTES * HELD[form]
 
 
 def export(part: Extract, blocks: Iterable[RawArray], form: ExportFormat) -> Iterator[bytes]:

@@ -72,8 +72,11 @@ class BenchQueue:
             what = f"{reservation.kind.value} {reservation.name}"
             return f"{what} is reserved by {reservation.holder} until {reservation.until.isoformat()}"
         latest = self.at + timedelta(seconds=LONGEST_PAUSE_S)
-        if entry.not_before is not None and self.at < entry.not_before <= latest:
-            return f"it is tried again at {entry.not_before.isoformat()}"
+        if entry.not_before is not None and self.at < entry.not_before:
+            if entry.attempt == 1:
+                return f"it starts no earlier than {entry.not_before.isoformat()}"
+            if entry.not_before <= latest:
+                return f"it is tried again at {entry.not_before.isoformat()}"
         return None
 
     def place(self, job_id: str, driven: bool) -> Place | None:

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from threading import Event
 
@@ -19,7 +19,7 @@ from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.retries import try_again
 from bench_service.jobs.stores import JobStores
 from bench_service.model.context import context_document, context_of, withheld_calibration
-from bench_service.model.errors import ServiceError, StorageFailure
+from bench_service.model.errors import DatabaseMoved, ServiceError, StorageFailure
 from bench_service.model.job import Failure, Job, JobState
 from bench_service.model.records import BenchStop, Idempotency, StoredResult
 from bench_service.wall_clock import now
@@ -121,7 +121,8 @@ class JobRunner:
                 raise ShuttingDown
             info = session.record(index)
         except Stopped:
-            return StepOutcome(cancelled=True)
+            moved = self._moved_database(job_id)
+            return StepOutcome(cancelled=True) if moved is None else StepOutcome(replace(moved, station=index))
         except (BenchError, DomainError, ServiceError) as error:
             return StepOutcome(Failure(type(error).__name__, str(error), index))
         jobs.station_done(
@@ -244,15 +245,28 @@ class JobRunner:
         """Return whether the job was cancelled or its bench stopped, through any process.
 
         A database that does not answer now, because it is restarted, counts as no stop: the recording goes on. A stop
-        on the bench's own host does not depend on it.
+        on the bench's own host does not depend on it. One whose file was deleted or replaced takes no recording any
+        more: the job is stopped.
         """
         if self._stopped():
             return True
         try:
             bench_stop = self._stores.benches.bench_stop(self._driver.description.id)
             return bench_stop is not None or self._stores.jobs.cancel_requested(job_id)
+        except DatabaseMoved:
+            return True
         except StorageFailure:
             return False
+
+    def _moved_database(self, job_id: str) -> Failure | None:
+        """The failure of a job whose database's file was deleted or replaced; None where it was not."""
+        try:
+            self._stores.jobs.cancel_requested(job_id)
+        except DatabaseMoved as moved:
+            return Failure(type(moved).__name__, str(moved))
+        except StorageFailure:
+            return None
+        return None
 
     def _require_usable_calibrations(self, job: Job) -> None:
         """Refuse a job whose unit's calibration was rejected or expired while it waited. Raises `NoCalibration`."""

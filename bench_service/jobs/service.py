@@ -67,9 +67,9 @@ class JobService:
             log.info("%s on %s queued", stored.procedure, stored.unit)
         return stored
 
-    def cancel(self, job_id: str) -> Job:
-        """Request a job's cancellation. Raises `IllegalTransition` where it has ended."""
-        return self._stores.jobs.request_cancel(job_id, now())
+    def cancel(self, job_id: str, by: str = "", reason: str = "") -> Job:
+        """Request a job's cancellation, for an author and a reason. Raises `IllegalTransition` where it has ended."""
+        return self._stores.jobs.request_cancel(job_id, now(), by, reason)
 
     def pause(self, job_id: str) -> Job:
         """Pause a job, a running one before its next station. Raises `IllegalTransition` where it has ended."""

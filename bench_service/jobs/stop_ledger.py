@@ -8,7 +8,7 @@ from queue import Full, Queue
 from threading import Lock, Thread
 
 from bench_service.bench.stop.word import StopWord
-from bench_service.model.errors import NotFound, ServiceError, StorageFailure
+from bench_service.model.errors import NotFound, ServiceError, StorageFailure, TooManyStops
 from bench_service.wall_clock import pause
 
 WAITING = 200
@@ -61,8 +61,8 @@ class StopLedger:
         """Enter one waiting stop; True where no retry is needed."""
         try:
             waiting.entered.set_result(self._enter(waiting.bench_id, waiting.word))
-        except NotFound as unknown:
-            waiting.entered.set_exception(unknown)
+        except (NotFound, TooManyStops) as refused:
+            waiting.entered.set_exception(refused)
         except ServiceError as error:
             if str(error) != self.failure:
                 log.warning("a stop of bench %s is not in the books yet: %s", waiting.bench_id, error)

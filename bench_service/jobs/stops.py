@@ -13,6 +13,7 @@ from bench_service.bench.safety import Safety, SafetyService
 from bench_service.bench.stop.road import StopRoads
 from bench_service.bench.stop.word import StopWord
 from bench_service.jobs.stop_entry import StopEntry
+from bench_service.jobs.stop_keys import StopKeys
 from bench_service.jobs.stop_ledger import StopLedger
 from bench_service.jobs.stores import JobStores
 from bench_service.model.errors import NotFound, ServiceError, SeveralStops, StorageFailure
@@ -57,16 +58,34 @@ class StopService:
         self._roads = roads
         self._entry = StopEntry(stores.benches, stores.queue, stores.jobs, trail)
         self._ledger = StopLedger(self._enter)
+        self._keys = StopKeys()
 
-    def stop(self, bench_id: str, reason: str, by: str, via: str = "http", patient: bool = True) -> Stopped:
+    def stop(
+        self,
+        bench_id: str,
+        reason: str,
+        by: str,
+        via: str = "http",
+        patient: bool = True,
+        key: str | None = None,
+    ) -> Stopped:
         """Stop all activity of the bench, on any host, until this stop is released. Jobs in the queue wait.
 
         `by`: the person; `via`: the way over which it came. It waits for bench and database, for a second each at the
-        most, and neither waits for the other; where it is not `patient`, for neither. Raises `NotFound` for an unknown
+        most, and neither waits for the other; where it is not `patient`, for neither. `key`: a request that comes again
+        with the key that it had is the same stop (`StopKeys`). Raises `NotFound` for an unknown
         bench, and `StorageFailure` where the stop has reached neither bench nor database.
         """
         books_by_s = monotonic_s() + (BOOKS_S if patient else 0.0)
-        word = StopWord(reason, by, via)
+        keyed = self._keys.of(bench_id, key, StopWord(reason, by, via))
+        if keyed.answered:
+            again = BenchStop(bench_id, keyed.word.at, reason, by=by, id=keyed.word.id)
+            return Stopped(again, None, self._safety.known(bench_id))
+        stopped = self._stop(bench_id, keyed.word, books_by_s, patient)
+        keyed.answered = True
+        return stopped
+
+    def _stop(self, bench_id: str, word: StopWord, books_by_s: float, patient: bool) -> Stopped:
         road = self._roads.to(bench_id)
         found = None if road is None else road.ask(word)
         entering = self._ledger.enter(bench_id, word)
@@ -79,7 +98,7 @@ class StopService:
             if found is None and books:
                 raise StorageFailure(f"{self._roads.unreached(bench_id)} ({books}; it is tried again)")
             safety = found or self._safety.stopping_elsewhere(bench_id)
-        return Stopped(BenchStop(bench_id, word.at, reason, by=by, id=word.id), job, safety, books)
+        return Stopped(BenchStop(bench_id, word.at, word.reason, by=word.by, id=word.id), job, safety, books)
 
     def _enter(self, bench_id: str, word: StopWord) -> str | None:
         self._benches.description(bench_id)

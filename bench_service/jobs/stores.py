@@ -73,8 +73,10 @@ class JobStore(Protocol):
         """Note that recordings up to and including `station` (index) are complete; idempotent."""
         ...
 
-    def request_cancel(self, job_id: str, at: datetime) -> Job:
+    def request_cancel(self, job_id: str, at: datetime, by: str = "", reason: str = "") -> Job:
         """Cancel a queued job at once, a running one soon; `NotUnderstood` is raised after that.
+
+        An event keeps author and reason.
 
         Raises `IllegalTransition` for one that has ended.
         """

@@ -12,6 +12,7 @@ ServiceError
 ├── NotReady             a job could not start here now
 ├── NotSafe              the bench's devices are not known to be safe
 ├── SeveralStops         a release must name one of the stops that stand
+├── TooManyStops         so many stops of a bench stand that one more is not kept apart
 ├── NotAllowed           the role or the team does not have this right
 ├── WrongPassword        name or password is wrong
 ├── LockedOut            too many failed log-ins
@@ -21,6 +22,8 @@ ServiceError
 ├── NotMounted           this bench does not have that unit
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
+    ├── DamagedDatabase   the database's file is damaged
+    ├── DatabaseMoved     the database's file was deleted or replaced while it was open
     ├── DamagedRecording  the stored bytes of a recording are not those written
     └── UnfitValue        a value cannot be stored, now or later
 """
@@ -103,6 +106,10 @@ class SeveralStops(ServiceError):
         self.stops = tuple(stops)
 
 
+class TooManyStops(ServiceError):
+    """Raised where so many stops of a bench stand already that one more is not stored on its own."""
+
+
 class NotAllowed(ServiceError):
     """Raised where the role or the team of a person or program does not have a right."""
 
@@ -151,6 +158,14 @@ class StorageFull(ServiceError):
 
 class StorageFailure(ServiceError):
     """Raised where the database failed in any other way."""
+
+
+class DamagedDatabase(StorageFailure):
+    """Raised where the database's own file is damaged: a part of it cannot be read, now or later."""
+
+
+class DatabaseMoved(StorageFailure):
+    """Raised where the file of the database is no longer the one that was opened."""
 
 
 class DamagedRecording(StorageFailure):

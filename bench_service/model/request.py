@@ -34,6 +34,8 @@ class JobRequest(JobTerms):
     """A client's request for a job."""
 
     bench: str | None = None
+    not_before: datetime | None = None
+    """Earliest start, by the service's clock; None: as soon as its turn comes."""
     parameters: dict[str, Any] = field(default_factory=dict[str, Any])
 
 

@@ -10,6 +10,7 @@ from threading import Lock
 
 from fastapi import APIRouter, Request, Response
 
+from bench_service.evidence.admission import Turns
 from bench_service.model.errors import NotFound
 from bench_service.pages.caching import kept
 from bench_service.pages.figures import svg
@@ -21,6 +22,8 @@ router = APIRouter(include_in_schema=False)
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; sandbox"
 """Content-Security-Policy of a drawing: it has styles in place; opened alone it runs nothing."""
+IMAGES = Turns("figures", at_once=4, waiting=400)
+"""Images: one is drawn at a time, and a page of a static run asks for twenty at once."""
 MOST = 200
 """Number of figures that are kept: those of about ten pages, as many as are kept drawn."""
 
@@ -58,8 +61,12 @@ def report_figures(report: Report) -> list[Figure]:
 
 
 @router.get("/results/{result_id}/figures/{number}.svg")
-def result_figure(result_id: str, number: int, request: Request) -> Response:
+async def result_figure(result_id: str, number: int, request: Request) -> Response:
     """Image of a figure of a result's report, by its number from 1."""
+    return await IMAGES.run(_result_figure, result_id, number, request)
+
+
+def _result_figure(result_id: str, number: int, request: Request) -> Response:
     figure = SHELF.get(request.query_params.get("v"))
     if figure is None:
         service = service_of(request)
@@ -71,8 +78,12 @@ def result_figure(result_id: str, number: int, request: Request) -> Response:
 
 
 @router.get("/units/{serial}/trend.svg")
-def trend_image(serial: str, request: Request, query: TrendQuery) -> Response:
+async def trend_image(serial: str, request: Request, query: TrendQuery) -> Response:
     """Image of the chart of a quantity over a unit's results."""
+    return await IMAGES.run(_trend_image, serial, request, query)
+
+
+def _trend_image(serial: str, request: Request, query: TrendQuery) -> Response:
     figure = SHELF.get(request.query_params.get("v"))
     if figure is None:
         figure = trend_of(service_of(request), serial, wanted_trend(service_of(request), serial, query)).figure

@@ -1,16 +1,50 @@
 """Rendering shared by all pages: templates, the filters in them, and the service behind the request."""
 
+import re
+from datetime import UTC, datetime
+from math import floor, isfinite, log10
 from pathlib import Path
 from typing import Any
 
 from fastapi import Request
 from fastapi.templating import Jinja2Templates
+from markupsafe import Markup, escape
 
 from bench_service.access.identity import Identity, Proof
-from bench_service.pages.static_files import asset
+from bench_service.model.errors import ServiceError
+from bench_service.pages.languages import (
+    LANGUAGE,
+    LANGUAGES,
+    language_of,
+    translated,
+    translated_number,
+    words_address,
+)
+from bench_service.pages.static_files import asset, module
 from bench_service.service import BenchService
 
-templates = Jinja2Templates(Path(__file__).parent / "templates")
+LEAST_DIGITS = 6
+"""Significant digits of a number whose uncertainty is not known."""
+
+
+def service_of(request: Request) -> BenchService:
+    """Return the service that the application serves."""
+    return request.app.state.service
+
+
+def _shell(request: Request) -> dict[str, Any]:
+    """Frame of every page around its content. It needs no database: the stop stands on pages of errors, too."""
+    language = language_of(request)
+    LANGUAGE.set(language)
+    service = service_of(request)
+    try:
+        benches = list(service.benches.ids())
+    except ServiceError:
+        benches = [] if service.live.own is None else [service.live.own]
+    return {"language": language, "languages": LANGUAGES, "words": words_address(language), "stop_benches": benches}
+
+
+templates = Jinja2Templates(Path(__file__).parent / "templates", context_processors=[_shell])
 
 
 def number(value: Any) -> str:
@@ -18,13 +52,8 @@ def number(value: Any) -> str:
     if value is None:
         return "–"
     if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-templates.env.filters["number"] = number
-templates.env.filters["asset"] = asset
-templates.env.globals["who"] = lambda request: who(request)
+        return translated("yes") if value else translated("no")
+    return f"{value:.{LEAST_DIGITS}g}" if isinstance(value, float) else str(value)
 
 
 def who(request: Request) -> dict[str, Any]:
@@ -38,6 +67,82 @@ def who(request: Request) -> dict[str, Any]:
     return {"name": name, "role": role, "csrf": identity.csrf or "", "log_in_on": log_in_on, "session": session}
 
 
-def service_of(request: Request) -> BenchService:
-    """Return the service that the application serves."""
-    return request.app.state.service
+def measured(value: Any, uncertainty: Any) -> str:
+    """Format a value to the last digit that its standard uncertainty bears: two significant digits of it."""
+    places = _places(uncertainty)
+    if places is None or not isinstance(value, int | float) or not isfinite(value):
+        return number(value)
+    if abs(value) >= 1e9 or places > 12:
+        digits = max(1, floor(log10(abs(value))) + 1 + places) if value else 1
+        return f"{value:.{min(digits - 1, 15)}e}"
+    return f"{round(value, places):.{max(places, 0)}f}"
+
+
+def doubt(uncertainty: Any) -> str:
+    """Format a standard uncertainty: two significant digits."""
+    places = _places(uncertainty)
+    if places is None:
+        return number(uncertainty)
+    return f"{uncertainty:.1e}" if places > 12 else f"{round(uncertainty, places):.{max(places, 0)}f}"
+
+
+def _places(uncertainty: Any) -> int | None:
+    """Decimal places of the second significant digit; None where there is no uncertainty to follow."""
+    if not isinstance(uncertainty, int | float) or not isfinite(uncertainty) or uncertainty <= 0.0:
+        return None
+    return 1 - floor(log10(uncertainty))
+
+
+def moment(value: datetime | str | None) -> Markup | str:
+    """A moment as an element that a script shows in local time; without scripts it is UTC, and says so."""
+    if not value:
+        return "–"
+    at = datetime.fromisoformat(value) if isinstance(value, str) else value
+    utc = at.astimezone(UTC)
+    text = utc.strftime("%Y-%m-%d %H:%M:%S UTC")
+    return Markup('<time datetime="{}" title="{}">{}</time>').format(utc.isoformat(), text, text)
+
+
+def duration(seconds: Any) -> str:
+    """Format a time span in the unit that fits it."""
+    if not isinstance(seconds, int | float):
+        return "–"
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+
+
+_TIMES = re.compile(r"[^0-9a-f]")
+
+
+def short(identity: str) -> str:
+    """Short name of a thing for a person: the last six characters of its id, which chance made."""
+    return _TIMES.sub("", identity)[-6:]
+
+
+def words_of(value: Any) -> Markup:
+    """Readable text of a parameter: numbers as they are, lists and objects line by line, no Python notation."""
+    if isinstance(value, dict):
+        rows = (f"{escape(k)}: {words_of(v)}" for k, v in value.items())
+        return Markup("; ").join(Markup(row) for row in rows) if value else Markup("–")
+    if isinstance(value, list | tuple):
+        return Markup(", ").join(words_of(v) for v in value) if value else Markup("–")
+    return Markup(escape(number(value)))
+
+
+templates.env.add_extension("jinja2.ext.i18n")
+templates.env.install_gettext_callables(  # pyright: ignore[reportAttributeAccessIssue]
+    translated, translated_number, newstyle=True
+)
+cast(dict[str, Any], templates.env.globals)["who"] = who
+templates.env.filters |= {
+    "number": number,
+    "asset": asset,
+    "module": module,
+    "measured": measured,
+    "doubt": doubt,
+    "moment": moment,
+    "duration": duration,
+    "short": short,
+    "words_of": words_of,
+}

@@ -5,7 +5,7 @@ from typing import Any
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 
-from bench_service.model.job import FINAL, Job, JobState
+from bench_service.model.job import FINAL, Event, Job, JobState
 from bench_service.model.records import StoredResult
 from bench_service.pages.corrections import correction_table
 from bench_service.pages.images import SHELF
@@ -19,6 +19,8 @@ from procedures.core.units import DISPLAY, NOISE_DISPLAY
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
+SHOWN_EVENTS = 300
+"""Number of a job's latest events that its page lists."""
 _VERBS = {
     JobState.QUEUED: (("pause", "Pause"), ("cancel", "Cancel")),
     JobState.RUNNING: (("pause", "Pause"), ("cancel", "Cancel")),
@@ -41,7 +43,9 @@ def _reported(service: BenchService, result: StoredResult) -> dict[str, Any]:
         if isinstance(section, Figure):
             number += 1
             version = SHELF.put(section, service.code_version)
-            sections.append({"figure": section, "image": f"/results/{result.id}/figures/{number}.svg?v={version}"})
+            sections.append(
+                {"figure": section, "number": number, "image": f"/results/{result.id}/figures/{number}.svg?v={version}"}
+            )
         else:
             sections.append({"table": section})
     return {"result": result, "report": report, "sections": sections}
@@ -84,6 +88,20 @@ def _explanation(job: Job) -> str:
     return ""
 
 
+def _notes(events: tuple[Event, ...]) -> list[dict[str, Any]]:
+    """Remarks of people about a job, and who cancelled it and why."""
+    notes: list[dict[str, Any]] = []
+    for event in events:
+        said = event.data
+        if event.kind == "note" and (said.get("cancel_requested") or "text" in said):
+            text = said.get("reason", said.get("text", ""))
+            cancel = bool(said.get("cancel_requested"))
+            notes.append({"at": event.at, "by": said.get("by", ""), "text": text, "cancel": cancel})
+        elif event.kind == "answer" and not said.get("done", True):
+            notes.append({"at": event.at, "by": said.get("by", ""), "text": said.get("remark", ""), "cancel": True})
+    return notes
+
+
 @router.get("/")
 def home(request: Request) -> HTMLResponse:
     """Page of the benches, their units and the latest jobs."""
@@ -103,18 +121,9 @@ def home(request: Request) -> HTMLResponse:
             }
             for bench_id in service.benches.ids()
         ],
-        jobs=service.stores.jobs.list(limit=50).items,
+        jobs=service.stores.jobs.list(limit=20).items,
         units=service.stores.units.units(),
     )
-
-
-@router.get("/benches/{bench_id}/stops")
-def stops_page(bench_id: str, request: Request, after: str | None = None) -> HTMLResponse:
-    """Page of a bench's stops, newest first: each with author, reason, release and remark."""
-    service = service_of(request)
-    service.benches.description(bench_id)
-    page = service.stores.benches.stops(bench_id, after=after)
-    return _page(request, "stops.html", bench=bench_id, stops=page.items, next=page.next)
 
 
 @router.get("/jobs/{job_id}")
@@ -126,6 +135,7 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
     live = service.live.of_job(job)
     stations = max(1, len(job.stations))
     result = service.stores.results.get(job.result_id) if job.result_id else None
+    events = service.stores.jobs.events(job_id, max(0, last_event - SHOWN_EVENTS), SHOWN_EVENTS)
     return _page(
         request,
         "job.html",
@@ -135,6 +145,8 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
         explanation=_explanation(job),
         standing=service.queues.standing([job])[job.id],
         last_event=last_event,
+        events=events,
+        notes=_notes(events),
         live=live,
         fraction=job.stations_done / stations if live is None else live.fraction,
         recordings=service.stores.recordings.of_job(job_id),

@@ -1,4 +1,8 @@
-"""Scripts and style sheets of the pages: the service's, and those of the package that shows the API's document."""
+"""Scripts and style sheets of the pages: the service's, and those of the packages that carry libraries for browsers.
+
+Scripts import one another by relative addresses, so they stand under an address with the version of them all: a browser
+fetches each once, and never mixes those of two versions.
+"""
 
 import hashlib
 from dataclasses import dataclass
@@ -8,14 +12,18 @@ from importlib.resources import files
 from fastapi import APIRouter, Request, Response
 
 from bench_service.model.errors import NotFound
-from bench_service.pages.caching import kept
+from bench_service.pages.caching import FOR_GOOD, kept
 
 router = APIRouter(include_in_schema=False)
 
 MEDIA_TYPES = {"css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
-OWN = ("page.css", "act.js", "log_in.js", "log_out.js", "live.js", "reload.js", "choose.js", "docs.js", "icon.svg")
-OF_PACKAGE = ("swagger-ui.css", "swagger-ui-bundle.js")
-"""Names of the files that the package `fastapi-offline` carries."""
+OF_PACKAGE = {
+    "swagger-ui.css": ("fastapi_offline", "static"),
+    "swagger-ui-bundle.js": ("fastapi_offline", "static"),
+    "uplot.iife.min.js": ("youplot", "vendor"),
+    "uplot.min.css": ("youplot", "vendor"),
+}
+"""Files of installed packages, with package and folder: the API's document, and the charts of the pages."""
 
 
 @dataclass(frozen=True)
@@ -28,16 +36,31 @@ class StaticFile:
 
 
 @cache
+def own() -> frozenset[str]:
+    """Names of the service's own static files."""
+    folder = files("bench_service.pages") / "static"
+    return frozenset(file.name for file in folder.iterdir() if file.name.rpartition(".")[2] in MEDIA_TYPES)
+
+
+@cache
 def static_file(name: str) -> StaticFile:
     """Find a file by its name. Raises `NotFound`."""
-    if name in OWN:
-        folder = files("bench_service.pages")
+    if name in own():
+        place = files("bench_service.pages") / "static"
     elif name in OF_PACKAGE:
-        folder = files("fastapi_offline")
+        package, folder = OF_PACKAGE[name]
+        place = files(package) / folder
     else:
         raise NotFound("file", name)
-    content = (folder / "static" / name).read_bytes()
+    content = (place / name).read_bytes()
     return StaticFile(content, MEDIA_TYPES[name.rpartition(".")[2]], hashlib.sha256(content).hexdigest()[:16])
+
+
+@cache
+def release() -> str:
+    """Version of all own scripts and style sheets together."""
+    known = "".join(name + static_file(name).version for name in sorted(own()))
+    return hashlib.sha256(known.encode()).hexdigest()[:16]
 
 
 def asset(name: str) -> str:
@@ -45,8 +68,23 @@ def asset(name: str) -> str:
     return f"/static/{name}?v={static_file(name).version}"
 
 
+def module(name: str) -> str:
+    """Return the address of a script that imports others: the version is a part of the path, and so theirs too."""
+    return f"/static/{release()}/{name}?v={static_file(name).version}"
+
+
 @router.get("/static/{name}")
 def read_static(name: str, request: Request) -> Response:
     """A script or a style sheet."""
     file = static_file(name)
     return kept(request, file.version, file.media_type, lambda: file.content)
+
+
+@router.get("/static/{version}/{name}")
+def read_static_of_release(version: str, name: str, request: Request) -> Response:
+    """A script or a style sheet under the address of a release; of another release it is not kept."""
+    file = static_file(name)
+    answer = kept(request, file.version, file.media_type, lambda: file.content)
+    if version == release():
+        answer.headers["Cache-Control"] = FOR_GOOD
+    return answer

@@ -11,13 +11,15 @@ from bench_service.persistence.database import Database
 from bench_service.persistence.engine_database import engine_database
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from bench_service.campaigns.stores import Stores
 
 __all__ = ["BenchLease", "Database", "acquire_lease", "engine_database", "lease_holder", "open_stores"]
 
 
-def open_stores(database_url: str) -> "tuple[Stores, Database]":
-    """Open all stores behind a URL, in the newest form; `Database.dispose` closes it. Raises `StorageFailure`."""
+def open_stores(database_url: str, copies: "Path | None" = None) -> "tuple[Stores, Database]":
+    """Open all stores behind a URL, in the newest form; see `bench_service.persistence.stores.open_stores`."""
     from bench_service.persistence.stores import open_stores as opened
 
-    return opened(database_url)
+    return opened(database_url, copies)

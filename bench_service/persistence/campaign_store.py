@@ -154,6 +154,11 @@ class SqlCampaignStore:
         with self._database.read() as session:
             return tuple(_schedule(row) for row in session.scalars(query))
 
+    def waiting_schedules(self, at: datetime) -> tuple[Schedule, ...]:
+        query = select(ScheduleRow).where(ScheduleRow.enabled, ScheduleRow.next_at > at).order_by(ScheduleRow.id)
+        with self._database.read() as session:
+            return tuple(_schedule(row) for row in session.scalars(query))
+
     def save_schedule(self, schedule: Schedule, expected_next_at: datetime | None, run: CampaignRun | None) -> bool:
         with self._database.write() as session:
             row = session.get(ScheduleRow, schedule.id, with_for_update=True)

@@ -22,7 +22,8 @@ from sqlalchemy.pool import QueuePool
 
 from bench_service import wall_clock
 from bench_service.formats.plain_json import read_back
-from bench_service.model.errors import StorageFailure, StorageFull, UnfitValue
+from bench_service.model.errors import DamagedDatabase, DatabaseMoved, StorageFailure, StorageFull, UnfitValue
+from bench_service.persistence.upkeep.file_identity import FileIdentity
 
 BUSY_S = 30.0
 """Longest time that a writer waits for another one [s]."""
@@ -41,6 +42,8 @@ nothing of it applies. One that is reached and hangs is waited for: who must not
 _NEWS = "news"
 _SQLITE_FULL = frozenset({sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_SHMSIZE})
 _POSTGRES_FULL = frozenset({"53100"})
+_SQLITE_DAMAGED = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
+_POSTGRES_DAMAGED = frozenset({"XX001", "XX002"})
 _JSON: dict[str, Any] = {
     "json_serializer": partial(json.dumps, allow_nan=False),
     "json_deserializer": read_back,
@@ -59,20 +62,29 @@ class Database:
         self._reading_engine = _reading(engine)
         self._writing_engine = engine.execution_options(bench_write=True)
         self._tell: list[Callable[[str], None]] = []
+        self._file = None if self.is_postgres or not engine.url.database else FileIdentity(Path(engine.url.database))
 
     @contextmanager
     def read(self) -> Generator[Session, None, None]:
         """Open a reading transaction. On SQLite all its reads see one moment; on Postgres each statement its own."""
+        self.require_file()
         with storage_errors(), Session(self._reading_engine) as session:
             yield session
 
     @contextmanager
     def write(self) -> Generator[Session, None, None]:
-        """Open a transaction that commits at the end, or leaves nothing. Raises `StorageFull`, `StorageFailure`."""
+        """Open a transaction that commits at the end, or leaves nothing.
+
+        Raises `StorageFull`, `StorageFailure`, and `DatabaseMoved` where the file is not the one that was opened.
+        """
         news: list[str] = []
+        self.require_file()
         with storage_errors(), Session(self._writing_engine, expire_on_commit=False) as session, session.begin():
             session.info[_NEWS] = news
             yield session
+        if self._file is not None:  # deleted meanwhile: what was committed is lost, and may not be acknowledged
+            self._file.look_after_commit()
+            self.require_file()
         for subject in dict.fromkeys(news):
             for tell in self._tell:
                 tell(subject)
@@ -100,6 +112,20 @@ class Database:
         """Free space on the disk of an SQLite file [bytes]; None where the database is elsewhere."""
         file = self.engine.url.database
         return None if self.is_postgres or not file else shutil.disk_usage(Path(file).parent).free
+
+    def trouble(self) -> str | None:
+        """Return why the database's file is no longer the one that was opened; None where it is, or there is none."""
+        return None if self._file is None else self._file.trouble()
+
+    def replaced(self) -> bool:
+        """Return whether another file has taken the place of the one that was opened."""
+        return self._file is not None and self._file.replaced()
+
+    def require_file(self) -> None:
+        """Check that the database's file is the one that was opened. Raises `DatabaseMoved`."""
+        trouble = self.trouble()
+        if trouble is not None:
+            raise DatabaseMoved(trouble)
 
     @property
     def is_postgres(self) -> bool:
@@ -192,12 +218,18 @@ def storage_errors() -> Generator[None, None, None]:
     except DBAPIError as error:
         if is_full(error.orig):
             raise StorageFull("the database cannot grow: the disk is full") from error
+        if is_damaged(error.orig):
+            raise _damaged(error.orig) from error
         raise StorageFailure(f"the database failed: {error.orig}") from error
     except StatementError as error:  # raised before the database is asked: the value has no form there
         raise UnfitValue(f"a value cannot be stored: {error.orig}") from error
     except SQLAlchemyError as error:
         raise StorageFailure(f"the database failed: {error}") from error
     except sqlite3.Error as error:
+        if is_full(error):
+            raise StorageFull("the database cannot grow: the disk is full") from error
+        if is_damaged(error):
+            raise _damaged(error) from error
         raise StorageFailure(f"the database failed: {error}") from error
     except (ValueError, OverflowError) as error:
         raise UnfitValue(f"a value cannot be stored, or not be read again: {error}") from error
@@ -223,3 +255,14 @@ def is_full(error: BaseException | None) -> bool:
         code = getattr(error, "sqlite_errorcode", 0)
         return code in _SQLITE_FULL or code & 0xFF == sqlite3.SQLITE_FULL
     return getattr(error, "sqlstate", None) in _POSTGRES_FULL
+
+
+def is_damaged(error: BaseException | None) -> bool:
+    """Return whether a driver's error means that the database's stored bytes are damaged."""
+    if isinstance(error, sqlite3.Error):
+        return getattr(error, "sqlite_errorcode", 0) & 0xFF in _SQLITE_DAMAGED
+    return getattr(error, "sqlstate", None) in _POSTGRES_DAMAGED
+
+
+def _damaged(error: BaseException | None) -> DamagedDatabase:
+    return DamagedDatabase(f"the database is damaged ({error}): `bench scrub` names what, `bench restore` takes a copy")

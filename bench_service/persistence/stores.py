@@ -1,5 +1,10 @@
 """Construction of the stores: one database, all stores. Must not know their callers."""
 
+import logging
+from functools import partial
+from pathlib import Path
+
+from bench_service import wall_clock
 from bench_service.campaigns.stores import Stores
 from bench_service.persistence.access.access_store import SqlAccessStore
 from bench_service.persistence.bench.live_store import SqlLiveStore
@@ -19,13 +24,20 @@ from bench_service.persistence.jobs.reservation_store import SqlReservationStore
 from bench_service.persistence.migration import upgrade_to_head
 from bench_service.persistence.telemetry.audit_store import SqlAuditTrail
 from bench_service.persistence.telemetry.tally_store import SqlTallyStore
+from bench_service.persistence.telemetry.upkeep_store import SqlUpkeepStore
+
+log = logging.getLogger(__name__)
 
 
-def open_stores(database_url: str) -> tuple[Stores, Database]:
-    """Open all stores behind a URL, in the newest form; `Database.dispose` closes it. Raises `StorageFailure`."""
+def open_stores(database_url: str, copies: Path | None = None) -> tuple[Stores, Database]:
+    """Open all stores behind a URL, in the newest form; `Database.dispose` closes it. Raises `StorageFailure`.
+
+    `copies`: folder of the copy that is made before a database is changed to a newer form; None: next to an SQLite
+    file, and of a Postgres database none.
+    """
     database = connect(database_url)
     try:
-        upgrade_to_head(database)
+        upgrade_to_head(database, partial(_keep_copy, database, copies))
     except BaseException:
         database.dispose()
         raise
@@ -49,6 +61,22 @@ def stores_of(database: Database) -> Stores:
         prompts=SqlPromptStore(database),
         audit=SqlAuditTrail(database),
         tallies=SqlTallyStore(database),
+        upkeep=SqlUpkeepStore(database),
         access=SqlAccessStore(database),
         keys=SqlKeyStore(database),
     )
+
+
+def _keep_copy(database: Database, copies: Path | None, old: str, new: str) -> None:
+    """Copy a database before its form is changed, and log the place of the copy. Raises `StorageFailure`."""
+    from bench_service.persistence.upkeep.copies import copy_database
+
+    stamp = wall_clock.now().strftime("%Y%m%dT%H%M%SZ")
+    file = None if database.is_postgres else Path(database.engine.url.database or "")
+    folder = copies or (None if file is None else file.parent)
+    if folder is None:
+        log.warning("the database goes from revision %s to %s without a copy: no folder for it is named", old, new)
+        return
+    place = folder / f"{'bench' if file is None else file.name}.before-{new}-{stamp}"
+    copy_database(database, place)
+    log.warning("the database goes from revision %s to %s; a copy of it as it was is %s", old, new, place)

@@ -1,9 +1,10 @@
-"""Stores of the telemetry room: the audit trail and the counts that a monitor reads."""
+"""Stores of the telemetry room: the audit trail, the counts that a monitor reads, and the reports of upkeep."""
 
 from dataclasses import dataclass
 
 from bench_service.telemetry.audit import AuditTrail
 from bench_service.telemetry.tallies import TallyStore
+from bench_service.telemetry.upkeep import UpkeepStore
 
 
 @dataclass(frozen=True)
@@ -12,3 +13,4 @@ class TelemetryStores:
 
     audit: AuditTrail
     tallies: TallyStore
+    upkeep: UpkeepStore

@@ -14,6 +14,7 @@ from typing import Any
 from uuid import UUID
 
 from bench_service.model.job import Job
+from bench_service.telemetry.redaction import names_token, without_tokens
 
 TIMEOUT_S = 2.0
 """Maximum time for a collector's answer, also at the end of the service [s]."""
@@ -93,10 +94,18 @@ class CollectedTraces(Traces):
             tracer_provider=self._provider,
             excluded_urls="/healthz,/readyz,/metrics,/events$",  # a stream would be a span as long as its job
             exclude_spans=["receive", "send"],
+            server_request_hook=_hide_tokens,
         )
 
     def close(self) -> None:
         self._provider.shutdown()
+
+
+def _hide_tokens(span: Any, _scope: Any) -> None:
+    """Hide tokens in the addresses of a request's span: such a request is refused, and its span is sent anyway."""
+    for name, value in dict(getattr(span, "attributes", None) or {}).items():
+        if isinstance(value, str) and names_token(value):
+            span.set_attribute(name, without_tokens(value))
 
 
 def traces_to(url: str | None, bench_id: str, code_version: str) -> Traces:

@@ -320,7 +320,11 @@ def downgrade() -> None:
     for row in op.get_bind().execute(sa.select(lineage).order_by(lineage.c.result_id, lineage.c.position)):
         if row.calibration_id in sets:
             used.setdefault(row.result_id, {})[sets[row.calibration_id]] = None
-    rows = [dict(zip(columns, (r, p, c), strict=True)) for r, found in used.items() for p, c in enumerate(found)]
+    rows: list[dict[str, Any]] = [
+        {"result_id": result, "position": position, "calibration_id": calibration}
+        for result, found in used.items()
+        for position, calibration in enumerate(found)
+    ]
     if rows:
         op.get_bind().execute(old.insert(), rows)
     for name in ("jobs", "results"):

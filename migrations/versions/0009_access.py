@@ -1,6 +1,6 @@
 """accounts, tokens, sessions, approvals; the team of a reservation; the audit trail as a hash chain
 
-Revision: 0009, after 0007
+Revision: 0009, after 0008
 
 Entries of the trail that exist are chained as they stand: from here on a change of them shows.
 """

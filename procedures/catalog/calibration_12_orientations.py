@@ -189,7 +189,7 @@ def report(result: Result) -> Report:
     magnitudes = [t.magnitudes for t in result.triads]
     tables = [pictures.triad_table(t) for t in result.triads]
     tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
-    tables += [pictures.magnitude_table(magnitudes, "Magnitudes over the orientations")]
+    tables += [pictures.sample_table(result.triads)]
     figures = [f for t in result.triads for f in pictures.triad_figures(t)]
     stations = [pictures.station_table(m) for m in magnitudes]
     thermal = [] if result.thermal is None else pictures.thermal_tables(result.thermal, magnitudes[0].labels)
@@ -281,7 +281,7 @@ def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
 PROCEDURE = Procedure(
     "calibration_12_orientations",
     "Calibration in twelve orientations",
-    "1.3.0",
+    "1.4.0",
     Params,
     Result,
     resolve,

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis.calibration.station_plan import move_time_s, windows
-from procedures.analysis.table_program.dialect import DELAY_MAX_S, Dwell, read_program, refusal
+from procedures.analysis.table_program.dialect import AXES, DELAY_MAX_S, Dwell, read_program, refusal
 from procedures.analysis.table_program.recorded import DwellRecord, dwell_records, mean_sd
 from procedures.analysis.table_program.writing import THESIS_POSITIONS, dwells_at, write_program
 from procedures.bench import Bench
@@ -31,6 +31,7 @@ SHORTEST_S = 1.0
 GRAIN_S = 0.1
 """Recordings are whole multiples of it, so that a station's length is a round number."""
 
+Axis = Literal["inner", "middle", "outer"]
 Angle = Annotated[float, Field(ge=-3600.0, le=3600.0)]
 Delay = Annotated[float, Field(gt=0.0, le=DELAY_MAX_S)]
 Rate = Annotated[float, Field(gt=0.0, le=1e5)]
@@ -43,7 +44,10 @@ class Params(Parameters):
         None,
         max_length=50_000,
         description="text: ':mode:position all', ':demand:position 1,deg; p 2,deg; p 3,deg', 'delay s', '% comment'; "
-        "axis 1 inner, 2 middle, 3 outer",
+        "axes as in `axes`",
+    )
+    axes: tuple[Axis, Axis, Axis] = Field(
+        AXES, description="axes 1, 2 and 3 of a program's text; the thesis does not name those of its own program"
     )
     positions: tuple[tuple[Angle, Angle, Angle, Delay], ...] | None = Field(
         None,
@@ -73,7 +77,10 @@ def resolve(params: Params, context: Context) -> Params:
     """The program from the positions or the thesis; the axes' motion from the bench."""
     if params.program is not None and params.positions is not None:
         raise BadParameter("positions", len(params.positions), "not beside a program: one of the two")
-    text = write_program(dwells_at(params.positions or THESIS_POSITIONS))
+    if len(set(params.axes)) < len(params.axes):
+        raise BadParameter("axes", list(params.axes), "each of inner, middle and outer once")
+    given = params.positions
+    text = write_program(dwells_at(THESIS_POSITIONS)) if given is None else write_program(dwells_at(given), params.axes)
     outer, middle, inner = context.bench.axis_motion
     filled = params.filled({"program": text, "axis_motion": (outer, middle, inner)})
     return filled.model_copy(update={"positions": None})
@@ -128,7 +135,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     checks = tuple(_whole(d) for d in dwells)
     unknown = [m.channel for m in dwells[0].means if not m.from_noise]
     warnings = (_unknown(unknown),) if unknown else ()
-    program = write_program(_dwells(params))
+    program = write_program(_dwells(params), params.axes)
     return Result(checks=checks, verdict=verdict(checks), warnings=warnings, program=program, dwells=dwells)
 
 
@@ -169,7 +176,7 @@ def report(result: Result) -> Report:
 def _dwells(params: Params) -> tuple[Dwell, ...]:
     if params.program is None:
         raise BadParameter("program", None, "resolve the parameters first: the program is written from the positions")
-    return read_program(params.program)
+    return read_program(params.program, params.axes)
 
 
 def _used_s(dwell: Dwell, at: TableAngles, params: Params) -> float:
@@ -204,7 +211,7 @@ def _unknown(channels: Sequence[str]) -> str:
 PROCEDURE = Procedure(
     "table_program",
     "Program of table positions",
-    "2.0.0",
+    "2.1.0",
     Params,
     Result,
     resolve,

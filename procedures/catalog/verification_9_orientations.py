@@ -1,4 +1,8 @@
-"""Verification of a calibration: magnitudes in nine orientations that did not make it (thesis 3.3.2, 5.1, 5.4, 5.5).
+"""Verification of a calibration: magnitudes in nine orientations that did not make it (thesis 5.1, 5.5).
+
+The thesis verifies with a macro that it does not print. These nine are the plan of a scalar calibration that it cites
+in 3.3.2 (its reference [63]): steps of 40°, 10° and 20°, none of which is among the twelve. Its Tables 5.3 and 5.4 are
+those of the twelve that made the coefficients; what is shown here is out of sample, in another launch.
 
 The corrected magnitude of gravity and of the Earth's rate is compared with the site's; the table's angles need not be
 true for that. What should be seen follows from the calibration's covariance, the unit's stability and the noise of the
@@ -39,7 +43,7 @@ from procedures.site_parameters import Arcsec, SiteParameters, declared_site
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 
 ORIENTATIONS = tuple((40.0 * i, 10.0 * i, 20.0 * i) for i in range(9))
-"""(inner, middle, outer) [deg], steps of 40°, 10° and 20° (thesis 3.3.2)."""
+"""(inner, middle, outer) [deg], steps of 40°, 10° and 20°: the scalar plan that thesis 3.3.2 cites as [63]."""
 
 
 class Limits(Parameters):
@@ -124,10 +128,10 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
 
 
 def report(result: Result) -> Report:
-    """Checks, Tables 5.3 and 5.4, figures 5.6-5.12 of the thesis."""
+    """Checks, and out of sample what Tables 5.3, 5.4 and figures 5.6-5.12 of the thesis show in sample."""
     magnitudes = [t.magnitudes for t in result.triads]
     figures = [figure for m in magnitudes for figure in pictures.magnitude_figures(m)]
-    table = pictures.magnitude_table(magnitudes, "Verification")
+    table = pictures.magnitude_table(magnitudes, "Verification, out of sample: other orientations and another launch")
     return Report(sections=(table, *figures, *(pictures.station_table(m) for m in magnitudes)))
 
 

@@ -286,10 +286,8 @@ def test_the_trail_has_the_proved_name_whatever_a_client_calls_itself(home: Hous
             f"/api/v1/benches/sim/stops/{stop}/release", json={"remark": "looked", "by": "Bo"}
         ).json()["stop"]
         assert (released["by"], released["released_by"]) == ("ada", "nightly")
-        assert person.post("/api/v1/procedures/none/approval", json={}).status_code == 405
     with home.client() as http:
         http.post("/api/v1/session", json={"name": "ada", "password": "not hers at all"})
-        assert http.post("/api/v1/units", json={}).status_code == 405
     refused = home.client(Authorization="Bearer nonsense").put("/api/v1/units/X-1", json={})
     assert refused.status_code == 401
     failed = [one for one in trail(home) if one["action"] == "log_in" and one["outcome"] == "401"]
@@ -316,6 +314,9 @@ def test_a_wrong_account_is_refused_with_what_is_allowed(home: House) -> None:
         assert answer.status_code == 422
         assert field in answer.json()["errors"][0]["field"]
         assert "short" not in answer.text
+    for path in ("/api/v1/accounts", "/api/v1/tokens"):
+        taken = home.owner.post(path, json={"name": "service-token", "role": "viewer"})
+        assert taken.status_code == 422, "a name with which the service signs"
     twice = home.owner.post("/api/v1/accounts", json={"name": "ada", "role": "viewer", "password": PASSWORD})
     assert twice.status_code == 409
     assert home.owner.patch("/api/v1/accounts/ada", json={"role": "viewer"}).status_code == 409, "the last admin"

@@ -93,6 +93,18 @@ def test_with_the_database_locked_a_request_on_this_host_stops_without_any_name(
             assert took_s < IN_TIME_S, took_s
 
 
+def test_a_stop_without_a_log_in_is_nobodys_whatever_name_it_gives(home: House) -> None:
+    answer = home.client().post(STOP, json={"reason": "a hand", "by": "ada"}, headers={"X-Requested-By": "ada"})
+    assert answer.status_code == 202, answer.text
+    (stopped,) = [
+        one for one in home.owner.get("/api/v1/benches/sim/stops").json()["items"] if one["id"] == answer.json()["stop"]
+    ]
+    assert stopped["by"] == "127.0.0.1"
+    entry = home.owner.get("/api/v1/audit", params={"limit": 1, "who": "127.0.0.1"}).json()["items"][0]
+    assert (entry["action"], entry["detail"]["claimed"]) == ("stop", "ada")
+    assert "proof" not in entry["detail"]
+
+
 def test_nobody_from_elsewhere_stops_and_no_page_of_another_site(home: House) -> None:
     assert stop(home.client(**AFAR), "never").status_code == 401
     assert stop(home.client(**AFAR, Authorization="Bearer nobody-s-token"), "never").status_code == 401

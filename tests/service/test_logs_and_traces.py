@@ -68,6 +68,9 @@ def test_every_line_is_json_about_its_job_and_every_job_one_trace(tmp_path: Path
         with process(tmp_path, free_port, **told) as (client, file):
             job = client.wait(client.submit(seed=1)["id"])
             client.http.get("/healthz", headers={"X-Request-ID": "probe-1"})
+            token = f"bench_{'A1-_' * 10}xyz"
+            assert client.http.get("/api/v1/jobs", params={"token": token}).status_code == 400
+        assert token not in file.read_text(), "a line of the log hides a token"
         lines = [json.loads(line) for line in file.read_text().splitlines()]
     assert all({"at", "level", "logger", "message", "bench"} <= set(line) for line in lines)
     about = [line for line in lines if line.get("job") == job["id"]]
@@ -89,6 +92,8 @@ def test_every_line_is_json_about_its_job_and_every_job_one_trace(tmp_path: Path
     assert root.parent_span_id == b""
     assert attributes(root)["bench.verdict"] == attributes(ours["analysis"])["bench.verdict"] == job["verdict"]
     assert root.start_time_unix_nano <= ours["station 0"].start_time_unix_nano
+    assert any("bench_[hidden]" in str(attributes(s)) for s in spans.spans)
+    assert not any(token in str(attributes(s)) for s in spans.spans), "and so does a span"
     requests = [s for s in spans.spans if s.name == "POST /api/v1/jobs"]
     assert len(requests) == 1
 

@@ -169,3 +169,29 @@ def test_a_stop_that_cannot_be_written_is_not_answered_as_done(tmp_path: Path) -
         other.close()
         assert http.post(f"{BENCH}/stop").status_code == 503
         assert http.get(f"{BENCH}/stops").json()["items"] == []
+
+
+def test_a_stop_sent_again_with_its_key_is_the_same_stop_and_after_its_release_changes_nothing(client: Client) -> None:
+    body, key = {"reason": "smoke", "by": "Ada"}, {"Idempotency-Key": "press 1"}
+    first = client.http.post(f"{BENCH}/stop", json=body, headers=key).json()["stop"]
+    again = client.http.post(f"{BENCH}/stop", json=body, headers=key)
+    assert (again.status_code, again.json()["stop"]) == (202, first)
+    other = client.http.post(f"{BENCH}/stop", json={**body, "by": "Bo"}, headers=key).json()["stop"]
+    assert other != first  # no stop is refused for its key
+    assert [stop["id"] for stop in client.http.get(BENCH).json()["stops"]] == [first, other]
+    for stop in (first, other):
+        assert release(client, stop, by="Cy", remark="looked at").is_success
+    client.http.post(f"{BENCH}/stop", json={**body, "by": "Bo"}, headers=key)
+    assert client.http.get(BENCH).json()["stops"] == []
+
+
+def test_sixteen_stops_stand_at_the_most_and_one_more_is_told_that_it_waits(client: Client) -> None:
+    first = stopped(client, "reason 0", "Ada")
+    for number in range(1, 16):
+        stopped(client, f"reason {number}", "Ada")
+    more = client.http.post(f"{BENCH}/stop", json={"reason": "one more", "by": "Bo"})
+    assert more.status_code == 202
+    assert "16 stops of bench 'sim' stand already" in more.json()["books"]
+    assert len(client.http.get(BENCH).json()["stops"]) == 16
+    assert release(client, first, by="Cy", remark="looked at").is_success
+    assert client.http.get(BENCH).json()["state"] == "stopped"

@@ -40,8 +40,8 @@ def test_the_shipped_unit_has_the_published_figures() -> None:
     assert unit.serial == "SIM-0001"
     assert unit.sample_rate_hz == 400.0
     np.testing.assert_allclose(np.array(unit.gyro.bias) / units.DEG_PER_HOUR, [0.1856, 0.026498, -0.027218])
-    assert unit.gyro.matrix[2][1] == -0.0091769
-    assert unit.accelerometer.matrix[1] == (-0.0010369, 0.85883, -0.005538)
+    assert unit.gyro.matrix[1][2] == -0.0091769
+    assert unit.accelerometer.matrix[1] == (0.0010164, 0.85883, 0.0053613)
     assert unit.gyro.pulse[0] / units.ARCSEC == pytest.approx(0.775)  # 2·0.3875: dithered
     assert unit.accelerometer.pulse[0] == pytest.approx(2.157463e-4)  # 2·11e-6·9.80665
     bare = replace(unit.gyro, dithered=False)

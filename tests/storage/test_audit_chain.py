@@ -13,6 +13,7 @@ from bench_service.persistence import Database, open_stores
 from bench_service.persistence.telemetry import audit_store
 from bench_service.persistence.telemetry.audit_store import SqlAuditTrail
 from bench_service.telemetry.audit import AuditEntry
+from bench_service.telemetry.audit_retention import AuditRetention
 from bench_service.wall_clock import new_id, now
 
 BEGUN = now() - timedelta(days=30)
@@ -169,3 +170,24 @@ def test_the_trail_of_an_older_service_is_chained_as_it_stands(empty_database_ur
         command.upgrade(config, "head")
     assert stores.audit.verify().whole
     database.dispose()
+
+
+def test_entries_go_when_their_retention_ends_and_that_is_an_entry_too(trail: SqlAuditTrail) -> None:
+    fill(trail, 10)
+    retention = AuditRetention(trail, now() - BEGUN - timedelta(days=4.5))
+    assert retention.look() == 1
+    report = trail.verify()
+    assert (report.whole, report.entries) == (True, 6)
+    (newest, *_) = trail.list().items
+    assert (newest.action, newest.detail["first"], newest.detail["last"]) == ("close_audit", 1, 5)
+    assert retention.look() == 0, "nothing more is as old"
+
+
+def test_a_broken_trail_keeps_all_and_says_so(
+    database: Database, trail: SqlAuditTrail, caplog: pytest.LogCaptureFixture
+) -> None:
+    fill(trail, 3)
+    execute(database, "UPDATE audit SET who = 'bo' WHERE sequence = 1")
+    assert AuditRetention(trail, timedelta(days=1)).look() == 0
+    assert trail.verify().entries == 3
+    assert "the audit chain is broken" in caplog.text

@@ -62,7 +62,7 @@ def test_a_job_that_may_not_start_yet_is_passed_over(stores: Stores, new_job: Ne
     place, behind = queue.place(later.id, True), queue.place(ready.id, True)
     assert place is not None
     assert (place.position, place.ahead) == (1, 0)
-    assert place.waiting == f"it is tried again at {(NOW + 30 * SECOND).isoformat()}"
+    assert place.waiting == f"it starts no earlier than {(NOW + 30 * SECOND).isoformat()}"
     assert behind is not None
     assert (behind.position, behind.ahead, behind.waiting) == (2, 0, "it is next")
     first = claim_next(stores)

@@ -7,7 +7,7 @@ from threading import Thread
 import pytest
 
 from bench_service.campaigns.run import CampaignRun, RunRequest
-from bench_service.campaigns.schedule import Missed, Overlap, Schedule
+from bench_service.campaigns.schedule import Missed, Overlap, Schedule, brought_back
 from bench_service.campaigns.scheduler import Scheduler, ScheduleRequest
 from bench_service.campaigns.stores import Stores
 from bench_service.model.errors import NotFound, NotMounted
@@ -129,3 +129,46 @@ def test_off_and_on_again(scheduler: Scheduler, stores: Stores) -> None:
     with pytest.raises(NotFound):
         scheduler.get(schedule.id)
     assert not scheduler.fire(schedule, DUE)
+
+
+@pytest.mark.parametrize(
+    ("last", "expected"),
+    [
+        (None, DUE),  # made, or switched on, while the clock was ahead
+        (DUE - timedelta(days=1), DUE),
+        (DUE + timedelta(days=365), DUE),  # it started a year ahead
+        (DUE, None),  # it started two hours ahead of this night: it is not repeated
+    ],
+)
+def test_a_clock_that_was_ahead_and_is_right_again_takes_no_night_away(
+    scheduler: Scheduler, stores: Stores, last: datetime | None, expected: datetime | None
+) -> None:
+    at = DUE - timedelta(hours=2)
+    late = DUE + timedelta(days=1) if last == DUE else DUE + timedelta(days=366)
+    schedule = due(stores, scheduler, last_at=last)
+    assert stores.campaigns.save_schedule(replace(schedule, next_at=late), DUE, None)
+    found = brought_back(scheduler.get(schedule.id), at)
+    assert found == expected
+
+
+def test_a_start_that_is_brought_back_says_why_and_a_right_one_stays(scheduler: Scheduler, stores: Stores) -> None:
+    right = scheduler.add(NIGHTLY)
+    assert right.next_at is not None
+    wrong = scheduler.add(NIGHTLY)
+    ahead = right.next_at + timedelta(days=366)
+    assert stores.campaigns.save_schedule(replace(wrong, next_at=ahead), wrong.next_at, None)
+    scheduler.fire_due()
+    assert scheduler.get(right.id) == right
+    found = scheduler.get(wrong.id)
+    assert found.next_at == right.next_at
+    assert found.last_outcome.startswith("the clock was ahead: the next start was ")
+    assert runs(stores) == []
+
+
+def test_a_clock_put_right_by_minutes_repeats_no_start() -> None:
+    every_minute = Schedule("id", "* * * * *", "UTC", "trial", "U-1", DUE)
+    shortly = replace(every_minute, last_at=DUE + timedelta(minutes=10), next_at=DUE + timedelta(minutes=11))
+    assert brought_back(shortly, DUE) is None
+    far = replace(every_minute, last_at=DUE + timedelta(days=1), next_at=DUE + timedelta(days=1, minutes=1))
+    assert brought_back(far, DUE) == DUE + timedelta(minutes=1)
+    assert brought_back(replace(every_minute, last_at=DUE, next_at=DUE + timedelta(minutes=1)), DUE) is None

@@ -8,7 +8,7 @@ import asyncio
 import getpass
 import hmac
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from ipaddress import IPv4Network, IPv6Network, ip_address, ip_network
 from typing import Any
 
@@ -21,6 +21,7 @@ from bench_service.access.book import AccessBook
 from bench_service.access.credentials import csrf_of, digest_of
 from bench_service.access.identity import Identity, Proof
 from bench_service.access.roles import Role
+from bench_service.access.service import SERVICE_TOKEN
 from bench_service.api.http.door import Door, Refusal
 from bench_service.settings import Settings
 from bench_service.wall_clock import now
@@ -30,8 +31,6 @@ COOKIE, SECURE_COOKIE = "bench_session", "__Host-bench_session"
 CSRF_HEADER = "X-CSRF-Token"
 LOOK_AGAIN_S = 0.5
 """Longest time that a request with an unknown credential waits for another look at the database [s]."""
-SERVICE_TOKEN = "service-token"
-"""Name of the program that has the token of `BENCH_TOKEN_FILE`."""
 PEER = "bench.peer"
 """Key of the request's scope: the address of the socket, before a proxy's word about it is taken."""
 FOUND = "bench.access"
@@ -49,6 +48,18 @@ class Found:
     """Somebody whose session has ended by itself, and who still may stop a bench."""
     refusal: Refusal | None = None
     """The reason why there is no identity."""
+    claims: bool = False
+    """True where nobody logs in, so that the name counts which a client gives itself."""
+
+    @property
+    def proven_name(self) -> str | None:
+        """The name that is proved, also by a session that has ended."""
+        identity = self.identity or self.stopper
+        return None if identity is None else identity.proven_name
+
+    def name(self, claimed: str | None) -> str | None:
+        """The name that counts: the proved one; where nobody logs in the one that a client gives itself."""
+        return self.proven_name or (claimed if self.claims else None)
 
 
 @dataclass(frozen=True)
@@ -154,6 +165,11 @@ class Identification:
         by_proxy = self._proxies.header is not None and self._proxies.header in headers
         return by_proxy or "authorization" in headers or cookie_of(headers) is not None
 
+    @property
+    def log_in_on(self) -> bool:
+        """Return whether people log in."""
+        return self._book.log_in_on
+
     async def look_again(self) -> None:
         """Have accounts and tokens read again, for a short time at the most."""
         await asyncio.wait((asyncio.wrap_future(self._book.refreshed()),), timeout=LOOK_AGAIN_S)
@@ -179,13 +195,13 @@ class Identified:
         if found.identity is None and self._rules.has_credential(headers):
             await self._rules.look_again()
             found = self._rules.find(headers, client, peer)
-        return found
+        return replace(found, claims=not self._rules.log_in_on)
 
 
 class PeerKept:
     """ASGI middleware that keeps the address of the socket, before a proxy's word about its client is taken."""
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: Any) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

@@ -21,9 +21,10 @@ from bench_service.api.http.dependencies import (
     REQUESTED_BY,
     After,
     ClientName,
+    IdempotencyKey,
     Limit,
-    ProvenName,
     RequestedBy,
+    Sender,
     Service,
 )
 from bench_service.api.http.errors import problems
@@ -34,7 +35,8 @@ from bench_service.wall_clock import now
 router = APIRouter(prefix="/api/v1/benches", tags=["benches"])
 
 
-def _view(service: BenchService, bench_id: str) -> BenchView:
+def view_of(service: BenchService, bench_id: str) -> BenchView:
+    """Build the view of a bench: what it is, what it does, how safe it is. Raises `NotFound`."""
     description = service.benches.description(bench_id)
     running = service.jobs.driving_job(bench_id)
     live = service.live.of_bench(bench_id)
@@ -59,13 +61,13 @@ def _view(service: BenchService, bench_id: str) -> BenchView:
 @router.get("", responses=problems())
 def list_benches(service: Service) -> list[BenchView]:
     """List every bench that a worker of this database has registered."""
-    return [_view(service, bench_id) for bench_id in service.benches.ids()]
+    return [view_of(service, bench_id) for bench_id in service.benches.ids()]
 
 
 @router.get("/{bench_id}", responses=problems(404))
 def read_bench(bench_id: str, service: Service) -> BenchView:
     """Read one bench: live state, limits, declared accuracy, and the job that drives it."""
-    return _view(service, bench_id)
+    return view_of(service, bench_id)
 
 
 @router.get("/{bench_id}/queue", responses=problems(404))
@@ -80,16 +82,23 @@ def read_queue(bench_id: str, service: Service) -> QueueView:
 
 @router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 413, 507))
 async def stop(
-    bench_id: str, service: Service, client: ClientName, proven: ProvenName, body: StopRequest | None = None
+    bench_id: str,
+    service: Service,
+    client: ClientName,
+    sender: Sender,
+    body: StopRequest | None = None,
+    key: IdempotencyKey = None,
 ) -> Stopping:
     """Stop a bench by software: end the running job, stop the table, switch the unit off; until this stop is released.
 
     The stop goes to the bench itself first, on its host, and needs no database for that: a worker sees it, and in its
     place the bench's supervisor. The database follows when it can; `books` says why where it has not yet. Several stops
-    of a bench can stand at the same time.
+    of a bench can stand at the same time, sixteen at most: of one more, `books` says that it waits. Sent again with its
+    Idempotency-Key it is the same stop, as long as this process lives.
     """
     asked = body or StopRequest.model_validate({})
-    done = await stop_in_own_thread(service.stops, bench_id, asked.reason, proven or asked.by or client)
+    by = sender.name(asked.by) or client
+    done = await stop_in_own_thread(service.stops, bench_id, asked.reason, by, key, wait=asked.wait)
     return Stopping(
         bench=bench_id, stop=done.stop.id, job=done.job, safety=SafetyView.of(done.safety), books=done.books or None
     )
@@ -105,7 +114,7 @@ def list_stops(bench_id: str, service: Service, after: After = None, limit: Limi
 
 @router.post("/{bench_id}/stops/{stop_id}/release", responses=problems(404, 409, 413, 507), dependencies=[TeamOfBench])
 def release_stop(
-    bench_id: str, stop_id: str, service: Service, body: ReleaseRequest, proven: ProvenName, requested_by: RequestedBy
+    bench_id: str, stop_id: str, service: Service, body: ReleaseRequest, sender: Sender, requested_by: RequestedBy
 ) -> Releasing:
     """Release one stop, the client's own or another's, once the bench is known to be safe.
 
@@ -113,7 +122,7 @@ def release_stop(
     `X-Requested-By`. The jobs in the bench's queue go on once
     no stop stands.
     """
-    by = proven or body.by or requested_by
+    by = sender.name(body.by) or requested_by
     if by is None:
         text = f"the person who releases a stop names himself, here or in {REQUESTED_BY}"
         raise RequestValidationError([{"type": "missing", "loc": ("body", "by"), "msg": text, "input": None}])
@@ -129,4 +138,4 @@ def release(bench_id: str, service: Service, client: ClientName) -> BenchView:
     The bench must be known to be safe. The jobs that wait in its queue go on.
     """
     service.stops.release_only(bench_id, client, "")
-    return _view(service, bench_id)
+    return view_of(service, bench_id)

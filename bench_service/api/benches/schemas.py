@@ -1,11 +1,10 @@
 """HTTP schemas of benches: their state, safety, queue and stops."""
 
 from datetime import datetime
-from typing import Annotated
 
 from pydantic import BaseModel, Field
 
-from bench_service.api.http.dependencies import NO_CONTROL_CHARACTERS, REQUESTED_BY, WHO_LENGTH
+from bench_service.api.http.dependencies import By
 from bench_service.api.http.fields import Request
 from bench_service.bench.devices import DeviceState
 from bench_service.bench.live.values import BenchLive
@@ -15,21 +14,15 @@ from bench_service.mapping import copied
 from bench_service.model.records import BenchStop
 from procedures.bench import BenchDescription
 
-By = Annotated[
-    str,
-    Field(
-        min_length=1,
-        max_length=WHO_LENGTH,
-        pattern=NO_CONTROL_CHARACTERS.pattern,
-        description=f"Who does it; without it, `{REQUESTED_BY}` counts",
-    ),
-]
-
 
 class StopRequest(Request):
     """Request to stop a bench, with reason and author."""
 
     reason: str = Field("stopped by an operator", min_length=1, max_length=500)
+    wait: bool = Field(
+        True,
+        description="Answer once the devices are safe and the database has it, at most a second later; false: at once",
+    )
     by: By | None = None
 
 

@@ -15,12 +15,15 @@ LONGEST_S = 6.0
 _waiting = 0
 
 
-async def stop_in_own_thread(stops: StopService, bench_id: str, reason: str, by: str) -> Stopped:
+async def stop_in_own_thread(
+    stops: StopService, bench_id: str, reason: str, by: str, key: str | None = None, *, wait: bool = True
+) -> Stopped:
     """Run `StopService.stop` in a thread of its own, outside the pool of all other routes. Raises what it raises."""
     global _waiting
     _waiting += 1
     try:
-        work = partial(stops.stop, bench_id, reason, by, patient=_waiting <= PATIENT)
+        patient = wait and _waiting <= PATIENT
+        work = partial(stops.stop, bench_id, reason, by, patient=patient, key=key)
         return await asyncio.wait_for(asyncio.wrap_future(in_background("stop", work)), LONGEST_S)
     except TimeoutError:
         raise StorageFailure(

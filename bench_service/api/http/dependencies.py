@@ -4,10 +4,11 @@ import re
 from typing import Annotated
 
 from fastapi import Depends, Header, Query, Request
+from pydantic import AfterValidator, Field
 
 from bench_service.access.identity import Identity, Proof
 from bench_service.access.roles import Role
-from bench_service.api.access.identify import found_of
+from bench_service.api.access.identify import Found, found_of
 from bench_service.jobs.events.hub import EventHub
 from bench_service.service import BenchService
 
@@ -37,8 +38,28 @@ NOBODY = Identity("", Role.VIEWER, Proof.NONE, proven=False)
 """Somebody on this host who has not logged in, and may only stop a bench."""
 REQUESTED_BY = "X-Requested-By"
 WHO_LENGTH = 200
+By = Annotated[
+    str,
+    Field(
+        min_length=1,
+        max_length=WHO_LENGTH,
+        pattern=NO_CONTROL_CHARACTERS.pattern,
+        description=f"Who does it; without it, `{REQUESTED_BY}` counts",
+    ),
+]
+
+
+def as_utf8(text: str | None) -> str | None:
+    """Read a header as the UTF-8 that browsers send; one that is none stays as it came (ISO 8859-1)."""
+    try:
+        return None if text is None else text.encode("latin-1").decode("utf-8")
+    except (UnicodeEncodeError, UnicodeDecodeError):
+        return text
+
+
 _Claimed = Annotated[
     str | None,
+    AfterValidator(as_utf8),
     Header(
         alias=REQUESTED_BY,
         min_length=1,
@@ -56,20 +77,24 @@ async def _identity(request: Request) -> Identity:
     return found_of(request.scope).identity or NOBODY
 
 
+async def _found(request: Request) -> Found:
+    return found_of(request.scope)
+
+
 async def _proven_name(request: Request) -> str | None:
-    found = found_of(request.scope)
-    identity = found.identity or found.stopper
-    return None if identity is None else identity.proven_name
+    return found_of(request.scope).proven_name
 
 
+Sender = Annotated[Found, Depends(_found)]
+"""Everything that is known of the sender of the request."""
 Me = Annotated[Identity, Depends(_identity)]
 """The identity of the request; on routes that need none it may be nobody's."""
 ProvenName = Annotated[str | None, Depends(_proven_name)]
 """The name that the request has proved; None where a client names itself."""
 
 
-async def _requested_by(proven: ProvenName, claimed: _Claimed = None) -> str | None:
-    return proven or claimed
+async def _requested_by(sender: Sender, claimed: _Claimed = None) -> str | None:
+    return sender.name(claimed)
 
 
 RequestedBy = Annotated[str | None, Depends(_requested_by)]

@@ -18,10 +18,10 @@ from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from bench_service.access.credentials import names_token, without_tokens
 from bench_service.api.http.errors import respond
 from bench_service.model.errors import Misconfigured
 from bench_service.settings import BadSettings, Settings
+from bench_service.telemetry.redaction import names_token, without_tokens
 from bench_service.wall_clock import monotonic_s
 
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "[::1]")

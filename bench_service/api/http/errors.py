@@ -1,6 +1,5 @@
 """One table from errors to status codes, and problem+json (RFC 9457) for all of them."""
 
-from asyncio import CancelledError
 from collections.abc import Sequence
 from http import HTTPStatus
 from math import ceil
@@ -11,7 +10,6 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from bench_service.api.http.headers import SECURITY_HEADERS
 from bench_service.api.http.status import status_of
@@ -99,49 +97,6 @@ def install(app: FastAPI) -> None:
     for error in (DomainError, ServiceError, BenchError):
         app.add_exception_handler(error, _on_known)
     app.add_exception_handler(Exception, _on_unknown)
-    app.add_middleware(RefuseNul)
-    app.add_middleware(AnswerAtTheEnd)
-
-
-class AnswerAtTheEnd:
-    """Middleware that answers every request still at work when the server's grace period is over. Such a request may be
-    repeated: what it asked for may be done or not, which its `Idempotency-Key` sorts out. A stream ends, unfinished.
-    """
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        begun = False
-
-        async def sent(message: Message) -> None:
-            nonlocal begun
-            begun = True
-            await send(message)
-
-        try:
-            await self._app(scope, receive, sent)
-        except CancelledError:
-            if scope["type"] != "http":
-                raise
-            if begun:  # a stream, cut here: the server closes its connection, and the client sees that it is not whole
-                return
-            text = "the service is ending, and this request had not ended: ask again, with the same Idempotency-Key"
-            await respond(Request(scope), 503, text, "Ending")(scope, receive, send)
-
-
-class RefuseNul:
-    """ASGI middleware that refuses addresses with the character NUL, which no database can hold in a text."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] == "http" and ("\x00" in scope["path"] or b"%00" in scope["query_string"]):
-            refusal = respond(Request(scope), 400, "an address may not contain the character NUL", "BadRequest")
-            await refusal(scope, receive, send)
-            return
-        await self._app(scope, receive, send)
 
 
 def problem_of(request: Request, error: DomainError | ServiceError | ValidationError) -> Problem:

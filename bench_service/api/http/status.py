@@ -4,6 +4,8 @@ from bench_service.model.errors import (
     AlreadyReserved,
     BenchBusy,
     CalibrationRefused,
+    DamagedDatabase,
+    DamagedRecording,
     IdempotencyConflict,
     IllegalTransition,
     LockedOut,
@@ -46,6 +48,8 @@ STATUS: dict[type[Exception], int] = {
     DomainError: 422,
     BenchError: 502,
     StorageFull: 507,
+    DamagedRecording: 409,
+    DamagedDatabase: 500,
     StorageFailure: 503,
     ServiceError: 500,
 }

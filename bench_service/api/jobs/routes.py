@@ -8,16 +8,29 @@ from fastapi.responses import JSONResponse, StreamingResponse
 
 from bench_service.access.service import require_team
 from bench_service.api.access.teams import TeamOfJob
-from bench_service.api.http.dependencies import After, Hub, IdempotencyKey, Limit, Me, RequestedBy, Service
+from bench_service.api.http.dependencies import (
+    After,
+    ClientName,
+    Hub,
+    IdempotencyKey,
+    Limit,
+    Me,
+    ProvenName,
+    RequestedBy,
+    Service,
+)
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.queries import Searched
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs.schemas import (
+    CancelRequest,
+    EventView,
     ForeignJob,
     JobChange,
     JobPage,
     JobSubmission,
     JobView,
+    NoteRequest,
     PromptAnswer,
     Reanalysis,
     Truth,
@@ -39,6 +52,7 @@ OF_A_JOB = (
     "change_job",
     "cancel",
     "answer",
+    "add_note",
     "pause",
     "resume",
     "events",
@@ -118,17 +132,21 @@ def change_job(job_id: str, body: JobChange, service: Service) -> JobView:
     dependencies=[TeamOfJob],
     response_model=JobView,
     responses={
-        **problems(404, 409, 507),
+        **problems(404, 409, 413, 507),
         200: {"model": ForeignJob, "description": "Noted; the job is not understood here"},
     },
 )
-def cancel(job_id: str, service: Service) -> JobView | JSONResponse:
+def cancel(
+    job_id: str, service: Service, client: ClientName, proven: ProvenName, body: CancelRequest | None = None
+) -> JobView | JSONResponse:
     """Cancel a job: a queued one at once, a running one as soon as its bench is safe. Its recordings are kept.
 
+    An event of the kind `note` has who cancelled it and why.
     A job that this version does not understand is cancelled too; the answer then holds only its state.
     """
     try:
-        return _view(service, service.jobs.cancel(job_id))
+        asked = body or CancelRequest.model_validate({})
+        return _view(service, service.jobs.cancel(job_id, proven or asked.by or client, asked.reason))
     except NotUnderstood as error:
         _, state = service.stores.jobs.last_event(job_id)
         return JSONResponse(ForeignJob(id=job_id, state=state, waiting=str(error)).model_dump(mode="json"), 200)
@@ -144,7 +162,16 @@ def pause(job_id: str, service: Service) -> JobView:
 def answer(job_id: str, body: PromptAnswer, service: Service, requested_by: RequestedBy) -> JobView:
     """Confirm that the person at the bench did what the job's prompt asks (`prompt`), or decline it."""
     said = Answer(body.done, body.remark, requested_by or "")
-    return _view(service, service.stores.prompts.answer(job_id, said, now()))
+    return _view(service, service.stores.prompts.answer(job_id, body.prompt, said, now()))
+
+
+@router.post("/{job_id}/notes", status_code=201, responses=problems(404, 409, 413, 507), dependencies=[TeamOfJob])
+def add_note(job_id: str, body: NoteRequest, service: Service, client: ClientName, proven: ProvenName) -> EventView:
+    """Add a person's remark to a job: an event of the kind `note`, with its author."""
+    said = {"text": body.text, "by": proven or body.by or client}
+    service.stores.jobs.note(job_id, "note", now(), said)
+    last, _ = service.stores.jobs.last_event(job_id)
+    return EventView.of(service.stores.jobs.events(job_id, last - 1)[0])
 
 
 @router.post("/{job_id}/resume", status_code=202, responses=problems(404, 409, 507), dependencies=[TeamOfJob])

@@ -5,6 +5,7 @@ from typing import Any
 
 from pydantic import AwareDatetime, BaseModel, Field
 
+from bench_service.api.http.dependencies import By
 from bench_service.api.http.fields import NAME, Labels, Request
 from bench_service.api.procedures import PreviewRequest
 from bench_service.bench.driver import TrueTriad
@@ -13,6 +14,8 @@ from bench_service.jobs.queue_service import Standing
 from bench_service.mapping import copied
 from bench_service.model.job import Event, Failure, Job, JobState
 from procedures.core.limits import Verdict
+
+NO_NUL = r"^[^\x00]*$"
 
 
 class JobSubmission(PreviewRequest):
@@ -24,6 +27,7 @@ class JobSubmission(PreviewRequest):
     seed: int | None = Field(None, ge=0, lt=2**48, description="Of a simulated bench: same seed, same bytes")
     retries: int = Field(0, ge=0, le=5, description="How often a fault of the bench is answered by trying again")
     reservation: str | None = Field(None, max_length=100, description="The reservation under which it runs")
+    not_before: AwareDatetime | None = Field(None, description="Earliest start; until then it waits in the queue")
     deadline_at: AwareDatetime | None = Field(None, description="No station begins later; the job then fails")
 
 
@@ -36,8 +40,23 @@ class JobChange(Request):
 class PromptAnswer(Request):
     """The answer of the person at the bench to a job's prompt."""
 
+    prompt: str = Field(max_length=100, description="Id of the prompt that is answered: an older one's is refused")
     done: bool = Field(description="It is done; false: it will not be, and the job ends cancelled")
-    remark: str = Field("", max_length=500, pattern=r"^[^\x00]*$")
+    remark: str = Field("", max_length=500, pattern=NO_NUL)
+
+
+class CancelRequest(Request):
+    """Request to cancel a job, with author and reason."""
+
+    reason: str = Field("", max_length=500, pattern=NO_NUL)
+    by: By | None = None
+
+
+class NoteRequest(Request):
+    """A remark of a person about a job."""
+
+    text: str = Field(min_length=1, max_length=2000, pattern=NO_NUL)
+    by: By | None = None
 
 
 class Reanalysis(Request):
@@ -78,8 +97,12 @@ class PlaceView(BaseModel):
 class PromptView(BaseModel):
     """A prompt for a person at the bench; the job waits for the answer."""
 
+    id: str = Field("", description="The answer names it")
     text: str
     asked_at: datetime
+    angles_deg: tuple[float, float, float] | None = Field(
+        None, description="Table angles of the wanted attitude: outer, middle, inner; null: it is about no attitude"
+    )
 
 
 class JobView(BaseModel):

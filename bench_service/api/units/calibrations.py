@@ -1,10 +1,11 @@
 """Routes of a unit's calibrations: history, known coefficients, and which one of each triad counts."""
 
+from collections.abc import Callable
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Depends, Path, Query, Response
 
-from bench_service.api.http.dependencies import After, ClientName, IdempotencyKey, Limit, Service
+from bench_service.api.http.dependencies import After, ClientName, IdempotencyKey, Limit, ProvenName, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.units.calibration_schemas import (
     CalibrationApproval,
@@ -42,6 +43,15 @@ def list_calibrations(
     return CalibrationPage(items=[CalibrationView.of(c) for c in page.items], next=page.next)
 
 
+async def _decider(client: ClientName, proven: ProvenName) -> Callable[[str | None, str], Decider]:
+    """The person who decides: the one who has logged in, or the name in the body, or the client's."""
+    return lambda by, remark: Decider(proven or by or client, remark, proven is not None)
+
+
+DeciderOf = Annotated[Callable[[str | None, str], Decider], Depends(_decider)]
+"""Makes the decider of a name and a remark, as the body gives them."""
+
+
 @router.post(
     "",
     status_code=201,
@@ -51,24 +61,24 @@ def enter_calibration(
     serial: Serial,
     body: CalibrationEntry,
     service: Service,
-    client: ClientName,
+    decider: DeciderOf,
     response: Response,
     key: IdempotencyKey = None,
 ) -> CalibrationView:
     """Enter known coefficients of a triad, with their standard uncertainties and their origin."""
     service.stores.units.unit(serial)
     calibration = stored_calibration(serial, body.entry())
-    by = Decider(body.by or client, body.remark)
+    by = decider(body.by, body.remark)
     stored = service.stores.calibrations.add(calibration, by, body.choose, _key("enter", key, serial, body))
     response.headers["Location"] = f"/api/v1/units/{serial}/calibrations/{stored.id}"
     return CalibrationView.of(stored)
 
 
 @router.post("/choose-by-rule", responses=problems(404, 409, 413, 507))
-def choose_by_rule(serial: str, body: RuleChoice, service: Service, client: ClientName) -> CalibrationView:
+def choose_by_rule(serial: str, body: RuleChoice, service: Service, decider: DeciderOf) -> CalibrationView:
     """Give a triad back to the rule: its newest usable calibration by a job that passed becomes current."""
     service.stores.units.unit(serial)
-    by = Decider(body.by or client, body.remark)
+    by = decider(body.by, body.remark)
     return CalibrationView.of(service.stores.calibrations.choose_by_rule(serial, body.triad, by))
 
 
@@ -88,11 +98,11 @@ def choose_calibration(
     calibration_id: str,
     body: CalibrationChoice,
     service: Service,
-    client: ClientName,
+    decider: DeciderOf,
     key: IdempotencyKey = None,
 ) -> CalibrationView:
     """Make a calibration the one of its triad that new jobs use; jobs that began before keep theirs."""
-    by = Decider(body.by or client, body.remark)
+    by = decider(body.by, body.remark)
     asked = _key("choose", key, serial, calibration_id, body)
     return CalibrationView.of(service.stores.calibrations.choose(serial, calibration_id, by, asked))
 
@@ -103,11 +113,11 @@ def approve_calibration(
     calibration_id: str,
     body: CalibrationApproval,
     service: Service,
-    client: ClientName,
+    decider: DeciderOf,
     key: IdempotencyKey = None,
 ) -> CalibrationView:
     """Approve a calibration, and say until when it is valid."""
-    by = Decider(body.by or client, body.remark)
+    by = decider(body.by, body.remark)
     asked = _key("approve", key, serial, calibration_id, body)
     return CalibrationView.of(service.stores.calibrations.approve(serial, calibration_id, by, body.valid_until, asked))
 
@@ -118,11 +128,11 @@ def reject_calibration(
     calibration_id: str,
     body: CalibrationRejection,
     service: Service,
-    client: ClientName,
+    decider: DeciderOf,
     key: IdempotencyKey = None,
 ) -> CalibrationView:
     """Reject a calibration: no new job uses it, also where it is current."""
-    by = Decider(body.by or client, body.remark)
+    by = decider(body.by, body.remark)
     asked = _key("reject", key, serial, calibration_id, body)
     return CalibrationView.of(service.stores.calibrations.reject(serial, calibration_id, by, asked))
 

@@ -9,6 +9,7 @@ from typing import Protocol
 
 from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.stop.word import StopWord
+from bench_service.model.errors import TooManyStops
 from bench_service.model.records import BenchStop
 
 LATE_S = 2.0
@@ -47,7 +48,10 @@ class StopExchange:
         words = self._channel.standing()
         for word in words:
             if not word.booked:
-                self._books.enter(word)
+                try:
+                    self._books.enter(word)
+                except TooManyStops:  # it stays in the channel, and is entered once another one is released
+                    continue
                 self._channel.mark_booked([word.id])
         standing = {stop.id: stop for stop in self._books.standing()}
         self._channel.clear(word.id for word in words if word.booked and word.id not in standing)

@@ -126,14 +126,15 @@ def _spawn(settings: Settings) -> Process:
         "BENCH_DATABASE_URL": settings.database_url,
         "BENCH_ID": settings.bench_id,
         "BENCH_DEVICE_FOLDER": str(folder),
+        "BENCH_LOG_FILE": str(log_of(settings)),
     }
-    with log_of(settings).open("ab") as log_file:
+    with output_of(settings).open("wb") as output:  # what is no line of its log: the end of one that did not start
         return subprocess.Popen(
             [sys.executable, "-m", "bench_service", "supervise", "--companion"],
             env=environment,
             stdin=subprocess.DEVNULL,
-            stdout=log_file,
-            stderr=log_file,
+            stdout=output,
+            stderr=output,
             start_new_session=True,
         )
 
@@ -141,3 +142,8 @@ def _spawn(settings: Settings) -> Process:
 def log_of(settings: Settings) -> Path:
     """Return the path of the companion's log file."""
     return settings.devices_in() / f"bench-{settings.bench_id}.supervisor.log"
+
+
+def output_of(settings: Settings) -> Path:
+    """Return the path of the file with what the latest companion printed."""
+    return settings.devices_in() / f"bench-{settings.bench_id}.supervisor.out"

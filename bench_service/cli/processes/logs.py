@@ -7,16 +7,21 @@ import logging
 import re
 import sys
 from datetime import UTC, datetime
+from logging.handlers import RotatingFileHandler
 
-from bench_service.access.credentials import without_tokens
+from bench_service.model.errors import Misconfigured
 from bench_service.settings import Settings
 from bench_service.telemetry.log_context import AddSubjects
+from bench_service.telemetry.log_restraint import Restraint
+from bench_service.telemetry.redaction import without_tokens
 
 FIELDS = "{asctime} {levelname} {name} {message}"
 OWN_HANDLERS = ("uvicorn", "uvicorn.error", "uvicorn.access", "dbos")
 """Loggers of libraries that install a handler of their own unless they find one; some put tracebacks into messages."""
 
 
+FILE_BYTES, FILES_KEPT = 10_000_000, 5
+"""Length at which a log file is begun anew, and how many older ones are kept."""
 TRACE = "    | "
 """Prefix of each line of a traceback: a message with a line break in it cannot look like a line of the log."""
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
@@ -45,8 +50,13 @@ class Lines(logging.Formatter):
 
 
 def set_up(settings: Settings, level: str) -> None:
-    """Write lines of at least this level to standard error; the setting `log_level` counts more, where given."""
-    handler = logging.StreamHandler(sys.stderr)
+    """Write lines of at least this level to standard error, or to the settings' log file.
+
+    The setting `log_level` counts more than `level`, where given. Raises `Misconfigured` for a file that cannot be
+    written.
+    """
+    handler = _handler(settings)
+    handler.addFilter(Restraint())
     handler.addFilter(AddSubjects(bench=settings.bench_id))
     handler.setFormatter(_json_lines() if settings.log == "json" else Lines())
     wanted = (settings.log_level or level).upper()
@@ -54,6 +64,8 @@ def set_up(settings: Settings, level: str) -> None:
     for old in root.handlers[:]:
         if isinstance(old, logging.StreamHandler) and any(isinstance(f, AddSubjects) for f in old.filters):
             root.removeHandler(old)
+            if isinstance(old, RotatingFileHandler):
+                old.close()
     root.addHandler(handler)
     root.setLevel(logging.WARNING)
     logging.getLogger("bench_service").setLevel(wanted)
@@ -65,6 +77,18 @@ def set_up(settings: Settings, level: str) -> None:
     logging.getLogger("uvicorn").setLevel(logging.WARNING)
     logging.getLogger("uvicorn.access").setLevel(logging.INFO if settings.log_access else logging.WARNING)
     logging.getLogger("uvicorn.error").setLevel("INFO" if wanted == "DEBUG" else logging.WARNING)
+
+
+def _handler(settings: Settings) -> logging.Handler:
+    if settings.log_file is None:
+        return logging.StreamHandler(sys.stderr)
+    try:
+        settings.log_file.parent.mkdir(parents=True, exist_ok=True)
+        handler = RotatingFileHandler(settings.log_file, maxBytes=FILE_BYTES, backupCount=FILES_KEPT, encoding="utf-8")
+        settings.log_file.chmod(0o600)  # begun before the service takes rights away from what it makes
+        return handler
+    except OSError as error:
+        raise Misconfigured(f"BENCH_LOG_FILE {settings.log_file} cannot be written: {error.strerror}") from error
 
 
 def _json_lines() -> logging.Formatter:

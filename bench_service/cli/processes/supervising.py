@@ -64,7 +64,10 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
         if listener is not None:
             listener.begin()
             closing.callback(listener.end)
-        say(f"supervising bench {bench}")
+        if companion:
+            log.info("supervising bench %s", bench)
+        else:
+            say(f"supervising bench {bench}")
         Supervisor(bench, devices, files, books, take_lease, channel, heartbeat, listener).run(ending, companion)
     return 0
 

@@ -1,10 +1,63 @@
-"use strict";
-// Sends a form to the API as JSON. Whatever is answered is shown beside the form: nothing fails in silence.
-const NAME = "bench.name", PATIENCE_MS = 15000;
+// Verbs of the pages. What cannot be undone asks once, says what is lost, and takes name and reason; a refusal is shown.
+import { ask, iAm, me } from "./api.js";
+import { h } from "./dom.js";
+import { t } from "./words.js";
 
-function refused(output, text) {
-  output.className = "refused";
-  output.textContent = text;
+let dialogs = 0;
+
+/** Asks once: gives {by, reason} or null where the person does not want it after all. */
+export function confirmed({ title, lost, verb, reason = null, by = false }) {
+  return new Promise((settle) => {
+    const id = `dialog-${++dialogs}`;
+    const name = by && h("label", {}, t("Your name"), h("input", { name: "by", required: true, maxlength: 200, autocomplete: "name", value: me() }));
+    const why = reason && h("label", {}, reason.label, h("input", { name: reason.name || "reason", maxlength: 500, required: reason.required, placeholder: reason.hint }));
+    const form = h("form", { method: "dialog" }, h("h2", { id }, title), lost && h("p", {}, lost), name, why,
+      h("div", { class: "verbs" }, h("button", { type: "submit", class: "danger" }, verb), h("button", { type: "button", class: "quiet", onclick: () => box.close() }, t("Back"))));
+    const box = h("dialog", { "aria-labelledby": id }, form);
+    let given = null;
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      given = Object.fromEntries([...new FormData(form)].filter(([, value]) => value !== ""));
+      if (given.by) iAm(given.by);
+      box.close();
+    });
+    box.addEventListener("close", () => { box.remove(); settle(given); });
+    document.body.append(box);
+    box.showModal();
+  });
+}
+
+/** Does something for a button: it is busy meanwhile, and `output` says how it ended. */
+export async function busy(button, output, work) {
+  button.disabled = true;
+  output.className = "note";
+  output.textContent = t("Asking …");
+  try {
+    const done = await work();
+    output.className = "done";
+    output.textContent = typeof done === "string" ? done : t("Done.");
+    return done;
+  } catch (error) {
+    output.className = "refused";
+    output.textContent = error.message;
+    return undefined;
+  } finally {
+    button.disabled = false;
+  }
+}
+
+/** A button that asks the API; `confirm` asks the person first. */
+export function verb(label, { method = "POST", path, body = {}, confirm = null, then = null, kind = "" }) {
+  const output = h("output", { role: "status" });
+  const button = h("button", { type: "button", class: kind }, label);
+  button.addEventListener("click", async () => {
+    const given = confirm ? await confirmed(confirm) : {};
+    if (given === null) return;
+    const sent = { ...(typeof body === "function" ? body() : body), ...given };
+    const done = await busy(button, output, () => ask(method, path, Object.keys(sent).length ? sent : undefined));
+    if (done !== undefined && then) then(done);
+  });
+  return h("span", { class: "verb" }, button, output);
 }
 
 function documentOf(form) {
@@ -12,50 +65,21 @@ function documentOf(form) {
   return { ...JSON.parse(form.dataset.document || "{}"), ...Object.fromEntries(fields) };
 }
 
-async function problemOf(answer) {
-  let problem = {};
-  try { problem = await answer.json(); } catch { /* no problem document: the status alone is shown */ }
-  const errors = (problem.errors || []).map((one) => `${one.field}: ${one.message}${one.value ? ` (${one.value})` : ""}`);
-  return `Refused (${answer.status}): ${[problem.detail || answer.statusText, ...errors].join("; ")}`;
-}
-
-async function ask(form) {
-  const output = form.querySelector("output"), button = form.querySelector("button");
-  const sent = documentOf(form), request = { method: "POST", signal: AbortSignal.timeout(PATIENCE_MS) };
-  const csrf = document.querySelector('meta[name="csrf"]');
-  request.headers = csrf ? { "X-CSRF-Token": csrf.content } : {};
-  if (Object.keys(sent).length) {
-    request.headers["Content-Type"] = "application/json";
-    request.body = JSON.stringify(sent);
+/** Forms that are in the page already: sent as JSON, asked once where they say so. */
+export function wire(within = document) {
+  for (const form of within.querySelectorAll("form.act")) {
+    const name = form.elements.namedItem("by");
+    if (name && !name.value) name.value = me();
+    form.addEventListener("submit", async (event) => {
+      event.preventDefault();
+      const { ask: title, lost, verb: label, reason, reasonName } = form.dataset;
+      const given = title ? await confirmed({ title, lost, verb: label, by: "by" in form.dataset, reason: reason ? { label: reason, name: reasonName } : null }) : {};
+      if (given === null) return;
+      const sent = { ...documentOf(form), ...given };
+      if (sent.by) iAm(sent.by);
+      const done = await busy(form.querySelector("button"), form.querySelector("output"),
+        () => ask("POST", form.getAttribute("action"), Object.keys(sent).length ? sent : undefined));
+      if (done !== undefined) location.reload();
+    });
   }
-  if (sent.by) localStorage.setItem(NAME, sent.by);
-  button.disabled = true;
-  output.className = "note";
-  output.textContent = "Asking …";
-  try {
-    const answer = await fetch(form.getAttribute("action"), request);
-    if (answer.ok) {
-      const said = await answer.json().catch(() => ({}));
-      if (said.safety && (said.books || said.safety.safe !== true)) {  // a stop: where the page may not load anew
-        refused(output, [said.safety.explanation, said.books && `The database does not have it yet: ${said.books}.`]
-          .filter(Boolean).join(" "));
-        button.disabled = false;
-        return;
-      }
-      location.reload();
-      return;
-    }
-    refused(output, await problemOf(answer));
-  } catch (error) {
-    refused(output, error.name === "TimeoutError"
-      ? `No answer within ${PATIENCE_MS / 1000} s: it is not known whether this was done. Use the hardware emergency stop where there is danger.`
-      : "Nothing answers: the service is not reached. Use the hardware emergency stop where there is danger.");
-  }
-  button.disabled = false;
-}
-
-for (const form of document.querySelectorAll("form.act")) {
-  const name = form.elements.namedItem("by");
-  if (name && !name.value) name.value = localStorage.getItem(NAME) || "";
-  form.addEventListener("submit", (event) => { event.preventDefault(); ask(form); });
 }

@@ -1,6 +1,8 @@
-"use strict";
-// Loads the page anew every three seconds, unless somebody reads a refusal or fills in a form.
+// Loads the page anew while its campaign runs, unless somebody reads a refusal, fills in a form, or the service is away.
+import * as feed from "./feed.js";
+
 setInterval(() => {
-  const busy = document.activeElement instanceof HTMLInputElement || document.querySelector("output.refused");
-  if (!busy) location.reload();
+  const busy = document.activeElement instanceof HTMLInputElement || document.querySelector("output.refused, dialog[open]");
+  const reading = document.querySelector("form.stop output:not([hidden])");
+  if (!busy && !reading && feed.state.alive === true) location.reload();
 }, 3000);

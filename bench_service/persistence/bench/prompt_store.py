@@ -4,7 +4,7 @@ from datetime import datetime
 
 from sqlalchemy import select
 
-from bench_service.bench.prompts import Answer
+from bench_service.bench.prompts import Answer, Prompt
 from bench_service.model.errors import IllegalTransition
 from bench_service.model.job import Job
 from bench_service.persistence.database import Database
@@ -19,20 +19,24 @@ class SqlPromptStore:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def ask(self, job_id: str, text: str, at: datetime) -> None:
+    def ask(self, job_id: str, prompt: Prompt) -> None:
+        asked = {"id": prompt.id, "text": prompt.text, "angles_deg": prompt.angles_deg}
         with self._database.write() as session:
             row = found_job(session, job_id, lock=True)
-            row.prompt = {"text": text, "asked_at": at.isoformat()}
-            append_event(session, job_id, "prompt", at, {"text": text})
+            row.prompt = {**asked, "asked_at": prompt.at.isoformat()}
+            append_event(session, job_id, "prompt", prompt.at, asked)
 
-    def answer(self, job_id: str, answer: Answer, at: datetime) -> Job:
+    def answer(self, job_id: str, prompt_id: str, answer: Answer, at: datetime) -> Job:
         said = {"done": answer.done, "remark": answer.remark, "by": answer.by}
         with self._database.write() as session:
             row = found_job(session, job_id, lock=True)
             if row.prompt is None or "answer" in row.prompt:
                 raise IllegalTransition(f"job {job_id} asks nothing of anybody now")
+            if row.prompt.get("id", "") != prompt_id:
+                text = f"job {job_id} asks something else now; this answer is to an older question: read it anew"
+                raise IllegalTransition(text)
             row.prompt = {**row.prompt, "answer": said}
-            append_event(session, job_id, "answer", at, said)
+            append_event(session, job_id, "answer", at, {**said, "prompt": prompt_id})
             return job_of_row(row)
 
     def answered(self, job_id: str) -> Answer | None:

@@ -5,11 +5,11 @@ from datetime import datetime
 from typing import Any
 
 from pydantic import TypeAdapter
-from sqlalchemy import select, update
+from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
 from bench_service import wall_clock
-from bench_service.model.errors import IllegalTransition, NotFound
+from bench_service.model.errors import IllegalTransition, NotFound, TooManyStops
 from bench_service.model.records import BenchStop, Page
 from bench_service.persistence.database import Database
 from bench_service.persistence.idempotency import again_after_conflict
@@ -17,6 +17,8 @@ from bench_service.persistence.pages import page
 from bench_service.persistence.tables.bench import BenchRow, BenchStopRow
 from procedures.bench import BenchDescription
 
+MOST_STANDING = 16
+"""Stops of a bench that may stand at a time, as many as its stop channel holds."""
 BENCH = TypeAdapter(BenchDescription)
 _STANDS = BenchStopRow.released_at.is_(None)
 _FIELDS = tuple(column.key for column in BenchStopRow.__table__.columns)
@@ -59,8 +61,16 @@ class SqlBenchRegistry:
     def stop_bench(self, stop: BenchStop) -> None:
         def once() -> None:
             with self._database.write() as session:
-                if session.get(BenchStopRow, stop.id) is None:
-                    session.add(_row_of_stop(stop))
+                if session.get(BenchStopRow, stop.id) is not None:
+                    return
+                self._database.one_at_a_time(session, f"stop bench {stop.bench}")
+                standing = select(func.count()).select_from(BenchStopRow).where(BenchStopRow.bench == stop.bench)
+                if (session.scalar(standing.where(_STANDS)) or 0) >= MOST_STANDING:
+                    raise TooManyStops(
+                        f"{MOST_STANDING} stops of bench {stop.bench!r} stand already and keep it from working; this "
+                        "one is stored once one of them is released"
+                    )
+                session.add(_row_of_stop(stop))
 
         again_after_conflict(once)
 

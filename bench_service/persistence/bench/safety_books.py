@@ -4,8 +4,6 @@ It needs few tables, and loads nothing else. The database is opened at the first
 even while the database does not answer.
 """
 
-from functools import cached_property
-
 from sqlalchemy import ColumnElement, select
 
 from bench_service import wall_clock
@@ -30,10 +28,16 @@ class SqlSafetyBooks:
     def __init__(self, database_url: str, bench_id: str) -> None:
         self._url = database_url
         self._bench_id = bench_id
+        self._opened: Database | None = None
 
-    @cached_property
+    @property
     def _database(self) -> Database:
-        return connect(self._url)
+        """The database; where its file was replaced, the one that is there now: this process outlives a service."""
+        if self._opened is not None and self._opened.replaced():
+            self.close()
+        if self._opened is None:
+            self._opened = connect(self._url)
+        return self._opened
 
     def standing(self) -> tuple[BenchStop, ...]:
         return SqlBenchRegistry(self._database).standing_stops(self._bench_id)
@@ -74,5 +78,6 @@ class SqlSafetyBooks:
 
     def close(self) -> None:
         """Close the database's connections."""
-        if "_database" in self.__dict__:
-            self._database.dispose()
+        opened, self._opened = self._opened, None
+        if opened is not None:
+            opened.dispose()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import TypeAdapter
 from sqlalchemy import ColumnElement, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from bench_service.mapping import copied
 from bench_service.model.calibrations import (
@@ -63,7 +63,9 @@ def decision_row(decision: Decision) -> CalibrationDecisionRow:
     return copied(CalibrationDecisionRow, decision, act=decision.act.value)
 
 
-def calibrations_where(session: Session, *conditions: ColumnElement[bool]) -> list[StoredCalibration]:
+def calibrations_where(
+    session: Session, *conditions: ColumnElement[bool] | InstrumentedAttribute[bool]
+) -> list[StoredCalibration]:
     """Read the calibrations that meet all conditions, in the order of their ids."""
     query = select(CalibrationRow).where(*conditions).order_by(CalibrationRow.id)
     return complete(session, session.scalars(query).all())

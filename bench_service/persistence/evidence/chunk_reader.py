@@ -53,4 +53,9 @@ class ChunkReader:
             raise self._failure(number, f"cannot be read: {error}") from error
 
     def _failure(self, number: int, what: str) -> DamagedRecording:
-        return DamagedRecording(f"chunk {number} of recording {self.recording_id} {what}")
+        first, last = number * self.chunk_rows, (number + 1) * self.chunk_rows - 1
+        return DamagedRecording(
+            f"chunk {number} of recording {self.recording_id} {what}; its samples, {first} to {last} at the most, are "
+            "lost here. Samples before and after it can be exported by start_s and stop_s; a copy of the database from "
+            "before the damage has them all"
+        )

@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 from sqlalchemy import bindparam, delete, select
 from sqlalchemy.orm import Session
 
+from bench_service.evidence.recordings import DamagedChunk
 from bench_service.formats.chunk import sample_type
 from bench_service.formats.content_hash import ContentHash
 from bench_service.model.errors import DamagedRecording, NotFound
 from bench_service.model.records import NewRecording, Page, RecordingState, StoredRecording
 from bench_service.model.search import EVERYTHING, Search
 from bench_service.persistence.database import Database
+from bench_service.persistence.evidence.chunk_check import damaged_chunks
 from bench_service.persistence.evidence.chunk_reader import ChunkReader
 from bench_service.persistence.evidence.recording_rows import info_of_row, stored_of_row
 from bench_service.persistence.evidence.recording_writer import SqlRecordingWriter
@@ -102,6 +104,12 @@ class SqlRecordingStore:
         for name in names:
             info.column(name)
         return reader.blocks(names, max(0, start), min(stop, info.count))
+
+    def damage(self, recording_id: str, start: int, stop: int) -> Iterator[DamagedChunk]:
+        with self._database.read() as session:
+            row = _found(session, recording_id)
+            rows, count = row.chunk_rows, row.samples
+        return damaged_chunks(self._database, recording_id, rows, max(0, start), min(stop, count))
 
     def checkpoint(self, job_id: str) -> dict[str, Any] | None:
         query = (

@@ -122,7 +122,8 @@ class SqlJobStore:
                 append_event(session, job_id, "station", at, {"station": station, **data})
             return job_of_row(row)
 
-    def request_cancel(self, job_id: str, at: datetime) -> Job:
+    def request_cancel(self, job_id: str, at: datetime, by: str = "", reason: str = "") -> Job:
+        said = {"cancel_requested": True} | {k: v for k, v in (("by", by), ("reason", reason)) if v}
         with self._database.write() as session:
             row = found_job(session, job_id, lock=True)
             state = state_of_row(row)
@@ -130,10 +131,11 @@ class SqlJobStore:
                 raise IllegalTransition(f"job {job_id} has ended: it is {state.value}, and cannot be cancelled")
             if state in (JobState.QUEUED, JobState.PAUSED, JobState.INTERRUPTED):
                 row.cancel_requested = True
+                append_event(session, job_id, "note", at, said)
                 move_job(session, row, JobState.CANCELLED, at)
             elif not row.cancel_requested:
                 row.cancel_requested = True
-                append_event(session, job_id, "note", at, {"cancel_requested": True})
+                append_event(session, job_id, "note", at, said)
         return job_of_row(row)  # after the commit: one that is not understood is cancelled all the same
 
     def request_pause(self, job_id: str, at: datetime) -> Job:

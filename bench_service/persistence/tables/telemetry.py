@@ -1,4 +1,4 @@
-"""SQL tables of the audit trail."""
+"""SQL tables of the audit trail and of the reports of upkeep."""
 
 from datetime import datetime
 from typing import Any
@@ -40,3 +40,18 @@ class AuditCheckpointRow(Table):
     digest: Mapped[str]
     closed_at: Mapped[datetime]
     closed_by: Mapped[str]
+
+
+class UpkeepRow(Table):
+    """A check of the database, or a copy of it, and its outcome."""
+
+    __tablename__ = "upkeep"
+    __table_args__ = (Index("ix_upkeep_kind_id", "kind", "id"),)
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    kind: Mapped[str]
+    began_at: Mapped[datetime]
+    ended_at: Mapped[datetime | None]
+    by: Mapped[str]
+    good: Mapped[bool | None]
+    document: Mapped[dict[str, Any]]

@@ -79,6 +79,8 @@ class TriadSummary:
     """Residuals over what noise and table allow; None without a spare equation and in results of older versions."""
     worst: str = ""
     """Station and channel with the greatest residual."""
+    left_out: Magnitudes | None = None
+    """Magnitudes out of sample, each station corrected by the fit of the others; None where that cannot be made."""
 
 
 def triad_summary(
@@ -87,6 +89,7 @@ def triad_summary(
     labels: Sequence[str],
     scalar: ScalarCheck | None = None,
     slow: float = 0.0,
+    left_out: Magnitudes | None = None,
 ) -> TriadSummary:
     """Numbers of a fit, ready to be stored; `slow` is the share of slow noise where the noise is not known."""
     misfit = residual_misfit(fit.residuals, fit.residual_sd, fit.chi_square, fit.degrees_of_freedom, labels, slow)
@@ -107,6 +110,7 @@ def triad_summary(
         fit.weighting,
         misfit.ratio,
         misfit.worst,
+        left_out,
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from procedures.analysis.calibration.estimator import Weighting
+from procedures.analysis.calibration.left_out import left_out_magnitudes
 from procedures.analysis.calibration.multiposition import TriadFit, fit_triad
 from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
 from procedures.analysis.calibration.reference_temperature import (
@@ -89,7 +90,8 @@ def analyse_inputs(
     fit = fit_triad(means.triad, means.output_unit, unit, vectors, means.outputs, noise, table, known, weighting)
     scalar = _scalar(means, reference, noise, known, fit) if with_scalar else None
     after = magnitudes(means.outputs, fit.calibration(), reference, means.labels, fit.magnitude_sd)
-    return triad_summary(fit, after, means.labels, scalar, _slow(means, noise, fit, known)), fit
+    others = left_out_magnitudes(fit, vectors, means.outputs, reference, means.labels)
+    return triad_summary(fit, after, means.labels, scalar, _slow(means, noise, fit, known), others), fit
 
 
 def _slow(means: StationMeans, noise: Array, fit: TriadFit, known: bool) -> float:

@@ -7,8 +7,9 @@ The thesis shows one program and no grammar; this is the least grammar that has 
     :demand:position axis,degrees; p axis,degrees; p axis,degrees
     delay seconds
 
-Axis 1 is the inner one, 2 the middle, 3 the outer. The thesis does not name them; the other way round its program would
-be no calibration: the accelerometers' design would have rank 3 of 4.
+By default axis 1 is the inner one, 2 the middle, 3 the outer; a controller that numbers them otherwise is a setting.
+The thesis does not name them; the other way round its program would be no calibration: the accelerometers' design would
+have rank 3 of 4.
 
 Letters may be large or small, blanks stand where they like between words. A demand sets the axes that it names, and the
 others stay; a delay is a dwell at what was demanded. Nothing else is understood, and nothing is skipped: a line outside
@@ -16,13 +17,16 @@ the dialect is refused with its number and what was expected.
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from procedures.core.errors import BadParameter
 from procedures.core.table_angles import TableAngles
 
 MODE, DEMAND, DELAY = ":mode:position", ":demand:position", "delay"
-AXES = {"1": "inner", "2": "middle", "3": "outer"}
+AXES = ("inner", "middle", "outer")
+"""Axes 1, 2 and 3 of a program, unless it is said otherwise."""
+NUMBERS = ("1", "2", "3")
 DEGREES_MAX = 3600.0
 """Greatest angle of a program, ten turns [deg]; the bench checks the range of its axes. This program's own limit."""
 DELAY_MAX_S = 86_400.0
@@ -49,6 +53,8 @@ class Dwell:
 class _Reader:
     """Demands accumulated from the lines read so far."""
 
+    axes: Sequence[str]
+    """Names of the axes 1, 2 and 3."""
     at: dict[str, float] = field(default_factory=dict[str, float])
     """Axis -> degrees, of axes that have a position."""
     pending: dict[str, int] = field(default_factory=dict[str, int])
@@ -74,8 +80,9 @@ class _Reader:
                 if word.casefold() != "p":
                     raise refusal(line, code, f"'p axis,degrees' after ';', not {part.strip()!r}")
             axis, comma, degrees = (piece.strip() for piece in named.partition(","))
-            if axis not in AXES:
-                raise refusal(line, code, f"an axis, 1 (inner), 2 (middle) or 3 (outer), not {axis!r}")
+            if axis not in NUMBERS:
+                names = [f"{number} ({name})" for number, name in zip(NUMBERS, self.axes, strict=True)]
+                raise refusal(line, code, f"an axis, {names[0]}, {names[1]} or {names[2]}, not {axis!r}")
             if not comma:
                 raise refusal(line, code, f"a comma and degrees after axis {axis}")
             if axis in self.pending:
@@ -89,7 +96,7 @@ class _Reader:
         delay_s = _number(line, code, rest, f"seconds, above 0 and at most {DELAY_MAX_S:g},", 0.0, DELAY_MAX_S)
         if delay_s == 0.0:
             raise refusal(line, code, f"seconds, above 0 and at most {DELAY_MAX_S:g}")
-        missing = [axis for axis in AXES if axis not in self.at]
+        missing = [axis for axis in NUMBERS if axis not in self.at]
         if missing:
             raise refusal(line, code, f"'{DEMAND}' of axis {', '.join(missing)} first: nobody knows where it stands")
         if len(self.dwells) == DWELLS_MAX:
@@ -98,17 +105,17 @@ class _Reader:
         self.pending.clear()
 
     def _angles(self) -> TableAngles:
-        degrees = {name: self.at[axis] for axis, name in AXES.items()}
+        degrees = {name: self.at[axis] for axis, name in zip(NUMBERS, self.axes, strict=True)}
         return TableAngles(degrees["outer"], degrees["middle"], degrees["inner"])
 
 
-def read_program(text: str) -> tuple[Dwell, ...]:
-    """The dwells of a program in order, one a delay.
+def read_program(text: str, axes: Sequence[str] = AXES) -> tuple[Dwell, ...]:
+    """The dwells of a program in order, one a delay; `axes` names its axes 1, 2 and 3.
 
     Raises `BadParameter` "program" with the line that is not understood as its value, the line's number and what was
     expected there; also where a demand has no delay, an axis no position, or the program no dwell.
     """
-    reader, lines = _Reader(), text.split("\n")
+    reader, lines = _Reader(axes), text.split("\n")
     for number, whole in enumerate(lines, start=1):
         if any(not c.isprintable() and c not in "\t\r" for c in whole):
             raise refusal(number, whole.strip(), "printable text")

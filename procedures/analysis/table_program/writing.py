@@ -1,10 +1,10 @@
 """Writes a position program in the language that `dialect` reads, and holds the positions of the thesis's own."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from procedures.analysis.table_program.dialect import DEMAND, MODE, Dwell
+from procedures.analysis.table_program.dialect import AXES, DEMAND, MODE, Dwell
 from procedures.core.table_angles import TableAngles
 
 THESIS_POSITIONS = (
@@ -17,17 +17,19 @@ THESIS_POSITIONS = (
 """(outer, middle, inner) [deg] and delay [s] of the calibration program in the thesis's appendix Д."""
 
 
-def write_program(dwells: Iterable[Dwell]) -> str:
-    """The program that `read_program` reads as the same dwells, but for the numbers of the lines.
+def write_program(dwells: Iterable[Dwell], axes: Sequence[str] = AXES) -> str:
+    """The program that `read_program` reads as the same dwells with these `axes`, but for the numbers of the lines.
 
     Every demand names all three axes, so that a program can be cut in two anywhere. Numbers have as many digits as they
     need to be read back exactly.
     """
-    lines = ["% axis 1 inner, 2 middle, 3 outer [deg]; a delay [s] counts from the demand before it", f"{MODE} all"]
+    named = f"% axis 1 {axes[0]}, 2 {axes[1]}, 3 {axes[2]} [deg]"
+    lines = [f"{named}; a delay [s] counts from the demand before it", f"{MODE} all"]
     for dwell in dwells:
         a = dwell.angles
-        outer, middle, inner = (_number(angle) for angle in (a.outer_deg, a.middle_deg, a.inner_deg))
-        lines += ["", f"{DEMAND} 1,{inner}; p 2,{middle}; p 3,{outer}", f"delay {_number(dwell.delay_s)}"]
+        of_axis = {"outer": a.outer_deg, "middle": a.middle_deg, "inner": a.inner_deg}
+        one, two, three = (_number(of_axis[name]) for name in axes)
+        lines += ["", f"{DEMAND} 1,{one}; p 2,{two}; p 3,{three}", f"delay {_number(dwell.delay_s)}"]
     return "\n".join(lines) + "\n"
 
 

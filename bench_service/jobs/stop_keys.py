@@ -1,0 +1,44 @@
+"""Idempotency keys of stop requests, in the memory of this process: a stop may not wait for a database to look one up.
+
+A stop that is sent again with its key, after a time-out or a broken connection, is the same stop. A key that comes with
+another body is a stop of its own: no stop is ever refused for its key.
+"""
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from threading import Lock
+
+from bench_service.bench.stop.word import StopWord
+
+MOST = 1000
+"""Number of keys that are remembered, the latest ones."""
+
+
+@dataclass
+class KeyedStop:
+    """The stop request of one key, and whether it was answered."""
+
+    word: StopWord
+    answered: bool = False
+
+
+class StopKeys:
+    """The stop requests of the latest keys. For any thread."""
+
+    def __init__(self) -> None:
+        self._mutex = Lock()
+        self._known: OrderedDict[tuple[str, str], KeyedStop] = OrderedDict()
+
+    def of(self, bench_id: str, key: str | None, word: StopWord) -> KeyedStop:
+        """Return the stop of a key where it is the same request, else the new one, remembered under the key."""
+        new = KeyedStop(word)
+        if key is None:
+            return new
+        with self._mutex:
+            known = self._known.get((bench_id, key))
+            if known is not None and (known.word.reason, known.word.by) == (word.reason, word.by):
+                return known
+            self._known[bench_id, key] = new
+            while len(self._known) > MOST:
+                self._known.popitem(last=False)
+            return new

@@ -1,0 +1,99 @@
+"""Messages that wait for one target: one file each, so that none is lost with the process, in the order they came."""
+
+import json
+import logging
+import os
+from dataclasses import asdict
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from bench_service.notifications.channels import Undelivered, deliver
+from bench_service.notifications.messages import Message, digest
+from bench_service.notifications.targets import Mail, Webhook
+from bench_service.wall_clock import now
+
+OLDEST = timedelta(days=1)
+"""Age at which a message that could not be delivered is given up."""
+FIRST_PAUSE = timedelta(seconds=5)
+LONGEST_PAUSE = timedelta(minutes=15)
+HOUR = timedelta(hours=1)
+REMEMBERED = 2000
+"""Number of messages that are remembered, so that a service that starts anew does not repeat them."""
+MOST_FILES = 1000
+"""Maximum number of waiting messages; further ones are logged and left out."""
+
+log = logging.getLogger(__name__)
+
+
+class Outbox:
+    """The waiting messages of a target, and when the next attempt is due."""
+
+    def __init__(self, folder: Path, target: Mail | Webhook, pages: str) -> None:
+        self.target = target
+        self._folder = folder / target.name
+        self._pages = pages
+        self._sent: list[datetime] = []
+        self._pause = FIRST_PAUSE
+        self._due = datetime.min.replace(tzinfo=now().tzinfo)
+        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        self._book = self._folder / "kept.txt"
+        self._kept = self._book.read_text(encoding="utf-8").split()[-REMEMBERED:] if self._book.exists() else []
+        if self._kept:
+            self._book.write_text("\n".join(self._kept) + "\n", encoding="utf-8")
+
+    def put(self, message: Message) -> None:
+        """Keep a message for the target, where it wants this kind; the same thing is kept once."""
+        file = self._folder / f"{message.key}.json"
+        if message.kind not in self.target.events or message.key in self._kept:
+            return
+        if len(self._files()) >= MOST_FILES:
+            log.error("%s has %d messages waiting: left out: %s", self.target.name, MOST_FILES, message.title)
+            return
+        part = file.with_suffix(".part")
+        part.write_text(json.dumps({**asdict(message), "at": message.at.isoformat()}), encoding="utf-8")
+        os.replace(part, file)
+        self._kept.append(message.key)
+        with self._book.open("a", encoding="utf-8") as book:
+            book.write(message.key + "\n")
+
+    def send(self, at: datetime) -> int:
+        """Deliver what waits and is due; the number of messages that are still waiting."""
+        while at >= self._due and (waiting := self._files()):
+            self._sent = [moment for moment in self._sent if at - moment < HOUR]
+            room = self.target.per_hour - len(self._sent)
+            if room <= 0:
+                break
+            many = len(waiting) > room and room == 1
+            batch = waiting if many else waiting[:1]
+            messages = [message for file in batch if (message := self._read(file)) is not None]
+            if messages and not self._deliver(digest(messages, messages[0].bench, at) if many else messages[0], at):
+                break
+            for file in batch:
+                file.unlink(missing_ok=True)
+        return len(self._files())
+
+    def _files(self) -> list[Path]:
+        return sorted(self._folder.glob("*.json"), key=lambda file: (file.stat().st_mtime_ns, file.name))
+
+    def _read(self, file: Path) -> Message | None:
+        try:
+            found = json.loads(file.read_text(encoding="utf-8"))
+            return Message(**{**found, "at": datetime.fromisoformat(found["at"])})
+        except (ValueError, TypeError, KeyError) as error:
+            log.error("a waiting message cannot be read and is left out (%s): %s", file, error)
+            return None
+
+    def _deliver(self, message: Message, at: datetime) -> bool:
+        """Try once; True where the message is done with: delivered, refused for good, or too old."""
+        try:
+            deliver(self.target, message, self._pages)
+        except Undelivered as error:
+            if error.final or at - message.at > OLDEST:
+                log.error("given up: %s: %s", message.title, error)
+                return True
+            log.warning("not delivered, tried again in %s: %s: %s", self._pause, message.title, error)
+            self._due, self._pause = at + self._pause, min(2 * self._pause, LONGEST_PAUSE)
+            return False
+        self._sent.append(at)
+        self._pause = FIRST_PAUSE
+        return True

@@ -1,0 +1,55 @@
+"""Routes of the pages that are made by scripts over the public API: start, queue, search, recordings, audit."""
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
+
+from bench_service.pages.rendering import service_of, templates
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+
+def _page(request: Request, name: str, **context: object) -> HTMLResponse:
+    return templates.TemplateResponse(request, name, context)
+
+
+@router.get("/start")
+def start_page(request: Request) -> HTMLResponse:
+    """Page where a job is chosen, previewed and started."""
+    return _page(request, "start.html")
+
+
+@router.get("/jobs")
+def jobs_page(request: Request) -> HTMLResponse:
+    """Page where the whole history is searched."""
+    return _page(request, "search.html")
+
+
+@router.get("/queue")
+def queue_page(request: Request) -> HTMLResponse:
+    """Page of the queues: order, priority, and why each job waits."""
+    return _page(request, "queue.html", benches=service_of(request).benches.ids())
+
+
+@router.get("/units")
+def units_page(request: Request) -> HTMLResponse:
+    """Page of all units, with what is known of each."""
+    return _page(request, "units.html", units=service_of(request).stores.units.units())
+
+
+@router.get("/recordings")
+def recordings_page(request: Request) -> HTMLResponse:
+    """Page of recordings: search, import of files, and methods run on chosen ones."""
+    return _page(request, "recordings.html")
+
+
+@router.get("/recordings/{recording_id}")
+def recording_page(recording_id: str, request: Request) -> HTMLResponse:
+    """Page of a recording: what it is, and its samples over any stretch."""
+    stored = service_of(request).stores.recordings.get(recording_id)
+    return _page(request, "recording.html", recording=stored)
+
+
+@router.get("/audit")
+def audit_page(request: Request) -> HTMLResponse:
+    """Page of who did what, newest first."""
+    return _page(request, "audit.html")

@@ -1,0 +1,81 @@
+// Campaigns and schedules: made, changed, previewed, started, switched on and off.
+import { ask, part, read, send } from "./api.js";
+import { busy, verb } from "./act.js";
+import { fill, h, span } from "./dom.js";
+import { t } from "./words.js";
+
+const place = document.getElementById("campaign"), zone = Intl.DateTimeFormat().resolvedOptions().timeZone;
+const NEW = { name: "my-campaign", title: "", steps: [{ name: "calibrate", procedure: "calibration_12_orientations" }, { name: "verify", procedure: "verification_9_orientations" }] };
+let units = [], benches = [];
+
+function target() {
+  const unit = h("input", { name: "unit", required: true, list: "known-units", value: (benches[0] && benches[0].units[0]) || units[0] || "" });
+  const bench = h("select", { name: "bench" }, ...benches.map((one) => h("option", { value: one.id }, one.id)));
+  return { unit, bench, labels: [h("label", {}, t("Unit"), unit, h("datalist", { id: "known-units" }, ...units.map((serial) => h("option", { value: serial })))), h("label", {}, t("Bench"), bench)], values: () => ({ unit: unit.value.trim(), ...(bench.value && { bench: bench.value }) }) };
+}
+
+function start(name) {
+  const on = target(), output = h("output", { role: "status" }), seen = h("div", { "aria-live": "polite" }), go = h("button", { class: "go" }, t("Start the campaign"));
+  const look = h("button", { type: "button" }, t("Preview"));
+  look.addEventListener("click", async () => {
+    const found = await busy(look, output, () => send(`/api/v1/campaigns/${part(name)}/preview`, on.values()));
+    if (found) fill(seen, h("p", {}, found.duration_s !== undefined ? `${span(found.duration_s)} ${t("of bench time")}` : ""), ...(found.warnings || []).map((text) => h("p", { class: "warning" }, text)),
+      h("ul", {}, ...(found.steps || []).map((step) => h("li", {}, `${step.name}${step.duration_s !== undefined && step.duration_s !== null ? `: ${span(step.duration_s)}` : ""} ${(step.warnings || []).join(" ")}`))));
+  });
+  const form = h("form", {}, h("h2", {}, `${t("Start")} ${name}`), h("div", { class: "filters" }, ...on.labels, look, go, output), seen);
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const run = await busy(go, output, () => send(`/api/v1/campaigns/${part(name)}/runs`, on.values(), { key: crypto.randomUUID() }));
+    if (run) location.href = `/campaign-runs/${run.id}`;
+  });
+  open(form);
+}
+
+function open(element) { fill(place, element); place.scrollIntoView({ block: "nearest" }); const first = place.querySelector("input, textarea"); if (first) first.focus(); }
+
+function edit(campaign, fresh) {
+  const text = h("textarea", { rows: 18, spellcheck: "false", "aria-label": t("The campaign as JSON") }), output = h("output", { role: "alert" }), save = h("button", { class: "go" }, fresh ? t("Make the campaign") : t("Change the campaign"));
+  text.value = JSON.stringify(campaign, null, 2);
+  const form = h("form", {}, h("h2", {}, fresh ? t("New campaign") : `${t("Change")} ${campaign.name}`), h("p", { class: "note" }, t("Steps in order, each with a procedure or a method, parameters and limits. Every step is examined before it is kept.")), text, h("div", { class: "verbs" }, save, output));
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const made = await busy(save, output, () => { const body = JSON.parse(text.value); return fresh ? send("/api/v1/campaigns", body) : ask("PUT", `/api/v1/campaigns/${part(campaign.name)}`, body); });
+    if (!made) return;
+    if (made.warnings && made.warnings.length) fill(output, ...made.warnings.map((one) => h("p", {}, one))); else location.reload();
+  });
+  open(form);
+}
+
+function schedule(name) {
+  const on = target(), output = h("output", { role: "alert" }), cron = h("input", { name: "cron", required: true, value: "0 1 * * *" }), where = h("input", { name: "zone", required: true, value: zone });
+  const form = h("form", {}, h("h2", {}, `${t("Schedule")} ${name}`), h("div", { class: "filters" }, h("label", {}, t("Minute hour day month weekday"), cron), h("label", {}, t("Time zone"), where), ...on.labels, h("button", { class: "go" }, t("Schedule")), output));
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const made = await busy(form.querySelector("button"), output, () => send("/api/v1/schedules", { cron: cron.value, time_zone: where.value, campaign: name, ...on.values() }, { key: crypto.randomUUID() }));
+    if (made) location.reload();
+  });
+  open(form);
+}
+
+async function begin() {
+  [units, benches] = await Promise.all([read("/api/v1/units").then((all) => all.map((one) => one.serial)), read("/api/v1/benches")]);
+  for (const cell of document.querySelectorAll("td.do[data-campaign]")) {
+    const name = cell.dataset.campaign;
+    cell.append(h("div", { class: "verbs" }, h("button", { type: "button", onclick: () => start(name) }, t("Start")), h("button", { type: "button", onclick: () => schedule(name) }, t("Schedule")),
+      h("button", { type: "button", onclick: async () => edit(await plain(name), false) }, t("Change"))));
+  }
+  for (const cell of document.querySelectorAll("td.do[data-schedule]")) {
+    const path = `/api/v1/schedules/${part(cell.dataset.schedule)}`, on = cell.dataset.on === "1";
+    cell.append(h("div", { class: "verbs" }, verb(on ? t("Switch off") : t("Switch on"), { method: "PATCH", path, body: { enabled: !on }, then: () => location.reload() }),
+      verb(t("Remove"), { method: "DELETE", path, kind: "danger", then: () => location.reload(), confirm: { title: t("Remove this schedule?"), lost: t("It starts nothing more. Its runs so far stay."), verb: t("Remove") } })));
+  }
+  place.before(h("div", { class: "verbs" }, h("button", { type: "button", onclick: () => edit(NEW, true) }, t("New campaign"))));
+}
+
+async function plain(name) {
+  const view = await read(`/api/v1/campaigns/${part(name)}`);
+  return view.campaign;
+}
+
+begin().catch((error) => fill(place, h("p", { class: "refused" }, error.message)));
+

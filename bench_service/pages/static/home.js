@@ -1,0 +1,81 @@
+// The first page, live: each bench with what it does, its stops and their release, and the latest jobs.
+import { read, part, send } from "./api.js";
+import { badge, fill, h, moment, number, short, span } from "./dom.js";
+import { busy } from "./act.js";
+import { iAm, me } from "./api.js";
+import * as feed from "./feed.js";
+import { t } from "./words.js";
+
+const JOBS_MS = 10000;
+
+function release(bench, stop) {
+  const output = h("output", { role: "status" });
+  const form = h("form", { class: "release" },
+    h("label", {}, t("Your name"), h("input", { name: "by", required: true, maxlength: 200, autocomplete: "name", value: me() })),
+    h("label", {}, t("What was looked at"), h("input", { name: "remark", required: true, maxlength: 500 })),
+    h("button", {}, t("Release this stop")), output);
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const given = Object.fromEntries(new FormData(form));
+    if (!confirmedOnce(form)) return;
+    iAm(given.by);
+    await busy(form.querySelector("button"), output, () => send(`/api/v1/benches/${part(bench.id)}/stops/${part(stop.id)}/release`, given));
+  });
+  return form;
+}
+
+function confirmedOnce(form) {  // the second press releases: the jobs in the queue begin to move the table
+  const button = form.querySelector("button");
+  if (button.dataset.sure) return true;
+  button.dataset.sure = "1";
+  button.className = "danger";
+  button.textContent = t("Yes, release: waiting jobs start at once");
+  return false;
+}
+
+function stops(card, bench) {
+  const place = card.querySelector(".stops") || card.insertBefore(h("div", { class: "stops" }), card.querySelector(".state"));
+  const key = bench.stops.map((stop) => stop.id).join();
+  if (place.dataset.key === key) return;
+  place.dataset.key = key;
+  place.replaceChildren(...bench.stops.map((stop) => h("div", { class: "stopped", "data-stop": stop.id },
+    t("Stopped since"), " ", moment(stop.at), stop.by ? ` ${t("by")} ${stop.by}` : "", `: ${stop.reason}. `, h("code", {}, short(stop.id)), release(bench, stop))));
+}
+
+function show({ bench, job }) {
+  const card = document.getElementById(`bench-${bench.id}`);
+  if (!card) { location.reload(); return; }
+  stops(card, bench);
+  const live = feed.lives.get(bench.id), progress = live && live.job && job && live.job.id === job.id ? live.job : null;
+  const { safety } = bench, free = !job && bench.state !== "busy";
+  fill(card.querySelector(".state"),
+    h("p", {}, badge(bench.state), " ", job
+      ? [t("Busy with"), " ", h("a", { href: job.page }, job.procedure), ` ${t("on")} `, h("a", { href: `/units/${part(job.unit)}` }, job.unit), ` (${short(job.id)}). `,
+        progress ? `${progress.label}. ${t("Left:")} ${span(progress.eta_s)} ${t("of bench time")}, ${span(progress.eta_wall_s)} ${t("of real time")}.` : ""]
+      : bench.driven_by ? t("Idle.") : t("No worker drives it now: its jobs wait."), bench.queued ? [" ", h("a", { href: "/queue" }, `${bench.queued} ${t("queued")}`), "."] : ""),
+    job && h("progress", { max: 1, value: progress ? progress.fraction : job.progress.fraction, "aria-label": t("Progress") }),
+    h("p", { class: safety.safe !== true && free ? "warning" : "note" }, job && !bench.stops.length && safety.safe === false
+      ? `${t("It is in use:")} ${safety.devices.unsafe.join(", ")}.` : safety.explanation),
+    live && live.devices && live.devices.chamber && h("p", { class: "note" }, `${t("Chamber")} ${number(Number(live.devices.chamber.air_c.toFixed(1)))} °C`));
+}
+
+let held = "", timer = null;
+async function jobs() {
+  clearTimeout(timer);
+  timer = setTimeout(jobs, JOBS_MS);
+  if (feed.state.alive === false) return;
+  try {
+    const page = await read("/api/v1/jobs?limit=20");
+    fill(document.getElementById("jobs"), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Latest jobs") }, h("table", {}, h("thead", {}, h("tr", {}, ...["Procedure", "Unit", "State", "Verdict", "Stations", "Submitted", "Labels", "Job"].map((name) => h("th", {}, t(name))))),
+      h("tbody", {}, ...page.items.map((job) => h("tr", {}, h("td", {}, h("a", { href: job.page }, job.procedure)), h("td", {}, job.unit), h("td", {}, badge(job.state)), h("td", {}, job.verdict && badge(job.verdict)),
+        h("td", { class: "n" }, `${job.progress.station} / ${job.progress.stations}`), h("td", {}, moment(job.created_at)), h("td", {}, Object.entries(job.labels).map(([k, v]) => `${k}: ${v}`).join("; ")), h("td", {}, h("code", { title: job.id }, short(job.id)))))))));
+  } catch { /* the page says by itself that the service is away */ }
+}
+
+feed.on("bench", ({ news }) => {
+  show(news);
+  const key = JSON.stringify([...feed.benches.values()].map((one) => [one.bench.state, one.job && one.job.id, one.bench.queued]));
+  if (key !== held) { held = key; jobs(); }
+});
+feed.on("live", ({ live }) => { const news = feed.benches.get(live.bench); if (news) show(news); });
+for (const news of feed.benches.values()) show(news);

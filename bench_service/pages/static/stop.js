@@ -1,0 +1,63 @@
+"use strict";
+// The stop of every page. It depends on no other script, and without this one its form still works.
+(() => {
+  const LATE_MS = 1500, GIVE_UP_MS = 30000, LOOK_MS = 200, SAFE_MS = 2000, WATCH_MS = 60000;
+  const name = () => { try { return localStorage.getItem("bench.name") || ""; } catch { return ""; } };
+  const clock = () => new Date().toLocaleTimeString();
+
+  function show(form, kind, ...texts) {
+    const output = form.querySelector("output");
+    output.className = kind;
+    output.textContent = texts.filter(Boolean).join(" ");
+    output.hidden = false;
+  }
+
+  async function watch(form, arrived, id, from) {  // the safety of the bench after a stop that arrived, and its books
+    const texts = form.dataset;
+    while (Date.now() < from + WATCH_MS) {
+      await new Promise((go) => setTimeout(go, LOOK_MS));
+      const patient = Date.now() < from + SAFE_MS;
+      try {
+        const answer = await fetch(`/api/v1/benches/${encodeURIComponent(texts.bench)}`, { signal: AbortSignal.timeout(3000) });
+        const { safety, stops } = await answer.json(), booked = stops.some((stop) => stop.id === id);
+        const done = safety.safe === true;
+        show(form, done ? "safe" : patient ? "asking" : "unsafe", arrived, done || !patient ? safety.explanation : texts.making, !booked && !patient && texts.books);
+        if (done && (booked || !patient)) return;
+      } catch { show(form, "unsafe", arrived, texts.unknown); }
+    }
+  }
+
+  async function stop(form) {
+    const texts = form.dataset, button = form.querySelector("button"), by = name();
+    const late = setTimeout(() => show(form, "unsafe", texts.late), LATE_MS);
+    show(form, "asking", texts.asking);
+    button.setAttribute("aria-busy", "true");
+    try {
+      const answer = await fetch(`/api/v1/benches/${encodeURIComponent(texts.bench)}/stop`, {
+        method: "POST",
+        headers: { "Content-Type": "application/json" },
+        body: JSON.stringify({ reason: texts.reason, wait: false, ...(by && { by }) }),
+        signal: AbortSignal.timeout(GIVE_UP_MS),
+        priority: "high",
+      });
+      clearTimeout(late);
+      const said = await answer.json().catch(() => ({}));
+      if (!answer.ok) {
+        show(form, "unsafe", texts.refused, `${answer.status}: ${said.detail || answer.statusText}`);
+        return;
+      }
+      const safe = said.safety && said.safety.safe === true, arrived = `${texts.arrived} ${clock()}.`;
+      show(form, safe ? "safe" : "asking", arrived, safe ? said.safety.explanation : texts.making);
+      watch(form, arrived, said.stop, Date.now());
+    } catch {
+      clearTimeout(late);
+      show(form, "unsafe", texts.silent);
+    } finally {
+      button.removeAttribute("aria-busy");
+    }
+  }
+
+  for (const form of document.querySelectorAll("form.stop")) {
+    form.addEventListener("submit", (event) => { event.preventDefault(); stop(form); });
+  }
+})();

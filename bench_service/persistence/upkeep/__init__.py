@@ -1,0 +1,1 @@
+"""Upkeep of the database itself: early forms mended, its file watched, copies made and restored, contents checked."""

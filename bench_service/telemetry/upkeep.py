@@ -1,0 +1,97 @@
+"""Upkeep of the database: reports of checks and copies, and the PORT that remembers them."""
+
+from dataclasses import dataclass, field
+from datetime import datetime
+from enum import StrEnum
+from typing import Any, Protocol
+
+from bench_service.model.records import Page
+
+
+class UpkeepKind(StrEnum):
+    """Kinds of upkeep that are reported."""
+
+    SCRUB = "scrub"
+    """A check of the database's integrity and of every stored chunk against its hash."""
+    BACKUP = "backup"
+    """A copy of the whole database."""
+
+
+@dataclass(frozen=True)
+class UpkeepReport:
+    """One piece of upkeep and its outcome."""
+
+    id: str
+    kind: UpkeepKind
+    began_at: datetime
+    by: str
+    """The process that did it, as text."""
+    ended_at: datetime | None = None
+    """None: it is under way, or its process died."""
+    good: bool | None = None
+    """None while it has not ended; false where something is wrong, which the document names."""
+    document: dict[str, Any] = field(default_factory=dict[str, Any])
+
+
+class UpkeepStore(Protocol):
+    """Reports of upkeep. Every method is one transaction."""
+
+    def begin(self, report: UpkeepReport, unless_since: datetime | None = None) -> bool:
+        """Add a report that has not ended; with `unless_since` only where no other of its kind began since then."""
+        ...
+
+    def end(self, report: UpkeepReport) -> None:
+        """Replace a report that has not ended by the one with its outcome."""
+        ...
+
+    def last(self, kind: UpkeepKind) -> UpkeepReport | None:
+        """Return the latest report of a kind that has ended."""
+        ...
+
+    def list(self, *, kind: UpkeepKind | None = None, after: str | None = None, limit: int = 50) -> Page[UpkeepReport]:
+        """List reports, newest first."""
+        ...
+
+
+@dataclass(frozen=True)
+class DatabaseSize:
+    """The size of a database."""
+
+    kind: str
+    """"sqlite" or "postgresql"."""
+    stored_bytes: int
+    log_bytes: int | None
+    """Length of the write-ahead log's file; None where the database is a server's."""
+    free_bytes: int | None
+    """Room on the disk of the file; None where the database is a server's."""
+    revision: str | None
+    """Revision of the tables."""
+
+
+class DatabasePort(Protocol):
+    """PORT: the database as a whole."""
+
+    def size(self) -> DatabaseSize:
+        """Read the size of the database. Raises `StorageFailure`."""
+        ...
+
+    def faults(self) -> tuple[str, ...]:
+        """Return what the database itself finds wrong with its pages and references; it may take minutes."""
+        ...
+
+    def trouble(self) -> str | None:
+        """Return why the database's file is no longer the one that was opened; None where it is."""
+        ...
+
+
+class NoDatabase:
+    """A `DatabasePort` of a service whose database is not known as a whole."""
+
+    def size(self) -> DatabaseSize:
+        return DatabaseSize("unknown", 0, None, None, None)
+
+    def faults(self) -> tuple[str, ...]:
+        return ()
+
+    def trouble(self) -> str | None:
+        return None

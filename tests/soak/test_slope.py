@@ -1,0 +1,41 @@
+"""The interval of a slope against sequences whose slope is known, with values that resemble their neighbours."""
+
+import numpy as np
+import pytest
+
+from tests.soak.slope import slope
+
+MINUTES = np.arange(45.0)
+TRIALS = 400
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5])
+def test_the_interval_holds_the_true_slope_about_as_often_as_it_says(correlation: float) -> None:
+    """Of 400 intervals of 95 % at least 80 % hold the truth.
+
+    Newey and West's interval is known to be too narrow for short records whose values resemble their neighbours, so
+    less than 95 % is expected. Least squares without it would hold in about 74 % at a correlation of 0.5: its variance
+    lacks the factor (1 + 0.5)/(1 - 0.5) = 3, and P(|t| < 2.02/√3) = 0.75. The standard error of that share of 400 is
+    0.022, so 0.80 tells the two apart.
+    """
+    rng = np.random.Generator(np.random.PCG64(5))
+    held = 0
+    for _ in range(TRIALS):
+        noise = rng.normal(size=(45 + 50))
+        for index in range(1, len(noise)):
+            noise[index] += correlation * noise[index - 1]
+        found = slope(MINUTES + 0.5, 500.0 + 0.3 * MINUTES + noise[50:])
+        held += found.low <= 0.3 <= found.high
+    assert held / TRIALS >= 0.80
+
+
+def test_samples_of_a_minute_count_as_one() -> None:
+    times = np.arange(0.0, 45.0, 0.05)
+    exact = slope(times, 7.0 + 2.0 * times)
+    assert exact.per_min == pytest.approx(2.0)
+    assert exact.high - exact.low < 1e-9
+
+
+def test_a_short_soak_gives_no_slope() -> None:
+    with pytest.raises(ValueError, match="8 are needed"):
+        slope(np.arange(0.0, 5.0, 0.1), np.zeros(50))
