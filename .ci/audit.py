@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 ALLOWED = re.compile(
     r"\b(MIT|MIT-0|MIT-CMU|BSD|0BSD|[23]-Clause|Apache|ISC|PSF|PSFL|Python|Python Software Foundation|HPND|Zlib|"
-    r"MPL|Mozilla|Unlicense|Public Domain|BSL-1\.0|CC0|LGPL|Lesser|FSFUL|matplotlib)\b",
+    r"MPL|Mozilla|Unlicense|Public Domain|BSL-1\.0|any-OSI|CC0|LGPL|Lesser|FSFUL|matplotlib)\b",
     re.IGNORECASE,
 )
 """Licences that may be used: permissive ones, and those that ask only for changes of the library itself."""

@@ -109,17 +109,21 @@ def read_procedure(name: str, service: Service) -> ProcedureView:
 @router.post("/procedures/{name}/preview", responses=problems(404, 413))
 async def preview(name: str, request: PreviewRequest, service: Service) -> Preview:
     """Preview stations, duration, predicted uncertainties and warnings of a plan; violations of axis limits."""
-    return await PREVIEWS.run(_preview, name, request, service)
+    return await PREVIEWS.run(_previewed, name, request, service)
 
 
-def _preview(name: str, request: PreviewRequest, service: BenchService) -> Preview:
+def _previewed(name: str, request: PreviewRequest, service: BenchService) -> Preview:
     plan = service.planner.plan(name, request.unit, request.parameters, request.bench)
     return _preview(name, request.unit, plan)
 
 
 @router.post("/previews", responses=problems(413))
-def preview_batch(body: PreviewBatch, service: Service, request: HttpRequest) -> PreviewOutcomes:
+async def preview_batch(body: PreviewBatch, service: Service, request: HttpRequest) -> PreviewOutcomes:
     """Preview up to 500 plans at once; a plan that cannot be run is refused by itself, the others are previewed."""
+    return await PREVIEWS.run(_batch, body, service, request)
+
+
+def _batch(body: PreviewBatch, service: BenchService, request: HttpRequest) -> PreviewOutcomes:
     contexts: dict[tuple[str, str | None], Context] = {}
     items: list[PreviewOutcome] = []
     for wanted in body.plans:

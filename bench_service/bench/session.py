@@ -69,6 +69,7 @@ class BenchSession:
         self._recordings = recordings
         self._stop_wanted = NonBlockingQuery("stop", stop_wanted)
         self._unanswered_s = 0.0
+        self._unwinding: set[asyncio.Task[Any]] = set()
         self._streams: AsyncIterator[Stream] | None = None
         self._next = -1
         self._shutting_down = threading.Event()
@@ -206,8 +207,14 @@ class BenchSession:
             log.error("job %s, bench %s: %s, and its driver does not come back", self.job.id, self.job.bench, why)
 
     async def _unwound(self) -> None:
-        others = asyncio.all_tasks(self._loop) - {asyncio.current_task(self._loop)}
-        await asyncio.gather(*others, return_exceptions=True)
+        """Wait for every task of the bench's loop but those that wait here: two stops would wait for each other."""
+        own = asyncio.current_task(self._loop)
+        assert own is not None
+        self._unwinding.add(own)
+        try:
+            await asyncio.gather(*(asyncio.all_tasks(self._loop) - self._unwinding), return_exceptions=True)
+        finally:
+            self._unwinding.discard(own)
 
     async def _record(self, index: int) -> RecordingInfo:
         station = self.job.stations[index]

@@ -1,10 +1,11 @@
 """Steps of a job that end badly: the lease is lost, the bench cannot be made safe, the engine does not start."""
 
 from collections.abc import Generator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
-from threading import Event
+from threading import Barrier, Event
 from typing import Any
 
 import pytest
@@ -192,3 +193,26 @@ def test_a_service_that_is_asked_to_end_while_a_bench_is_opened_records_nothing(
         runner.acquire(job.id, 0)
     assert stores.recordings.of_job(job.id) == ()
     assert runner.make_safe(job.id).good
+
+
+def test_stops_of_several_people_at_once_do_not_wait_for_each_other(stores: Stores) -> None:
+    """Each of them waits until the procedure has left its step: never for another one that waits too."""
+    runner, job = prepared(stores, SimulatedDriver("sim", real_time_factor=1.0), lambda: True)
+    with ThreadPoolExecutor(9) as pool:
+        recording = pool.submit(runner.acquire, job.id, 0)
+        while runner._session is None or runner._session._under_way is None:
+            pause(0.005)
+        pause(0.1)
+        session, together = runner._session, Barrier(8)
+
+        def stop() -> None:
+            together.wait()
+            session.stop()
+
+        for stopping in [pool.submit(stop) for _ in range(8)]:
+            stopping.result(20)
+        assert recording.result(20).cancelled
+    assert session._lost is None, "the driver came back at once"
+    assert runner.make_safe(job.id).good
+    session._thread.join(5)
+    assert not session._thread.is_alive()

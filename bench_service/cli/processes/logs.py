@@ -44,7 +44,7 @@ class Lines(logging.Formatter):
         text = f"{_moment(record)} {record.levelname:7} {record.name}: {first}"
         if found:
             text += f" [{found}]"
-        if record.exc_info is not None:
+        if record.exc_info:  # asyncio gives False where there is none
             more += self.formatException(record.exc_info).split("\n")
         return "\n".join([visible(text), *(TRACE + visible(line) for line in more)])
 
