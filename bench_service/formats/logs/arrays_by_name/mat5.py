@@ -15,9 +15,9 @@ import numpy as np
 
 from bench_service.formats.bounds import quoted
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.logs.arrays import MOST_ARRAYS, NamedArray, tables_by_length
+from bench_service.formats.logs.arrays_by_name.mat5_source import Packed, Plain, Source
+from bench_service.formats.logs.arrays_by_name.tables import MOST_ARRAYS, NamedArray, tables_by_length
 from bench_service.formats.logs.bytes_at import exactly, size_of
-from bench_service.formats.logs.mat5_source import Packed, Plain, Source
 from bench_service.formats.logs.table import BLOCK_ROWS, LogTable, Numbers
 
 NAME = "mat5"

@@ -10,10 +10,10 @@ from typing import Any, BinaryIO
 from bench_service.formats.bounds import quoted
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.logs.optional import needed
-from bench_service.formats.logs.ros_messages import Decoder, Topic
-from bench_service.formats.logs.ros_rows import Batches
-from bench_service.formats.logs.ros_types import distribution, full_name, parsed
-from bench_service.formats.logs.sqlite_stream import connected
+from bench_service.formats.logs.ros.batches import Batches
+from bench_service.formats.logs.ros.definitions import distribution, full_name, parsed
+from bench_service.formats.logs.ros.messages import Decoder, Topic
+from bench_service.formats.logs.ros.sqlite_stream import connected
 from bench_service.formats.logs.table import LogTable, Numbers
 
 NAME = "rosbag2"

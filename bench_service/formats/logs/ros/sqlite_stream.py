@@ -17,6 +17,22 @@ def connected(stream: BinaryIO, name: str) -> tuple[Any, Any]:
     Raises `UnreadableFile`.
     """
     apsw = needed("apsw", name)
+    label = f"stream-{next(_NUMBERS)}"
+    system = _file_system(apsw, stream, label)
+    try:
+        database = apsw.Connection(
+            "file:log?immutable=1", flags=apsw.SQLITE_OPEN_READONLY | apsw.SQLITE_OPEN_URI, vfs=label
+        )
+        database.execute(f"PRAGMA cache_size = -{CACHE_KIB}")
+        database.execute("PRAGMA mmap_size = 0")
+        database.execute("SELECT count(*) FROM sqlite_master").fetchall()
+    except apsw.Error as error:
+        raise UnreadableFile(name, f"cannot be read as an SQLite database ({str(error)[:120]})") from error
+    return database, system
+
+
+def _file_system(apsw: Any, stream: BinaryIO, label: str) -> Any:
+    """Make a file system with one file: the stream. Its classes need apsw, which is optional."""
     size = size_of(stream)
 
     class Held(apsw.VFSFile):
@@ -68,15 +84,4 @@ def connected(stream: BinaryIO, name: str) -> tuple[Any, Any]:
         def xAccess(self, path: str, flags: int) -> bool:  # noqa: N802
             return False
 
-    label = f"stream-{next(_NUMBERS)}"
-    system = Streams(label)
-    try:
-        database = apsw.Connection(
-            "file:log?immutable=1", flags=apsw.SQLITE_OPEN_READONLY | apsw.SQLITE_OPEN_URI, vfs=label
-        )
-        database.execute(f"PRAGMA cache_size = -{CACHE_KIB}")
-        database.execute("PRAGMA mmap_size = 0")
-        database.execute("SELECT count(*) FROM sqlite_master").fetchall()
-    except apsw.Error as error:
-        raise UnreadableFile(name, f"cannot be read as an SQLite database ({str(error)[:120]})") from error
-    return database, system
+    return Streams(label)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bench_service.formats.logs.ros_messages import Decoder
+from bench_service.formats.logs.ros.messages import Decoder
 from bench_service.formats.logs.table import Numbers
 
 _AT_ONCE = 8192

@@ -9,7 +9,7 @@ import numpy as np
 
 from bench_service.formats.bounds import MEGABYTE, quoted
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.logs.arrays import MOST_ARRAYS, NamedArray, tables_by_length
+from bench_service.formats.logs.arrays_by_name.tables import MOST_ARRAYS, NamedArray, tables_by_length
 from bench_service.formats.logs.optional import needed
 from bench_service.formats.logs.table import BLOCK_ROWS, LogTable, Numbers
 

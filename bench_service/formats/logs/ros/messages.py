@@ -225,7 +225,9 @@ class Decoder:
         self._layouts: dict[int, list[Layout]] = {}
         self._done = 0
 
-    def decode(self, messages: Sequence[bytes], received: Numbers, published: Numbers) -> Iterator[list[Numbers]]:
+    def decode(
+        self, messages: Sequence[bytes | memoryview], received: Numbers, published: Numbers
+    ) -> Iterator[list[Numbers]]:
         """Yield blocks of columns, messages of one length together and in order. Raises `UnreadableFile`."""
         at = 0
         for size, group in groupby(messages, len):
@@ -233,10 +235,10 @@ class Decoder:
             rows = slice(at, at + len(part))
             at += len(part)
             data = np.frombuffer(b"".join(part), np.uint8).reshape(len(part), size)
-            yield from self._same_length(part[0], data, received[rows], published[rows])
+            yield from self._same_length(data, received[rows], published[rows])
         self._done += len(messages)
 
-    def _same_length(self, first: bytes, data: Any, received: Numbers, published: Numbers) -> Iterator[list[Numbers]]:
+    def _same_length(self, data: Any, received: Numbers, published: Numbers) -> Iterator[list[Numbers]]:
         start = 0
         while start < len(data):
             layout = self._layout(bytes(data[start]))

@@ -3,7 +3,7 @@
 from typing import Any
 
 from bench_service.formats.logs.optional import needed
-from bench_service.formats.logs.ros_messages import Types
+from bench_service.formats.logs.ros.messages import Types
 
 MOST_TEXT = 200_000
 """Largest definition that is parsed [characters]."""

@@ -11,11 +11,11 @@ from typing import BinaryIO
 from bench_service.formats.bounds import MEGABYTE, quoted
 from bench_service.formats.errors import UnreadableFile
 from bench_service.formats.logs.bytes_at import exactly, size_of
-from bench_service.formats.logs.ros_messages import Decoder, Topic
-from bench_service.formats.logs.ros_rows import Batches
-from bench_service.formats.logs.ros_types import full_name, parsed
+from bench_service.formats.logs.ros.batches import Batches
+from bench_service.formats.logs.ros.definitions import full_name, parsed
+from bench_service.formats.logs.ros.messages import Decoder, Topic
+from bench_service.formats.logs.ros.unpacked import unpacked
 from bench_service.formats.logs.table import LogTable, Numbers
-from bench_service.formats.logs.unpacked import unpacked
 
 NAME = "rosbag1"
 TITLE = "ROS 1 bag"
