@@ -4,7 +4,7 @@ import re
 from datetime import UTC, datetime
 from math import floor, isfinite, log10
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from fastapi import Request
 from fastapi.templating import Jinja2Templates
