@@ -18,7 +18,7 @@ STOP = "/api/v1/benches/sim/stop"
 AFAR = {"X-Forwarded-For": "192.0.2.7"}
 """As a proxy on this host says for whom it asks: the request is from elsewhere, and needs a proof."""
 IN_TIME_S = 6.0
-"""Far below the 30 s for which a writer waits for the lock, and above what a loaded machine adds to 1.8 s of waiting."""
+"""Far below the 30 s for which a writer waits for the lock; above the 1.8 s of waiting and a loaded machine."""
 
 
 @pytest.fixture(scope="module")
