@@ -33,6 +33,7 @@ QUICK = settings(max_examples=150, deadline=None)
         ("crc16-ccitt-false", 0x29B1),
         ("crc32-mpeg2", 0x0376E6E7),
         ("crc32-ieee", 0xCBF43926),
+        ("crc32-novatel", 0x2DFD2D88),
     ],
 )
 def test_checksums_have_their_published_check_values(name: str, value: int) -> None:

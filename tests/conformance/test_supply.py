@@ -154,7 +154,7 @@ def test_a_device_with_narrower_limits_refuses_in_its_own_words(tmp_path: Path) 
         asyncio.run(scene(rig))
 
 
-ANSWERS = [(kind, at) for kind in ("slow", "half", "doubled", "cut", "cut_after", "silent") for at in (2, 4, 7, 9)]
+ANSWERS = [(kind, at) for kind in ("slow", "half", "doubled", "cut", "cut_after", "silent") for at in (2, 5)]
 
 
 @pytest.mark.parametrize(("kind", "at"), ANSWERS)
@@ -162,7 +162,7 @@ def test_no_set_goes_out_twice(tmp_path: Path, kind: str, at: int) -> None:
     async def scene(rig: SupplyRig) -> None:
         await rig.port.read()
         assert rig.served is not None
-        rig.served.plan(Fault("supply", kind, at=at, seconds=0.5))
+        rig.served.plan(Fault("supply", kind, at=at, seconds=0.7))
         found = await asyncio.gather(rig.port.switch_on(), return_exceptions=True)
         assert found == [None] or isinstance(found[0], Disconnected), found
         sets = rig.sets()
@@ -174,7 +174,7 @@ def test_no_set_goes_out_twice(tmp_path: Path, kind: str, at: int) -> None:
         assert not (await rig.port.read()).on
         assert rig.do(lambda s: s.launches) <= 1
 
-    with supply("scpi", tmp_path, answer_s=0.25) as rig:
+    with supply("scpi", tmp_path, answer_s=0.4) as rig:
         asyncio.run(scene(rig))
 
 

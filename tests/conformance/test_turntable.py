@@ -142,7 +142,7 @@ def test_no_demand_goes_out_twice_and_no_answer_is_taken_for_another(tmp_path: P
     async def scene(rig: TableRig) -> None:
         assert rig.served is not None
         await rig.port.read()
-        rig.served.plan(Fault("turntable", kind, at=at, seconds=0.5))
+        rig.served.plan(Fault("turntable", kind, at=at, seconds=0.7))
         before = len(rig.demands() or [])
         moved = await asyncio.gather(rig.port.move_to(TableAngles(3, 4, 5)), return_exceptions=True)
         if moved == [None]:
@@ -157,7 +157,7 @@ def test_no_demand_goes_out_twice_and_no_answer_is_taken_for_another(tmp_path: P
         await rig.port.move_to(TableAngles(1, 2, 3))
         assert _angles(await rig.port.read()) == pytest.approx((1.0, 2.0, 3.0), abs=POINTING_DEG)
 
-    with table("acutrol", tmp_path, answer_s=0.25) as rig:
+    with table("acutrol", tmp_path, answer_s=0.4) as rig:
         asyncio.run(scene(rig))
 
 
@@ -240,3 +240,68 @@ def _read_within_one_turn(bench) -> None:
             table.axes[axis].position_deg = value
 
     table.encoders_deg, table.load = within, nearest
+
+
+def test_made_safe_with_the_servo_off_where_the_section_says_so(tmp_path: Path) -> None:
+    async def scene(rig: TableRig) -> None:
+        assert rig.served is not None
+        move = asyncio.create_task(rig.port.move_to(TableAngles(100, 0, 0)))
+        while abs(rig.rates_deg_s()[0]) < 30.0:
+            await asyncio.sleep(0)
+        await rig.port.make_safe()
+        await asyncio.wait([move])
+        assert rig.served.do(lambda bench: [axis.mode for axis in bench.table.axes]) == ["off", "off", "off"]
+        assert not (await rig.port.read()).moving
+        await rig.port.move_to(TableAngles(0, 0, 0))
+
+    with table("acutrol", tmp_path, on_safe="off") as rig:
+        asyncio.run(scene(rig))
+
+
+def test_an_interlock_that_opens_during_a_move_ends_it(tmp_path: Path) -> None:
+    async def scene(rig: TableRig) -> None:
+        assert rig.served is not None
+        move = asyncio.create_task(rig.port.move_to(TableAngles(0, 0, 300)))
+        while abs(rig.rates_deg_s()[2]) < 30.0:
+            await asyncio.sleep(0)
+        rig.served.do(lambda bench: bench.table.open_interlock(2))
+        with pytest.raises(DeviceFault, match="interlock 3 of the turntable is open: a person looks why"):
+            await move
+        await rig.port.make_safe()
+        words = {word.name: word.raw for word in (await rig.port.read()).status}
+        assert words["interlock 3"] == "open"
+
+    with table("acutrol", tmp_path) as rig:
+        asyncio.run(scene(rig))
+
+
+def test_made_safe_while_an_open_interlock_brakes_it(tmp_path: Path) -> None:
+    async def scene(rig: TableRig) -> None:
+        assert rig.served is not None
+        await rig.port.command_turn(Turn("outer", 2, 50.0, 1.0))
+        while abs(rig.rates_deg_s()[0]) < 40.0:
+            await asyncio.sleep(0)
+        rig.served.do(lambda bench: bench.table.open_interlock(0))
+        await rig.port.make_safe()
+        assert not (await rig.port.read()).moving
+        assert max(abs(rate) for rate in rig.rates_deg_s()) < 1e-3
+
+    with table("acutrol", tmp_path) as rig:
+        asyncio.run(scene(rig))
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.002, 0.005, 0.01, 0.02, 0.04])
+def test_a_demand_that_is_still_being_given_does_not_outlive_make_safe(rig: TableRig, after_s: float) -> None:
+    async def scene() -> None:
+        await rig.port.read()
+        move = asyncio.create_task(rig.port.move_to(TableAngles(40, 30, 20)))
+        await asyncio.sleep(after_s)
+        await rig.port.make_safe()
+        await asyncio.wait([move])
+        before = _angles(await rig.port.read())
+        await rig.clock.sleep(2.0)
+        reading = await rig.port.read()
+        assert not reading.moving
+        assert _angles(reading) == pytest.approx(before, abs=POINTING_DEG)
+
+    asyncio.run(scene())

@@ -6,11 +6,10 @@ Not confirmed on a device. Limits go out before a demand, a demand before its mo
 import asyncio
 from math import sqrt
 
-from bench_service.drivers.devices.acutrol_link import AcutrolLink, AcutrolSection
-from bench_service.drivers.devices.table_axes import AXES, TurnCount, TurnProgress, angles_of, declared, steps, wrapped
-from bench_service.drivers.interface.driver import DeviceDriver, DriverContext, Found, narrowed
-from bench_service.drivers.protocols.acutrol import AxisState
-from procedures.bench.description import AxisLimits
+from bench_service.drivers.devices.acutrol_link import AcutrolSection
+from bench_service.drivers.devices.acutrol_watch import POLL_S, STOPPED, WatchedTable
+from bench_service.drivers.devices.table_axes import AXES, TurnProgress, angles_of, declared, steps, wrapped
+from bench_service.drivers.interface.driver import DeviceDriver, Found, narrowed
 from procedures.bench.device import DeviceIdentity
 from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
 from procedures.bench.turntable import TableReading
@@ -18,29 +17,12 @@ from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
 
-POLL_S = 0.05
-"""Time between two readings of a moving table [s]."""
-AT_REST = 3
-"""Number of readings in a row that make rest."""
-STATUS_EVERY = 20
-"""Number of readings of a motion after which the interlocks are read again."""
 MOST_LEFT_DEG = 170.0
 """Largest angle between the stop of turns and their end: beyond it the shorter way would be another number of turns."""
-STOPPED = "the table was stopped by another demand"
 
 
-class AcutrolTurntable:
+class AcutrolTurntable(WatchedTable):
     """Table whose every motion is watched by its encoders. A motion that is cancelled goes on to its end by itself."""
-
-    def __init__(self, section: AcutrolSection, context: DriverContext) -> None:
-        self._section, self._clock = section, context.clock
-        self._link = AcutrolLink(section, context.note)
-        self._counts = [
-            TurnCount(section.encoder == "single_turn" and not getattr(section, name).continuous) for name in AXES
-        ]
-        self._demand = 0
-        self._busy = False
-        self._turning: asyncio.Task[None] | None = None
 
     async def connect(self) -> Found:
         """Make the line, identify, read status and factory limits; see `WireDevice`."""
@@ -82,8 +64,12 @@ class AcutrolTurntable:
             here = angles_of([state.position_deg for state in states])
             self._require_allowed(declared(narrowed(self._section, self._link.own)).violations(here, turn))
             rate = turn.rate_deg_s if turn.turns > 0 else -turn.rate_deg_s
+            await self._prepare_brake(demand)
+            self._can_brake = False
             await self._link.limit("rate", index, turn.rate_deg_s, turn.rate_deg_s / turn.ramp_s)
+            self._require_current(demand)
             await self._link.demand("rate", index, rate)
+            self._require_current(demand)
             await self._link.mode("rate", [index])
         except BaseException:
             self._end(demand)
@@ -114,11 +100,12 @@ class AcutrolTurntable:
         self._busy = False
         if await self._rests():
             return
-        for index, axis in enumerate(self._axes()):
-            await self._link.limit("rate", index, axis.rate_deg_s, axis.acceleration_deg_s2)
-            await self._link.demand("rate", index, 0.0)
-        await self._link.mode("rate")
         longest = max(axis.rate_deg_s / axis.acceleration_deg_s2 for axis in self._axes())
+        try:
+            await self._brake()
+        except DeviceFault:  # an open interlock refuses, and brakes by itself: rest is what counts
+            await self._wait_for_rest(None, longest, self._demand)
+            return
         await self._wait_for_rest(None, longest, self._demand)
         if self._section.on_safe == "off":
             await self._link.mode("off")
@@ -126,6 +113,23 @@ class AcutrolTurntable:
         for index, state in enumerate(await self._link.states()):
             await self._link.demand("position", index, state.position_deg)
         await self._link.mode("position")
+
+    async def _prepare_brake(self, demand: int) -> None:
+        """Set the limits of rate mode before a motion, so that a stop needs two statements an axis."""
+        if self._can_brake:
+            return
+        for index, axis in enumerate(self._axes()):
+            self._require_current(demand)
+            await self._link.limit("rate", index, axis.rate_deg_s, axis.acceleration_deg_s2)
+        self._can_brake = True
+
+    async def _brake(self) -> None:
+        """Take the rate away from each axis that moves, the fastest one first."""
+        states = await self._link.states()
+        moving = [k for k, state in enumerate(states) if abs(state.rate_deg_s) > self._section.rest_rate_deg_s]
+        for index in sorted(moving, key=lambda k: -abs(states[k].rate_deg_s)):
+            await self._link.demand("rate", index, 0.0)
+            await self._link.mode("rate", [index])
 
     def close(self) -> None:
         """Drop the line; see `WireDevice`."""
@@ -136,96 +140,21 @@ class AcutrolTurntable:
         for count, angle in zip(self._counts, (angles.outer_deg, angles.middle_deg, angles.inner_deg), strict=True):
             count.restore(angle)
 
-    def _axes(self) -> tuple[AxisLimits, AxisLimits, AxisLimits]:
-        description = declared(narrowed(self._section, self._link.own))
-        return description.outer, description.middle, description.inner
-
-    def _under_way(self) -> bool:
-        return self._busy or (self._turning is not None and not self._turning.done())
-
-    def _begin(self) -> int:
-        """Begin a demand. Raises `DeviceFault` while another is under way."""
-        if self._under_way():
-            raise DeviceFault("the table is moving: one demand at a time")
-        self._busy, self._turning = True, None
-        self._demand += 1
-        return self._demand
-
-    def _end(self, demand: int) -> None:
-        if demand == self._demand:
-            self._busy = False
-
-    def _require_allowed(self, violations: tuple[str, ...]) -> None:
-        if violations:
-            raise OutOfRange("; ".join(violations))
-
-    async def _require_ready(self) -> tuple[AxisState, ...]:
-        """Read interlocks and states. Raises `DeviceFault` where an interlock is not closed or an axis moves."""
-        await self._link.require_closed()
-        states = await self._states()
-        for name, state in zip(AXES, states, strict=True):
-            if abs(state.rate_deg_s) > self._section.rest_rate_deg_s:
-                raise DeviceFault(f"the table is moving: its {name} axis turns at {state.rate_deg_s:g} deg/s")
-        return states
-
-    async def _states(self) -> tuple[AxisState, ...]:
-        """States of the axes with unwrapped positions."""
-        states = await self._link.states()
-        return tuple(
-            AxisState(count.read(state.position_deg), state.rate_deg_s)
-            for count, state in zip(self._counts, states, strict=True)
-        )
-
     async def _go(self, start: list[float], end: list[float], demand: int) -> None:
         """Set limits, then demands, then the mode; wait until the axes rest where they were asked."""
         longest = 0.0
+        await self._prepare_brake(demand)
         for index, axis in enumerate(self._axes()):
+            self._require_current(demand)
             await self._link.limit("position", index, axis.rate_deg_s, axis.acceleration_deg_s2)
             distance = abs(end[index] - start[index])
             longest = max(longest, _duration_s(distance, axis.rate_deg_s, axis.acceleration_deg_s2))
         for index, count in enumerate(self._counts):
+            self._require_current(demand)
             await self._link.demand("position", index, wrapped(end[index]) if count.counts else end[index])
+        self._require_current(demand)
         await self._link.mode("position")
         await self._wait_for_rest(end, longest, demand)
-
-    async def _wait_for_rest(self, end: list[float] | None, longest_s: float, demand: int) -> None:
-        """Wait for readings in a row at rest, and at the end where one is given. Raises `NotSettled`, `DeviceFault`."""
-        deadline = self._clock.now_s() + longest_s + self._section.settle_s
-        resting = readings = 0
-        while resting < AT_REST:
-            await self._clock.sleep(POLL_S)
-            if demand != self._demand:
-                raise Stopped(STOPPED)
-            states, late = await self._states(), self._clock.now_s() > deadline
-            resting = resting + 1 if self._at_rest(states, end) else 0
-            readings += 1
-            if late and resting == 0:
-                await self._link.require_closed()
-                away = "" if end is None else f", {self._away(states, end):g} deg from its demand"
-                raise NotSettled(
-                    f"the table did not come to rest within {self._section.settle_s:g} s of its move{away}"
-                )
-            if readings % STATUS_EVERY == 0:
-                await self._link.require_closed()
-
-    def _at_rest(self, states: tuple[AxisState, ...], end: list[float] | None) -> bool:
-        still = all(abs(state.rate_deg_s) <= self._section.rest_rate_deg_s for state in states)
-        return still and (end is None or self._away(states, end) <= self._section.tolerance_deg)
-
-    def _away(self, states: tuple[AxisState, ...], end: list[float]) -> float:
-        """Largest distance of an axis from its end; one with slip rings may read a turn more or less [deg]."""
-        return max(
-            abs(wrapped(state.position_deg - angle) if axis.continuous else state.position_deg - angle)
-            for state, angle, axis in zip(states, end, self._axes(), strict=True)
-        )
-
-    async def _rests(self) -> bool:
-        """True if some readings in a row show rest; false at the first that does not."""
-        for _ in range(AT_REST):
-            if not self._at_rest(await self._states(), None):
-                return False
-            await self._clock.sleep(POLL_S)
-        return True
 
     async def _follow(self, turn: Turn, index: int, start: list[float], demand: int) -> None:
         """Count the turns of an axis in rate mode, stop it before their end, and lead it to the angle of the start."""
@@ -240,6 +169,7 @@ class AcutrolTurntable:
                     break
                 await self._clock.sleep(min(POLL_S, left_s))
             await self._clock.sleep(max(0.0, left_s))
+            self._require_current(demand)
             await self._link.demand("rate", index, 0.0)
             stopped = self._clock.now_s()
             await self._wait_for_rest(None, turn.ramp_s, demand)

@@ -31,6 +31,11 @@ def crc32_ieee(data: bytes) -> int:
     return zlib.crc32(data)
 
 
+def crc32_novatel(data: bytes) -> int:
+    """CRC-32 of zlib's polynomial from 0, not inverted, as NovAtel's messages have it."""
+    return zlib.crc32(data, 0xFFFFFFFF) ^ 0xFFFFFFFF
+
+
 def sum16_words(data: bytes) -> int:
     """Sum of the 16-bit words, least significant byte first, overflow left out; a last odd byte is a word."""
     return (sum(data[0::2]) + 256 * sum(data[1::2])) & 0xFFFF
@@ -41,6 +46,7 @@ CHECKSUMS: dict[str, tuple[int, Callable[[bytes], int]]] = {
     "crc16-ccitt-false": (2, crc16_ccitt_false),
     "crc32-mpeg2": (4, crc32_mpeg2),
     "crc32-ieee": (4, crc32_ieee),
+    "crc32-novatel": (4, crc32_novatel),
     "sum16-words": (2, sum16_words),
 }
 """Name in a frame's file -> (length in bytes, function)."""

@@ -29,10 +29,14 @@ class CounterPart(_Part):
     bits: int | None = Field(default=None, ge=1, le=32)
     """Number of its lowest bits that count; none: all."""
     step: int = Field(default=1, ge=1, le=65536)
+    begins_again_at: int | None = Field(default=None, ge=2, le=2**32)
+    """Number after which it begins again where that is no power of two, as of milliseconds of a week."""
 
     @property
     def modulus(self) -> int:
         """Number after which it begins again."""
+        if self.begins_again_at is not None:
+            return self.begins_again_at
         return 1 << (8 * SIZES[self.type] if self.bits is None else self.bits)
 
 
@@ -71,7 +75,7 @@ class StatusPart(_Part):
 class ChecksumPart(_Part):
     """Checksum over a part of the frame."""
 
-    kind: Literal["crc16-xmodem", "crc16-ccitt-false", "crc32-mpeg2", "crc32-ieee", "sum16-words"]
+    kind: Literal["crc16-xmodem", "crc16-ccitt-false", "crc32-mpeg2", "crc32-ieee", "crc32-novatel", "sum16-words"]
     offset: int = Field(ge=0)
     start: int = Field(default=0, ge=0)
     pad_to: int = Field(default=1, ge=1, le=8)
