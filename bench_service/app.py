@@ -151,7 +151,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         closing.callback(guard.end)
         closing.callback(files.keep_books(stores).end)
         if settings.notify is not None:
-            closing.callback(open_notifier(settings, stores, database.free_bytes, LEAST_FREE_BYTES).end)
+            closing.callback(open_notifier(settings, stores, opened.free_bytes, LEAST_FREE_BYTES).end)
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
