@@ -173,15 +173,20 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         processes,
         *whole,
     )
+    _keep_access(service, settings, closing)
+    closing.callback(service.stop)
+    service.register()
+    return service
+
+
+def _keep_access(service: BenchService, settings: Settings, closing: ExitStack) -> None:
+    """Follow accounts and tokens that other processes change, and end stretches of the audit trail that are old."""
     if settings.audit_days is not None:
-        retention = AuditRetention(stores.audit, timedelta(days=settings.audit_days))
+        retention = AuditRetention(service.stores.audit, timedelta(days=settings.audit_days))
         retention.begin()
         closing.callback(retention.end)
     service.access.book.begin()
     closing.callback(service.access.book.end)
-    closing.callback(service.stop)
-    service.register()
-    return service
 
 
 def _roads(settings: Settings, opened: Database, closing: ExitStack) -> StopRoads:
