@@ -150,6 +150,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         guard.begin()
         closing.callback(guard.end)
         closing.callback(files.keep_books(stores).end)
+        if settings.notify is not None:
+            closing.callback(open_notifier(settings, stores, opened.free_bytes, LEAST_FREE_BYTES).end)
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
@@ -171,19 +173,16 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         processes,
         *whole,
     )
-    _begin_beside(settings, service, opened, drive, closing)
+    _keep_access(service, settings, closing)
     closing.callback(service.stop)
     service.register()
     return service
 
 
-def _begin_beside(settings: Settings, service: BenchService, opened: Database, drive: bool, closing: ExitStack) -> None:
-    """Begin what works beside the service: messages to people, retention of the audit trail, the book of accounts."""
-    stores = service.stores
-    if drive and settings.notify is not None:
-        closing.callback(open_notifier(settings, stores, opened.free_bytes, LEAST_FREE_BYTES).end)
+def _keep_access(service: BenchService, settings: Settings, closing: ExitStack) -> None:
+    """Follow accounts and tokens that other processes change, and end stretches of the audit trail that are old."""
     if settings.audit_days is not None:
-        retention = AuditRetention(stores.audit, timedelta(days=settings.audit_days))
+        retention = AuditRetention(service.stores.audit, timedelta(days=settings.audit_days))
         retention.begin()
         closing.callback(retention.end)
     service.access.book.begin()
