@@ -55,7 +55,7 @@ from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.worker import Worker
-from bench_service.notifications.opening import open_notifier
+from bench_service.notifications.opening import begin_notifier
 from bench_service.pages import (
     access_pages,
     campaign_pages,
@@ -150,8 +150,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         guard.begin()
         closing.callback(guard.end)
         closing.callback(files.keep_books(stores).end)
-        if settings.notify is not None:
-            closing.callback(open_notifier(settings, stores, opened.free_bytes, LEAST_FREE_BYTES).end)
+        begin_notifier(settings, stores, opened.free_bytes, LEAST_FREE_BYTES, closing)
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
