@@ -156,8 +156,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     )
     roads = _roads(settings, opened, closing)
     processes = _work_apart(settings, code, closing) if apart else None
-    whole = DatabaseContents(opened), settings.scrub_at
-    service = BenchService(
+    made_of = (
         stores,
         driver,
         planner,
@@ -170,8 +169,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         roads,
         rescued,
         processes,
-        *whole,
     )
+    service = BenchService(*made_of, DatabaseContents(opened), settings.scrub_at)
     _keep_access(service, settings, closing)
     closing.callback(service.stop)
     service.register()
