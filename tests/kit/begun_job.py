@@ -71,7 +71,8 @@ class FoundSafe:
 
 
 def safety_of(stores: Stores, driver: SimulatedDriver) -> SafetyService:
-    return SafetyService(stores.benches, lambda _: FoundSafe(driver), lambda _: NoWatch(), stores.jobs.note)
+    devices = FoundSafe(driver) if driver._register is None else driver
+    return SafetyService(stores.benches, lambda _: devices, lambda _: NoWatch(), stores.jobs.note)
 
 
 def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], bool]) -> tuple[JobRunner, Job]:
