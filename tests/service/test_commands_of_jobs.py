@@ -178,3 +178,26 @@ def test_the_shell_completes_commands_and_procedures(
     asked = {"_BENCH_COMPLETE": "complete_bash", "COMP_WORDS": "bench run stat", "COMP_CWORD": "2"}
     monkeypatch.setattr(os, "environ", {**os.environ, **asked})
     assert answered().split() == ["static_run"]
+
+
+def test_a_calibration_is_entered_from_a_file_and_exported(bench: Bench, tmp_path: Path) -> None:
+    """Seen once: `enter` ended in a stack trace before anything was sent."""
+    names = [name for axis, i in zip("xyz", "123", strict=True) for name in (f"b_{axis}", *(f"K{i}{j}" for j in "123"))]
+    rows = [{"name": n, "value": float(n in ("K11", "K22", "K33")), "standard_uncertainty": 1e-6} for n in names]
+    for row in rows:
+        row["unit"] = "rad/s" if row["name"].startswith("b") else "1"
+    entry = tmp_path / "entry.json"
+    entry.write_text(json.dumps({"triad": "gyro", "origin": "passport 17", "coefficients": rows}))
+    entered = bench("calibration", "enter", "SIM-0001", entry, "--json")
+    assert entered.code == 0, entered.err
+    known = entered.json()["id"]
+    shown = bench("calibration", "export", "SIM-0001", known)
+    assert json.loads(shown.out)["triads"][0]["calibration"] == known
+    file = tmp_path / "gyro.h"
+    assert bench("calibration", "export", "SIM-0001", known, "--format", "c", "-o", file).code == 0
+    assert "correct_gyro" in file.read_text()
+    refused = bench("calibration", "export", "SIM-0001", known, "--format", "excel")
+    assert refused.code != 0
+    assert "ardupilot" in refused.err
+    entry.write_text("{")
+    assert "no JSON" in bench("calibration", "enter", "SIM-0001", entry).err
