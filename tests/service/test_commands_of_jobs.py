@@ -201,3 +201,24 @@ def test_a_calibration_is_entered_from_a_file_and_exported(bench: Bench, tmp_pat
     assert "ardupilot" in refused.err
     entry.write_text("{")
     assert "no JSON" in bench("calibration", "enter", "SIM-0001", entry).err
+
+
+def test_samples_go_out_in_si_and_a_job_as_a_zip(bench: Bench, address: str, tmp_path: Path) -> None:
+    terms = {"procedure": "calibration_12_orientations", "unit": "SIM-0001", "parameters": {"dwell_s": 5.0}}
+    job = httpx.post(f"{address}/api/v1/jobs", json=terms).json()["id"]
+    ended(address, job)
+    recording = httpx.get(f"{address}/api/v1/recordings", params={"job": job}).json()["items"][0]["id"]
+    for name, more in (("s.h5", ()), ("s.mat", ()), ("s.csv", ("--values", "physical", "--decimate", "10"))):
+        assert bench("export", recording, "-o", tmp_path / name, *more).code == 0
+    assert (tmp_path / "s.csv").read_text().startswith("time_s,gyro_x_rad_per_s,")
+    assert (tmp_path / "s.h5").read_bytes().startswith(b"\x89HDF")
+    assert bench("export", job, "-o", tmp_path / "job.zip", "--decimate", "100").code == 0
+    assert (tmp_path / "job.zip").read_bytes().startswith(b"PK")
+
+
+def ended(address: str, job: str) -> None:
+    """Wait until a job has ended."""
+    deadline = monotonic_s() + 60.0
+    while httpx.get(f"{address}/api/v1/jobs/{job}").json()["state"] not in ("succeeded", "failed"):
+        assert monotonic_s() < deadline
+        pause(0.05)

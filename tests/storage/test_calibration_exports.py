@@ -47,11 +47,21 @@ def a_triad(name: str, seed: int, count: bool = False) -> TriadCalibration:
 
 def an_export(value: TriadCalibration, **changes: object) -> TriadExport:
     facts = {
-        "id": f"c-{value.triad}", "value": value, "method": "calibration_12_orientations", "origin": "",
-        "verdict": "pass", "made_at": "2026-01-02T03:04:05+00:00", "simulated": False, "current": True,
-        "approval": "open", "unusable": "", "valid_from": None, "valid_until": "2027-01-02T00:00:00+00:00", "temperature_c": (20.0, 23.0),
+        "id": f"c-{value.triad}",
+        "value": value,
+        "method": "calibration_12_orientations",
+        "origin": "",
+        "verdict": "pass",
+        "made_at": "2026-01-02T03:04:05+00:00",
+        "simulated": False,
+        "current": True,
+        "approval": "open",
+        "unusable": "",
+        "valid_from": None,
+        "valid_until": "2027-01-02T00:00:00+00:00",
+        "temperature_c": (20.0, 23.0),
         "lineage": {"result": "r-1", "recordings": [{"id": "x", "content_hash": "f00d"}]},
-    }  # fmt: skip
+    }
     return TriadExport(**{**facts, **changes})  # pyright: ignore[reportArgumentType]
 
 
