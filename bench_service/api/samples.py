@@ -14,11 +14,11 @@ from bench_service.api.http.errors import problems
 from bench_service.api.recordings import EXPORTS
 from bench_service.evidence.recordings import require_undamaged
 from bench_service.evidence.samples import treatment_of
-from bench_service.formats.archive import archived
 from bench_service.formats.chunk import RAW_BYTES
 from bench_service.formats.export import Extract, extract
-from bench_service.formats.sheet import LARGEST_FACTOR, Sheet, Treatment, physical_sheet, raw_sheet
-from bench_service.formats.sheet_files import SheetFormat, written
+from bench_service.formats.samples_out.archive import archived
+from bench_service.formats.samples_out.sheet import LARGEST_FACTOR, Sheet, Treatment, physical_sheet, raw_sheet
+from bench_service.formats.samples_out.sheet_files import SheetFormat, written
 from bench_service.model.errors import NotFound
 from bench_service.model.records import StoredRecording
 from bench_service.service import BenchService

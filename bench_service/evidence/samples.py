@@ -1,7 +1,7 @@
-"""What is done to samples before they go out: the calibrations that correct them, and decimation."""
+"""Treatment of samples before they go out: the calibrations that correct them, and decimation."""
 
 from bench_service.evidence.stores import EvidenceStores
-from bench_service.formats.sheet import Treatment
+from bench_service.formats.samples_out.sheet import Treatment
 from bench_service.model.calibrations import Approval
 from bench_service.model.errors import NotFound
 from procedures.core.errors import BadParameter

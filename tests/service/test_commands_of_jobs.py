@@ -11,6 +11,8 @@ import pytest
 from bench_service.cli.asking import leaving
 from bench_service.cli.commands import run_command_line
 from bench_service.cli.options import console, errors
+from bench_service.formats.certificate.rules import attached
+from bench_service.formats.certificate.signature import new_key, verified
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from tests.kit.command_line import Done, one_line
@@ -196,6 +198,19 @@ def test_a_calibration_is_entered_from_a_file_and_exported(bench: Bench, tmp_pat
     file = tmp_path / "gyro.h"
     assert bench("calibration", "export", "SIM-0001", known, "--format", "c", "-o", file).code == 0
     assert "correct_gyro" in file.read_text()
+    laboratory = tmp_path / "lab.toml"
+    place = 'name = "A"\ncountry = "UA"\ncity = "Kyiv"\n'
+    laboratory.write_text(
+        f'identifier = "K-1"\n[laboratory]\n{place}[customer]\n{place}[[people]]\nname = "Ann"\nrole = "head"\n'
+    )
+    pair = new_key("Lab")
+    (tmp_path / "lab.key.pem").write_bytes(pair.key)
+    (tmp_path / "lab.cert.pem").write_bytes(pair.certificate)
+    key, made = tmp_path / "lab.key.pem", tmp_path / "c.xml"
+    signed = bench("certificate", "make", "SIM-0001", known, "--laboratory", laboratory, "--key", key, "-o", made)
+    assert signed.code == 0, signed.err
+    root, _ = verified(made.read_bytes(), pair.certificate)
+    assert attached(root)["triads"][0]["calibration"] == known
     refused = bench("calibration", "export", "SIM-0001", known, "--format", "excel")
     assert refused.code != 0
     assert "ardupilot" in refused.err

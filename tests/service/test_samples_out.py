@@ -11,7 +11,7 @@ import pytest
 
 from procedures.core.imu_model import correct, triad_calibration
 from tests.service.client import Client
-from tests.service.test_calibration_exports import PATH, enter
+from tests.service.entries import PATH, enter
 
 GYROS = ["gyro_x_rad_per_s", "gyro_y_rad_per_s", "gyro_z_rad_per_s"]
 

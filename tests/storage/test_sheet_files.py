@@ -12,8 +12,8 @@ from pyarrow import feather
 from scipy.io import loadmat
 
 from bench_service.formats.export import Extract, extract
-from bench_service.formats.sheet import Sheet, Treatment, physical_sheet, raw_sheet
-from bench_service.formats.sheet_files import SheetFormat, written
+from bench_service.formats.samples_out.sheet import Sheet, Treatment, physical_sheet, raw_sheet
+from bench_service.formats.samples_out.sheet_files import SheetFormat, written
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration, correct, triad_calibration
 from procedures.core.recording import ACCELEROMETER, GYRO, Channel, Quantity, RawArray, RecordingInfo

@@ -22,7 +22,7 @@ class InverseModel:
 
 def inverse_model(calibration: TriadCalibration) -> InverseModel:
     """Invert a calibration; ``dA = −A·dK·A``, ``dc = −A·(db + dK·c)`` give the covariance to first order."""
-    a = np.linalg.inv(calibration.matrix_array)
+    a: Array = np.asarray(np.linalg.inv(calibration.matrix_array), dtype=np.float64)
     c = -a @ calibration.bias_array
     jacobian = np.empty((12, 12))
     for channel in range(3):

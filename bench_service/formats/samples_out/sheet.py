@@ -42,7 +42,7 @@ class Sheet:
 
 @dataclass(frozen=True)
 class Treatment:
-    """What is done to raw samples before they go out."""
+    """Treatment of raw samples before they go out."""
 
     calibrations: tuple[TriadCalibration, ...] = ()
     """At most one a triad."""
@@ -80,7 +80,8 @@ def physical_sheet(part: Extract, blocks: Iterable[RawArray], treatment: Treatme
     places: list[tuple[list[int], Array, Array]] = []
     for calibration, known in zip(asked.calibrations, asked.calibration_ids, strict=True):
         place = _place(part, calibration)
-        places.append((place, calibration.bias_array, np.linalg.inv(calibration.matrix_array)))
+        inverse = np.asarray(np.linalg.inv(calibration.matrix_array), dtype=np.float64)
+        places.append((place, calibration.bias_array, inverse))
         about[f"calibration_{calibration.triad}"] = known
         for index in place:
             units[index] = calibration.input_unit

@@ -9,14 +9,14 @@ import re
 import tempfile
 from collections.abc import Callable, Iterator
 from enum import StrEnum
-from typing import IO, Any
+from typing import IO, Any, cast
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from pyarrow import csv
 
-from bench_service.formats.sheet import Sheet
+from bench_service.formats.samples_out.sheet import Sheet
 from procedures.core.errors import BadParameter
 
 PIECE = 1 << 20
@@ -155,7 +155,7 @@ def _matlab(sheet: Sheet) -> Iterator[bytes]:
     variables["about"] = dict(sheet.about)
     variables["units"] = {name: c.attributes["unit"] for name, c in zip(names, sheet.columns, strict=True)}
     out = io.BytesIO()
-    savemat(out, variables, format="5", oned_as="column", long_field_names=True)
+    savemat(cast("Any", out), variables, format="5", oned_as="column", long_field_names=True)
     data = out.getbuffer()
     for start in range(0, len(data), PIECE):
         yield bytes(data[start : start + PIECE])
