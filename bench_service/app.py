@@ -21,6 +21,7 @@ from bench_service.api import (
     recordings,
     reservations,
     results,
+    samples,
     trends,
 )
 from bench_service.api.access import guard, identify
@@ -90,6 +91,7 @@ ROUTERS = (
     procedures,
     jobs,
     recordings,
+    samples,
     results,
     units,
     calibrations,

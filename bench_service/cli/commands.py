@@ -15,6 +15,7 @@ from bench_service.cli.groups import (
     benches,
     calibrations,
     campaigns,
+    certificates,
     database,
     evidence,
     importing,
@@ -71,6 +72,7 @@ for _panel, _commands in PANELS.items():
 app.command("import", rich_help_panel="Evidence")(importing.import_)
 app.add_typer(job, name="job", rich_help_panel="Jobs")
 app.add_typer(calibrations.calibration, name="calibration", rich_help_panel="Evidence")
+app.add_typer(certificates.certificate, name="certificate", rich_help_panel="Evidence")
 app.add_typer(campaigns.campaigns, name="campaign", rich_help_panel="Jobs")
 app.add_typer(campaigns.schedules, name="schedule", rich_help_panel="Jobs")
 app.add_typer(access.users, name="user", rich_help_panel="Access")

@@ -18,6 +18,7 @@ import pyarrow.parquet as pq
 from pyarrow import csv
 
 from bench_service.formats.chunk import RAW_BYTES, sample_type
+from bench_service.formats.outbox import Outbox
 from procedures.core.errors import BadParameter
 from procedures.core.recording import RawArray, RecordingInfo
 
@@ -102,29 +103,6 @@ def export(part: Extract, blocks: Iterable[RawArray], form: ExportFormat) -> Ite
     return writers[form](part, blocks)
 
 
-class _Outbox:
-    """File object that hands out the bytes written to it."""
-
-    def __init__(self) -> None:
-        self._pieces: list[bytes] = []
-        self.closed = False
-
-    def write(self, data: bytes) -> int:
-        self._pieces.append(bytes(data))
-        return len(data)
-
-    def flush(self) -> None:
-        """Flush nothing: no data are buffered."""
-
-    def close(self) -> None:
-        self.closed = True
-
-    def take(self) -> bytes:
-        taken = b"".join(self._pieces)
-        self._pieces.clear()
-        return taken
-
-
 def describe(part: Extract) -> dict[str, str]:
     """Describe the recording for the reader of the file, as text."""
     info = part.info
@@ -167,7 +145,7 @@ def _batches(schema: Any, blocks: Iterable[RawArray]) -> Iterator[Any]:
 
 
 def _arrow(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
-    outbox, schema = _Outbox(), _schema(part)
+    outbox, schema = Outbox(), _schema(part)
     with pa.ipc.new_stream(pa.PythonFile(outbox, mode="w"), schema) as writer:
         for batch in _batches(schema, blocks):
             writer.write_batch(batch)
@@ -176,7 +154,7 @@ def _arrow(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
 
 
 def _parquet(part: Extract, blocks: Iterable[RawArray]) -> Iterator[bytes]:
-    outbox, schema = _Outbox(), _schema(part)
+    outbox, schema = Outbox(), _schema(part)
     with pq.ParquetWriter(
         pa.PythonFile(outbox, mode="w"),
         schema,

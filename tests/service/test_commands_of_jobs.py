@@ -11,6 +11,8 @@ import pytest
 from bench_service.cli.asking import leaving
 from bench_service.cli.commands import run_command_line
 from bench_service.cli.options import console, errors
+from bench_service.formats.certificate.rules import attached
+from bench_service.formats.certificate.signature import new_key, verified
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
 from tests.kit.command_line import Done, one_line
@@ -206,3 +208,60 @@ def test_known_coefficients_are_entered_chosen_approved_and_rejected(bench: Benc
     one_line(bench("calibration", "choose", "SIM-0001"), "exactly one of")
     file.write_text("{")
     one_line(bench("calibration", "enter", "SIM-0001", file), "no JSON")
+
+
+def test_a_calibration_is_entered_from_a_file_and_exported(bench: Bench, tmp_path: Path) -> None:
+    """Seen once: `enter` ended in a stack trace before anything was sent."""
+    names = [name for axis, i in zip("xyz", "123", strict=True) for name in (f"b_{axis}", *(f"K{i}{j}" for j in "123"))]
+    rows = [{"name": n, "value": float(n in ("K11", "K22", "K33")), "standard_uncertainty": 1e-6} for n in names]
+    for row in rows:
+        row["unit"] = "rad/s" if row["name"].startswith("b") else "1"
+    entry = tmp_path / "entry.json"
+    entry.write_text(json.dumps({"triad": "gyro", "origin": "passport 17", "coefficients": rows}))
+    entered = bench("calibration", "enter", "SIM-0001", entry, "--json")
+    assert entered.code == 0, entered.err
+    known = entered.json()["id"]
+    shown = bench("calibration", "export", "SIM-0001", known)
+    assert json.loads(shown.out)["triads"][0]["calibration"] == known
+    file = tmp_path / "gyro.h"
+    assert bench("calibration", "export", "SIM-0001", known, "--format", "c", "-o", file).code == 0
+    assert "correct_gyro" in file.read_text()
+    laboratory = tmp_path / "lab.toml"
+    place = 'name = "A"\ncountry = "UA"\ncity = "Kyiv"\n'
+    laboratory.write_text(
+        f'identifier = "K-1"\n[laboratory]\n{place}[customer]\n{place}[[people]]\nname = "Ann"\nrole = "head"\n'
+    )
+    pair = new_key("Lab")
+    (tmp_path / "lab.key.pem").write_bytes(pair.key)
+    (tmp_path / "lab.cert.pem").write_bytes(pair.certificate)
+    key, made = tmp_path / "lab.key.pem", tmp_path / "c.xml"
+    signed = bench("certificate", "make", "SIM-0001", known, "--laboratory", laboratory, "--key", key, "-o", made)
+    assert signed.code == 0, signed.err
+    root, _ = verified(made.read_bytes(), pair.certificate)
+    assert attached(root)["triads"][0]["calibration"] == known
+    refused = bench("calibration", "export", "SIM-0001", known, "--format", "excel")
+    assert refused.code != 0
+    assert "ardupilot" in refused.err
+    entry.write_text("{")
+    assert "no JSON" in bench("calibration", "enter", "SIM-0001", entry).err
+
+
+def test_samples_go_out_in_si_and_a_job_as_a_zip(bench: Bench, address: str, tmp_path: Path) -> None:
+    terms = {"procedure": "calibration_12_orientations", "unit": "SIM-0001", "parameters": {"dwell_s": 5.0}}
+    job = httpx.post(f"{address}/api/v1/jobs", json=terms).json()["id"]
+    ended(address, job)
+    recording = httpx.get(f"{address}/api/v1/recordings", params={"job": job}).json()["items"][0]["id"]
+    for name, more in (("s.h5", ()), ("s.mat", ()), ("s.csv", ("--values", "physical", "--decimate", "10"))):
+        assert bench("export", recording, "-o", tmp_path / name, *more).code == 0
+    assert (tmp_path / "s.csv").read_text().startswith("time_s,gyro_x_rad_per_s,")
+    assert (tmp_path / "s.h5").read_bytes().startswith(b"\x89HDF")
+    assert bench("export", job, "-o", tmp_path / "job.zip", "--decimate", "100").code == 0
+    assert (tmp_path / "job.zip").read_bytes().startswith(b"PK")
+
+
+def ended(address: str, job: str) -> None:
+    """Wait until a job has ended."""
+    deadline = monotonic_s() + 60.0
+    while httpx.get(f"{address}/api/v1/jobs/{job}").json()["state"] not in ("succeeded", "failed"):
+        assert monotonic_s() < deadline
+        pause(0.05)

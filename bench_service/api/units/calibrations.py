@@ -18,7 +18,9 @@ from bench_service.api.units.calibration_schemas import (
     RuleChoice,
     Triad,
 )
+from bench_service.evidence.calibration_exports import export_calibration as exported_file
 from bench_service.evidence.entered_calibrations import stored_calibration
+from bench_service.formats.calibration_exports.forms import MEDIA_TYPES, CalibrationForm
 from bench_service.model.calibrations import Decider
 from bench_service.model.errors import NotFound
 from bench_service.model.records import Idempotency
@@ -90,6 +92,32 @@ def read_calibration(serial: str, calibration_id: str, service: Service) -> Cali
         raise NotFound("calibration", calibration_id, f"unit {serial} has none of that id")
     made_by = None if stored.result_id is None else service.stores.results.get(stored.result_id)
     return CalibrationDetail.of_use(stored, made_by, service.stores.calibrations.used_by(calibration_id))
+
+
+EXPORTED: dict[int | str, dict[str, object]] = {
+    200: {
+        "description": "The calibration as a file for other software",
+        "content": {kind: {"schema": {"type": "string", "format": "binary"}} for kind in MEDIA_TYPES},
+    }
+}
+
+
+@router.get("/{calibration_id}/export", response_class=Response, responses={**problems(404), **EXPORTED})
+def export_calibration(
+    serial: str,
+    calibration_id: str,
+    service: Service,
+    form: Annotated[CalibrationForm, Query(alias="format")] = CalibrationForm.JSON,
+    other: Annotated[
+        str | None,
+        Query(max_length=100, description="Calibration of the other triad; without it, of the same result or current"),
+    ] = None,
+) -> Response:
+    """Export a calibration in the form that other software applies."""
+    file = exported_file(service.stores, serial, calibration_id, form, other)
+    return Response(
+        file.text, media_type=file.media_type, headers={"Content-Disposition": f'attachment; filename="{file.name}"'}
+    )
 
 
 @router.post("/{calibration_id}/choose", responses=problems(404, 409, 413, 507))

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
-from bench_service.cli.asking.client import call, connect, segment
-from bench_service.cli.files import text_of
+from bench_service.cli.asking.client import answer, call, connect, segment
+from bench_service.cli.files import check_folder, text_of, whole_file
 from bench_service.cli.options import AsJson, Server, console, wide
 from bench_service.cli.refusal import Refused
 
@@ -114,6 +114,40 @@ def enter(
     given = {"by": by, "remark": remark or None, "choose": choose_it or None}
     body |= {name: value for name, value in given.items() if value is not None}
     _post(context, _path(unit), body, server, as_json)
+
+
+@calibration.command("export")
+def export(
+    context: typer.Context,
+    unit: str,
+    calibration_id: str,
+    form: Annotated[
+        str,
+        typer.Option(
+            "--format",
+            help="json, c, python, kalibr, kalibr-imu, openvins, ardupilot, px4, imucal, matlab, psins, pyins, navego",
+        ),
+    ] = "json",
+    other: Annotated[
+        str | None, typer.Option(help="Calibration of the other triad; without it, of the same result or current")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write; without it, standard output")
+    ] = None,
+    server: Server = None,
+) -> None:
+    """Export a calibration in the form that other software applies."""
+    query = {"format": form} if other is None else {"format": form, "other": other}
+    if output is not None:
+        check_folder(output)
+    with connect(context.obj, server, drive=False) as client:
+        found = answer(client, "GET", f"{_path(unit)}/{segment(calibration_id)}/export", params=query)
+    if output is None:
+        print(found.text, end="")
+        return
+    with whole_file(output) as sink:
+        sink.write(found.content)
+    console.print(f"{output}: {len(found.content)} bytes", soft_wrap=True)
 
 
 def _path(unit: str) -> str:

@@ -45,22 +45,36 @@ def analyse(
 
 def export(
     context: typer.Context,
-    recording: str,
+    recording: Annotated[str, typer.Argument(help="Id of a recording; of a job, where the file is a .zip")],
     output: Annotated[
         Path, typer.Option("--output", "-o", dir_okay=False, help="File to write; its ending is the format")
     ],
     channels: Annotated[str | None, typer.Option(help="Names, separated by commas; all without it")] = None,
     start_s: Annotated[float | None, typer.Option(help="From this second of the recording")] = None,
     stop_s: Annotated[float | None, typer.Option(help="Up to this second of the recording")] = None,
+    values: Annotated[
+        str | None, typer.Option(help="physical (SI, units in the names) or raw; without it, as stored")
+    ] = None,
+    corrected_by: Annotated[str | None, typer.Option(help="Calibrations that correct, ids separated by commas")] = None,
+    decimate: Annotated[int | None, typer.Option(min=1, help="Samples that one mean is taken over")] = None,
+    form: Annotated[str, typer.Option("--format", help="Format of the files in a .zip")] = "csv",
     server: Server = None,
 ) -> None:
-    """Take a recording's samples out as .csv, .parquet, .arrow or .npy."""
+    """Take a recording's samples out as .csv, .parquet, .arrow, .npy, .feather, .h5 or .mat; a job's as .zip."""
     options: dict[str, Any] = {"channels": channels, "start_s": start_s, "stop_s": stop_s}
-    query = {"format": output.suffix.removeprefix("."), **{k: v for k, v in options.items() if v is not None}}
+    treated = {"values": values, "corrected_by": corrected_by, "decimate": decimate}
+    ending = output.suffix.removeprefix(".")
+    path = f"/api/v1/recordings/{segment(recording)}/data"
+    if ending == "zip":
+        path = f"/api/v1/jobs/{segment(recording)}/samples"
+        ending = form
+    elif ending in ("feather", "h5", "mat") or any(treated.values()):
+        path = f"/api/v1/recordings/{segment(recording)}/samples"
+    query = {"format": ending, **{k: v for k, v in {**options, **treated}.items() if v is not None}}
     check_folder(output)
     with (
         connect(context.obj, server, drive=False) as client,
-        client.stream("GET", f"/api/v1/recordings/{segment(recording)}/data", params=query) as response,
+        client.stream("GET", path, params=query) as response,
     ):
         check(response)
         with whole_file(output) as sink:

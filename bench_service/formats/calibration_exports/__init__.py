@@ -1,0 +1,1 @@
+"""Calibrations as files for other software: one module a consumer, `forms.py` has them all."""

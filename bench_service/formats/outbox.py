@@ -1,0 +1,33 @@
+"""File object that hands out the bytes written to it, for writers of files that are streamed."""
+
+
+class Outbox:
+    """Bytes that were written and not yet taken. It cannot seek, and says so."""
+
+    def __init__(self) -> None:
+        self._pieces: list[bytes] = []
+        self._position = 0
+        self.closed = False
+
+    def write(self, data: bytes) -> int:
+        """Append bytes."""
+        self._pieces.append(bytes(data))
+        self._position += len(data)
+        return len(data)
+
+    def flush(self) -> None:
+        """Flush nothing: no data are buffered."""
+
+    def close(self) -> None:
+        """Close; what was written can still be taken."""
+        self.closed = True
+
+    def seekable(self) -> bool:
+        """Answer that there is no seeking."""
+        return False
+
+    def take(self) -> bytes:
+        """The bytes since the last call."""
+        taken = b"".join(self._pieces)
+        self._pieces.clear()
+        return taken
