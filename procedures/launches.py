@@ -10,15 +10,18 @@ from typing import Literal, TypeVar
 from pydantic import Field
 
 from procedures.analysis.launch.analysis import INSPECTION, analyse_launch
+from procedures.analysis.launch.prediction import predicted_noise
 from procedures.analysis.launch.results import LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.summary import ChannelSummary, summarise
 from procedures.core import units
 from procedures.core.errors import UnfitRecording
-from procedures.core.limits import Check, Limit, check, verdict
-from procedures.core.recording import Recording
+from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
+from procedures.core.recording import TRIADS, Recording
+from procedures.core.unit import Unit
 from procedures.procedure import Outcome, Parameters
 
+SOURCE = "thesis 4.3, 5.6"
 LAUNCH = INSPECTION
 """Inspection of launches: each by itself, at rest throughout."""
 Part = Literal["gyros", "accelerometers", "all", "none"]
@@ -135,6 +138,34 @@ def _checks(channels: Sequence[ChannelSummary], limits: NoiseLimits) -> tuple[Ch
     return tuple(found)
 
 
+LIMITED = (
+    ("gyro", "random_walk", "deg/√h", units.DEG_PER_SQRT_HOUR, "gyro_random_walk_deg_sqrt_h"),
+    ("gyro", "bias_instability", "deg/h", units.DEG_PER_HOUR, "gyro_bias_in_run_deg_h"),
+    ("accelerometer", "bias_instability", "m/s^2", 1.0, "accelerometer_bias_in_run_m_s2"),
+)
+"""Triad, process, unit of its limit, size of that unit in SI, and the field of the limit."""
+
+
+def noise_checks(params: NoiseParameters, unit: Unit, duration_s: float, launches: int) -> list[PlannedCheck]:
+    """Planned checks of the noise of a unit whose noise is known, from the bounds of its coefficients.
+
+    A coefficient c with standard uncertainty u is a root mean square of ``ν = ½·(c/u)²`` degrees of freedom.
+    """
+    found: list[PlannedCheck] = []
+    for triad, process, name, size, field in LIMITED:
+        record = unit.triad(triad)
+        limit = Limit(name, maximum=getattr(params.noise_limits, field), source=SOURCE)
+        for channel, noise in zip(TRIADS[triad], record.noise if record else (), strict=False):
+            of_process = [p for p in predicted_noise(channel, noise, duration_s, launches) if p.process == process]
+            check_name = f"{channel} {process.replace('_', ' ')}"
+            for p in of_process:
+                freedom = 0.5 * (p.value / p.standard_uncertainty) ** 2
+                found.append(PlannedCheck(check_name, limit, 0.0, freedom, p.value / size))
+            if not of_process:
+                found.append(PlannedCheck(check_name, limit))
+    return found
+
+
 def _label(recording: Recording, number: int) -> str:
     return recording.info.station.label if recording.info.station else f"recording {number}"
 
@@ -143,7 +174,7 @@ def _check(s: ChannelSummary, process: str, maximum: float, unit: str, size: flo
     """The mean over the launches; of a process that no launch shows, the least that it is known to stay below."""
     found = s.mean(process)
     name = f"{s.channel} {process.replace('_', ' ')}"
-    limit = Limit(unit, maximum=maximum, source="thesis 4.3, 5.6")
+    limit = Limit(unit, maximum=maximum, source=SOURCE)
     if found.mean is not None:
         return check(name, found.mean / size, limit, None if found.sd is None else found.sd / size)
     bound = min((r.upper_limit for r in found.values if r.upper_limit is not None), default=float("inf"))

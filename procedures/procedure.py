@@ -12,7 +12,7 @@ from procedures.bench import Bench, BenchDescription
 from procedures.bench.imu import Stream
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, Verdict
+from procedures.core.limits import Check, PlannedCheck, Verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.unit import Unit
@@ -161,6 +161,18 @@ def _at_rest(_params: Any, count: int) -> Inspection:
     return Inspection(FitnessSettings(least_samples=1)) if count == 1 else STATIONS
 
 
+Planned = Sequence[tuple[PredictedUncertainty, ...]]
+"""The predicted coefficients of several calibrations, calibration by calibration."""
+
+
+def _no_checks(_params: Any, _context: Context) -> tuple[PlannedCheck, ...]:
+    return ()
+
+
+def _no_checks_of_method(_params: Any, _unit: Unit, _planned: Planned) -> tuple[PlannedCheck, ...]:
+    return ()
+
+
 def _nothing_learnt(_: Any, unit: Unit, _origin: str) -> Unit:
     return unit
 
@@ -197,6 +209,8 @@ class Procedure(Generic[P, R]):
     """Function that updates the unit's record from a job's result; the text names that result as its origin."""
     quantities: Callable[[P, Context], tuple[str, ...]] | None = None
     """Names of the checks and of the named estimates that a result will have; None: not known before the job."""
+    planned_checks: Callable[[P, Context], tuple[PlannedCheck, ...]] = _no_checks
+    """Checks that a result will have, with the uncertainty of the plan; those that a plan can tell of."""
     inspection: Callable[[P], Inspection] = _stations
     """Inspection of the recordings before the analysis; see `procedures.inspection`."""
 
@@ -215,5 +229,7 @@ class Method(Generic[P, R]):
     calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
     corrections: Callable[[R], tuple[UnitCorrection, ...]] = _no_corrections
     """The correction sets that a result gives: at most one of a kind."""
+    planned_checks: Callable[[P, Unit, Planned], tuple[PlannedCheck, ...]] = _no_checks_of_method
+    """Checks that a result will have, from the plans of the calibrations that it is to work on."""
     inspection: Callable[[P, int], Inspection] = _at_rest
     """Inspection of a number of recordings before the analysis; see `procedures.inspection`."""

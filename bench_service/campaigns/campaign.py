@@ -38,6 +38,9 @@ class StepLimit(Document):
     unit: str = Field(min_length=1, max_length=32, pattern=TEXT, description="of the limits; deg/h, m/s^2, ppm, 1, …")
     minimum: float | None = None
     maximum: float | None = None
+    source: str = Field(
+        "", max_length=300, pattern=TEXT, description="where the limit comes from; a new campaign needs it for each"
+    )
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -69,6 +72,25 @@ class TrendRule(Document):
     last: int = Field(100, ge=2, le=500, description="how many of the earlier results the limits rest on at most")
 
 
+class Gate(Document):
+    """Condition on an earlier step: the step behind the gate begins only once that one has this verdict."""
+
+    step: Name
+    verdict: Literal["pass", "fail"] = "pass"
+
+
+class DecisionRule(Document):
+    """Rule of the campaign's decisions on its own limits (ISO/IEC 17025, 7.8.6; ILAC-G8).
+
+    ``U = k·u`` is the expanded uncertainty; a value is accepted at ``limit − r·U`` for a maximum, ``limit + r·U`` for a
+    minimum. Simple acceptance is r = 0. A value without a known uncertainty is accepted simply, and that is said.
+    """
+
+    rule: Literal["simple", "guarded"] = "simple"
+    guard: float = Field(1.0, gt=0.0, le=10.0, description="r of the guarded rule: the guard band is r·U")
+    coverage_factor: float = Field(2.0, ge=1.0, le=10.0, description="k of U = k·u; 2 is about 95 %")
+
+
 class Step(Document):
     """One step: a procedure on the bench, or a method over what earlier steps gave."""
 
@@ -80,6 +102,9 @@ class Step(Document):
     parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
     limits: tuple[StepLimit, ...] = Field((), max_length=200)
     trends: tuple[TrendRule, ...] = Field((), max_length=50)
+    gates: tuple[Gate, ...] = Field(
+        (), max_length=100, description="earlier steps that must have passed (or failed); else this one is left out"
+    )
     on_fail: Literal["stop", "continue"] = Field("continue", description="when the verdict is fail")
     on_error: Literal["stop", "continue"] = Field("stop", description="when it gave no verdict, after all retries")
     retries: int = Field(0, ge=0, le=10, description="how often an error is answered by a new job")
@@ -132,6 +157,7 @@ class Campaign(Document):
         None, gt=0.0, le=8760.0, description="stop so long after the start; a plan that takes longer is refused"
     )
     labels: Labels = Field(default_factory=Labels, max_length=20)
+    decision: DecisionRule = Field(default_factory=lambda: DecisionRule.model_validate({}))
     seeds: Seeds = Field(default_factory=lambda: Seeds.model_validate({}))
     priority: int = Field(10, ge=1, le=1000, description="of its jobs; smaller runs first")
 
@@ -146,6 +172,10 @@ class Campaign(Document):
                     if other not in known:
                         allowed = f"an earlier step is needed, there is {', '.join(known) or 'none'}"
                         raise _fault(("steps", index, field, position), other, allowed)
+            for position, gate in enumerate(step.gates):
+                if gate.step not in known:
+                    allowed = f"an earlier step is needed, there is {', '.join(known) or 'none'}"
+                    raise _fault(("steps", index, "gates", position, "step"), gate.step, allowed)
             known.append(step.name)
         return self
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from threading import Event, Thread
 
 from bench_service.background import BackgroundTasks
-from bench_service.campaigns import transitions
+from bench_service.campaigns import gates, transitions
 from bench_service.campaigns.campaign import Step
 from bench_service.campaigns.judgement import judge
 from bench_service.campaigns.lineage import failed_calibrations
@@ -142,6 +142,8 @@ class Conductor:
         late = run.deadline_at is not None and at > run.deadline_at
         step = run.steps[index]
         try:
+            if not step.decided and (why := gates.closed(run, index)):
+                return transitions.left_out(run, index, why, at)
             if not step.decided:
                 return self._attempt(run, index, late)
             if run.step_of(index).method is not None:

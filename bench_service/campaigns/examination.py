@@ -1,20 +1,31 @@
 """Examines a campaign against catalogue, unit and bench, before anything moves: its plan, and its faults."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
+from math import prod
 from typing import Any
 
 from pydantic import ValidationError
 
-from bench_service.campaigns.campaign import Campaign, Step, StepLimit
+from bench_service.campaigns.campaign import Campaign, DecisionRule, Step, StepLimit
+from bench_service.campaigns.decision import in_words
+from bench_service.campaigns.expected_unit import NO_CALIBRATIONS, NO_CORRECTIONS, Progress
+from bench_service.campaigns.faults import (
+    first_fault,
+    require_calibrations,
+    require_known,
+    require_possible,
+    unresolved,
+    valid_parameters,
+)
+from bench_service.campaigns.gates import require_consistent
+from bench_service.campaigns.power import LimitPreview, preview
 from bench_service.jobs.planning import Plan, Planner, stations_of
 from bench_service.model.errors import NotFound
 from procedures.core.errors import BadParameter, DomainError, NoCalibration
+from procedures.core.limits import Limit, PlannedCheck
 from procedures.core.units import HOUR, converted
-from procedures.procedure import PredictedUncertainty, Procedure
-
-NO_CALIBRATIONS = Procedure.calibrations
-"""The `calibrations` of a procedure or method whose results are no calibration."""
+from procedures.procedure import PredictedUncertainty
 
 
 @dataclass(frozen=True)
@@ -29,6 +40,10 @@ class StepPlan:
     duration_s: float = 0.0
     data_bytes: int = 0
     warnings: tuple[str, ...] = ()
+    gates: tuple[str, ...] = ()
+    """The earlier steps and their verdicts without which it is left out, as sentences."""
+    limits: tuple[LimitPreview, ...] = ()
+    """The limits that can be told beforehand: those of the procedure, then the campaign's own."""
 
 
 @dataclass(frozen=True)
@@ -39,17 +54,14 @@ class Examination:
     duration_s: float
     data_bytes: int
     warnings: tuple[str, ...]
+    decision: str = ""
+    """The rule by which values are held to limits, in words."""
+    false_alarm: float = 0.0
+    """Probability that the unit as recorded fails a limit of known false alarm, were they independent."""
 
 
-@dataclass
-class _Progress:
-    """The results that earlier steps leave for later ones."""
-
-    calibrated: bool = False
-    """True once the unit's current calibration is of this campaign."""
-    calibrating: set[str] = field(default_factory=set[str])
-    """Steps whose results give calibrations."""
-    left_out: set[str] = field(default_factory=set[str])
+_CORRECTED = "predicted without the share of the thermal correction, which an earlier step is to give"
+_EXPECTED = "predicted with the calibration that earlier steps are to give, at nominal scale factors"
 
 
 class Examiner:
@@ -66,8 +78,15 @@ class Examiner:
         calibration is refused where there will be none; without, it is a warning.
         """
         self._planner.context(unit, bench)
-        progress = _Progress()
-        plans = tuple(self._step(campaign, k, unit, bench, progress, strict) for k in range(len(campaign.steps)))
+        require_consistent(campaign)
+        progress = Progress()
+        plans = tuple(
+            replace(
+                self._step(campaign, k, unit, bench, progress, strict),
+                gates=tuple(f"{gate.step}: {gate.verdict}" for gate in campaign.steps[k].gates),
+            )
+            for k in range(len(campaign.steps))
+        )
         duration_s = sum(plan.duration_s for plan in plans)
         if campaign.window_h is not None and duration_s > campaign.window_h * HOUR:
             needs = f"at least {duration_s / HOUR:.4g} h: so long the steps take by their plans"
@@ -75,15 +94,18 @@ class Examiner:
         warnings = _warnings(plans)
         if all(plan.left_out for plan in plans):
             warnings.append("every step is left out: the verdict will be error, because nothing is judged")
-        return Examination(plans, duration_s, sum(p.data_bytes for p in plans), tuple(warnings))
+        sound = prod(1.0 - one.false_alarm for p in plans for one in p.limits if one.false_alarm is not None)
+        told = (plans, duration_s, sum(p.data_bytes for p in plans), tuple(warnings), in_words(campaign.decision))
+        return Examination(*told, false_alarm=1.0 - sound)
 
     def _step(
-        self, campaign: Campaign, index: int, unit: str, bench: str | None, progress: _Progress, strict: bool
+        self, campaign: Campaign, index: int, unit: str, bench: str | None, progress: Progress, strict: bool
     ) -> StepPlan:
         step, where = campaign.steps[index], f"steps.{index}"
-        _require_possible(step, where)
+        require_possible(step, where)
         catalog: Mapping[str, Any] = self._catalogue.methods if step.method else self._catalogue.procedures
-        missing = [name for name in (*step.calibrations_of, *step.recordings_of) if name in progress.left_out]
+        needed = (*step.calibrations_of, *step.recordings_of, *(gate.step for gate in step.gates))
+        missing = [name for name in needed if name in progress.left_out]
         if step.does not in catalog or missing:
             kind = "method" if step.method else "procedure"
             if not step.optional:
@@ -95,15 +117,11 @@ class Examiner:
             why = f"it works on {missing[0]}, which is left out" if missing else f"there is no {kind} {step.does} yet"
             return StepPlan(step.name, step.does, f"left out: {why}")
         if step.method is not None:
-            _require_calibrations(step, where, progress)
-            _valid_parameters(self._catalogue.methods[step.does].params.model_validate, step.parameters, where)
-            if self._catalogue.methods[step.does].calibrations is not NO_CALIBRATIONS:
-                progress.calibrating.add(step.name)
-            return StepPlan(step.name, step.does)
+            return self._method(step, where, unit, bench, progress, campaign.decision)
         try:
-            plan = self._planner.plan(step.does, unit, step.parameters, bench)
+            plan, unknown = self._foreseen(step, unit, bench, progress)
         except ValidationError as error:
-            raise _first(error, where) from error
+            raise first_fault(error, where) from error
         except BadParameter as error:
             raise BadParameter(f"{where}.parameters.{error.field}", error.value, error.allowed) from error
         except DomainError as error:
@@ -112,21 +130,61 @@ class Examiner:
             return self._without_calibration(step, where, unit, bench, progress, strict, error)
         if plan.violations:
             raise BadParameter(f"{where}.parameters", plan.violations[0], "beyond a limit of the bench")
-        return self._planned(step, where, plan, progress)
+        return self._planned(step, where, plan, unknown, progress, campaign.decision)
 
-    def _planned(self, step: Step, where: str, plan: Plan, progress: _Progress) -> StepPlan:
+    def _method(
+        self, step: Step, where: str, unit: str, bench: str | None, progress: Progress, rule: DecisionRule
+    ) -> StepPlan:
+        method = self._catalogue.methods[step.does]
+        require_calibrations(step, where, progress.calibrating)
+        valid_parameters(method.params.model_validate, step.parameters, where)
+        if method.calibrations is not NO_CALIBRATIONS:
+            progress.calibrating.add(step.name)
+        params, record = method.params.model_validate(step.parameters), self._planner.context(unit, bench).unit
+        checks = method.planned_checks(params, record, progress.plans_of(step.calibrations_of))
+        limits = tuple(preview(one, rule.model_copy(update={"rule": "simple"})) for one in checks)
+        coarse = (
+            f"{one.check}: the limit of {one.maximum:g} {one.unit} cannot be resolved, U = "
+            f"{one.expanded_uncertainty:.3g} {one.unit}"
+            for one in limits
+            if one.resolved is False and one.expanded_uncertainty is not None
+        )
+        return StepPlan(step.name, step.does, warnings=tuple(coarse), limits=limits)
+
+    def _foreseen(self, step: Step, unit: str, bench: str | None, progress: Progress) -> tuple[Plan, tuple[str, ...]]:
+        """The plan on the unit as earlier steps will leave it, as far as that is known, and what is not, in words."""
+        context, parameters, unknown = self._planner.context(unit, bench), step.parameters, ()
+        wanted = parameters.get("thermal_correction") == "current" and context.unit.thermal_correction is None
+        if wanted and progress.correcting:
+            parameters, unknown = {**parameters, "thermal_correction": "none"}, (_CORRECTED,)
+        try:
+            return self._planner.plan_in(context, step.does, parameters), unknown
+        except NoCalibration:
+            expected = progress.expected(context.unit) if progress.calibrated else None
+            if expected is None:
+                raise
+            plan = self._planner.plan_in(replace(context, unit=expected), step.does, parameters)
+            return plan, (*unknown, _EXPECTED)
+
+    def _planned(
+        self, step: Step, where: str, plan: Plan, unknown: tuple[str, ...], progress: Progress, rule: DecisionRule
+    ) -> StepPlan:
         procedure, prediction = plan.procedure, plan.prediction
         names = None if procedure.quantities is None else procedure.quantities(plan.parameters, plan.context)
-        _require_known(step, where, names)
-        warnings = [*prediction.warnings]
+        require_known(step, where, names)
+        warnings = [*prediction.warnings, *unknown]
         for position, limit in enumerate(step.limits):
-            warnings += _unresolved(limit, f"{where}.limits.{position}", prediction.uncertainties)
+            warnings += unresolved(limit, f"{where}.limits.{position}", prediction.uncertainties)
         if procedure.calibrations is not NO_CALIBRATIONS:
             progress.calibrated = True
             progress.calibrating.add(step.name)
-        return StepPlan(
-            step.name, step.does, "", len(plan.stations), prediction.duration_s, plan.data_bytes, tuple(warnings)
-        )
+            progress.planned[step.name] = prediction.uncertainties
+        if procedure.corrections is not NO_CORRECTIONS:
+            progress.correcting.add(step.name)
+        checks = [preview(one, DecisionRule()) for one in procedure.planned_checks(plan.parameters, plan.context)]
+        checks += [preview(_of_campaign(limit, prediction.uncertainties), rule) for limit in step.limits]
+        told = (len(plan.stations), prediction.duration_s, plan.data_bytes, tuple(warnings))
+        return StepPlan(step.name, step.does, "", *told, limits=tuple(checks))
 
     def _without_calibration(
         self,
@@ -134,7 +192,7 @@ class Examiner:
         where: str,
         unit: str,
         bench: str | None,
-        progress: _Progress,
+        progress: Progress,
         strict: bool,
         error: DomainError,
     ) -> StepPlan:
@@ -144,7 +202,7 @@ class Examiner:
         procedure, context = self._catalogue.procedure(step.does), self._planner.context(unit, bench)
         params = procedure.resolve(procedure.params.model_validate(step.parameters), context)
         stations = stations_of(procedure, params)
-        _require_known(step, where, None if procedure.quantities is None else procedure.quantities(params, context))
+        require_known(step, where, None if procedure.quantities is None else procedure.quantities(params, context))
         duration_s = sum(s.power_off_s + s.settle_s + s.record_s for s in stations)
         warning = "not predicted: the calibration that it uses is not there yet"
         return StepPlan(step.name, step.does, "", len(stations), duration_s, 0, (warning,))
@@ -159,79 +217,12 @@ def _warnings(plans: Sequence[StepPlan]) -> list[str]:
     return [f"step{'s' if len(names) > 1 else ''} {', '.join(names)}: {text}" for text, names in said.items()]
 
 
-def _valid_parameters(validate: Any, parameters: dict[str, Any], where: str) -> None:
-    try:
-        validate(parameters)
-    except ValidationError as error:
-        raise _first(error, where) from error
-
-
-def _first(error: ValidationError, where: str) -> BadParameter:
-    """The first fault of a step's parameters, with the step in its path."""
-    first = error.errors(include_url=False)[0]
-    path = ".".join(str(part) for part in (where, "parameters", *first["loc"]))
-    return BadParameter(path, first.get("input"), first["msg"])
-
-
-def _require_known(step: Step, where: str, names: tuple[str, ...] | None) -> None:
-    """Refuse a limit or trend on a quantity that the result can never have, where its quantities are known."""
-    if names is None:
-        return
-    for kind, wanted in (("limits", step.limits), ("trends", step.trends)):
-        for position, one in enumerate(wanted):
-            if one.quantity not in names and not one.quantity.startswith("/"):
-                allowed = f"a quantity of {step.does}: {', '.join(names) or 'it has none'}"
-                raise BadParameter(f"{where}.{kind}.{position}.quantity", one.quantity, allowed)
-
-
-def _require_possible(step: Step, where: str) -> None:
-    """Refuse a step that contradicts itself: nothing could pass, or nothing would ever be judged."""
-    for position, limit in enumerate(step.limits):
-        for earlier in step.limits[:position]:
-            if earlier.excludes(limit) or limit.excludes(earlier):
-                allowed = f"what passes {earlier} too, an earlier limit of {limit.quantity}"
-                raise BadParameter(f"{where}.limits.{position}", str(limit), allowed)
-    for position, rule in enumerate(step.trends):
-        if rule.at_least > rule.last:
-            allowed = f"at most {rule.last}: of so many results the limits are made"
-            raise BadParameter(f"{where}.trends.{position}.at_least", rule.at_least, allowed)
-    for kind, names in (("calibrations_of", step.calibrations_of), ("recordings_of", step.recordings_of)):
-        for position, name in enumerate(names):
-            if name in names[:position]:
-                raise BadParameter(f"{where}.{kind}.{position}", name, "each step once: given twice it counts as two")
-
-
-def _require_calibrations(step: Step, where: str, progress: _Progress) -> None:
-    """Refuse a method on calibrations of a step that gives none."""
-    for position, name in enumerate(step.calibrations_of):
-        if name not in progress.calibrating:
-            allowed = (
-                f"a step that calibrates: {', '.join(sorted(progress.calibrating)) or 'none before this one does'}"
-            )
-            raise BadParameter(f"{where}.calibrations_of.{position}", name, allowed)
-
-
-def _unresolved(limit: StepLimit, where: str, predicted: tuple[PredictedUncertainty, ...]) -> list[str]:
-    """Warn of a limit narrower than the predicted uncertainty of its quantity; refuse a unit of another kind."""
+def _of_campaign(limit: StepLimit, predicted: Sequence[PredictedUncertainty]) -> PlannedCheck:
+    """A campaign's limit with the predicted uncertainty of its quantity."""
     found = next((p for p in predicted if p.about(limit.quantity)), None)
-    if found is None:
-        return []
-    try:
-        uncertainty = converted(found.standard_uncertainty, found.unit, limit.unit)
-    except ValueError as error:
-        raise BadParameter(f"{where}.unit", limit.unit, f"{limit.quantity}: {error}") from error
-    width = (
-        0.5 * (limit.maximum - limit.minimum)
-        if limit.maximum is not None and limit.minimum is not None
-        else abs(limit.maximum if limit.maximum is not None else limit.minimum or 0.0)
-    )
-    sign_alone = width == 0.0 and None in (limit.minimum, limit.maximum)
-    if uncertainty <= width or sign_alone:
-        return []
-    return [
-        f"the limit of {limit.quantity} cannot be resolved: ±{width:.3g} {limit.unit} is asked for, the plan's "
-        f"standard uncertainty is {uncertainty:.3g} {limit.unit}"
-    ]
+    u = None if found is None else converted(found.standard_uncertainty, found.unit, limit.unit)
+    name = f"{limit.quantity}, campaign's limit"
+    return PlannedCheck(name, Limit(limit.unit, limit.maximum, limit.minimum, limit.source), u)
 
 
 def step_field(campaign: Campaign, name: str) -> int:

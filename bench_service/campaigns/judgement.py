@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from bench_service.campaigns.campaign import Campaign, Step, StepLimit, TrendRule
+from bench_service.campaigns.decision import decided
 from bench_service.campaigns.stores import Stores
 from bench_service.evidence.trend import trend_of, value_of
 from bench_service.model.errors import NotFound
@@ -71,9 +72,11 @@ def _limited(limit: StepLimit, campaign: Campaign, document: dict[str, Any]) -> 
         size = converted(1.0, found.unit or limit.unit, limit.unit)
     except ValueError as error:
         raise BadParameter("limits.unit", limit.unit, f"{limit.quantity}: {error}") from error
-    wanted = Limit(limit.unit, limit.maximum, limit.minimum, f"campaign {campaign.name}")
+    source = f"campaign {campaign.name}" + (f": {limit.source}" if limit.source else "")
+    wanted = Limit(limit.unit, limit.maximum, limit.minimum, source)
     uncertainty = None if found.standard_uncertainty is None else found.standard_uncertainty * size
-    return check(f"{limit.quantity}, campaign's limit", found.value * size, wanted, uncertainty)
+    made = check(f"{limit.quantity}, campaign's limit", found.value * size, wanted, uncertainty)
+    return decided(made, campaign.decision)
 
 
 def _trend(rule: TrendRule, result: StoredResult, stores: Stores) -> tuple[list[Check], list[str]]:

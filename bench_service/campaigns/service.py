@@ -9,6 +9,7 @@ from typing import Any
 from bench_service.campaigns.campaign import Campaign
 from bench_service.campaigns.conductor import Conductor
 from bench_service.campaigns.examination import Examination, Examiner, step_field
+from bench_service.campaigns.faults import require_sources
 from bench_service.campaigns.run import CampaignRun, RunRequest, StepRun, StepState
 from bench_service.campaigns.scheduler import Scheduler
 from bench_service.campaigns.shipped import shipped
@@ -67,6 +68,7 @@ class CampaignService:
             return self._stores.campaigns.get(campaign.name)
         if campaign.name in shipped():
             raise NameTaken(f"campaign {campaign.name!r} comes with the service: choose another name")
+        require_sources(campaign)
         self.examine(campaign)
         return self._stores.campaigns.add(campaign, now(), idempotency)
 
@@ -75,6 +77,7 @@ class CampaignService:
         if campaign.name in shipped():
             raise NameTaken(f"campaign {campaign.name!r} comes with the service and cannot be changed")
         self._stores.campaigns.get(campaign.name)
+        require_sources(campaign)
         self.examine(campaign)
         self._stores.campaigns.replace(campaign, now())
         return campaign

@@ -16,8 +16,10 @@ from procedures import steps
 from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.misfit import MISFIT_MAX
 from procedures.analysis.calibration.plan import (
+    IN_RUN_SOURCE,
     TriadPlan,
     basis,
+    in_run_check,
     in_run_unresolved,
     predicted_parts,
     run_to_run_requirements,
@@ -25,7 +27,7 @@ from procedures.analysis.calibration.plan import (
     unresolved,
 )
 from procedures.analysis.calibration.reference import INPUT_UNITS, TRIAD_NAMES
-from procedures.analysis.calibration.reference_temperature import ThermalShare
+from procedures.analysis.calibration.reference_temperature import ThermalShare, require_correctable
 from procedures.analysis.calibration.scalar import require_scalar_determined
 from procedures.analysis.calibration.station_means import launch_warnings
 from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS, windows
@@ -38,7 +40,7 @@ from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import BadParameter, Undetermined
 from procedures.core.frames import orientation_beta_gamma, orientation_gamma_beta
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, coefficient_unit
-from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
@@ -47,8 +49,6 @@ from procedures.site_parameters import TableParameters, declared_table
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 Lag = Annotated[float, Field(ge=0.0, le=600.0)]
-LEAST_DWELL_S = 10.0
-"""Least dwell for the temperatures of a station: means, slopes, and their scatter [s]."""
 
 
 _NOT_PREDICTED = (
@@ -61,7 +61,9 @@ class Limits(Parameters):
 
     gyro_bias_in_run_deg_h: float = Field(0.015, gt=0.0, le=1e6)
     gyro_bias_run_to_run_deg_h: float = Field(0.015, gt=0.0, le=1e6)
-    gyro_scale_run_to_run_ppm: float = Field(10.0, gt=0.0, le=1e6)
+    gyro_scale_run_to_run_ppm: float | None = Field(
+        10.0, gt=0.0, le=1e6, description="None: whole turns are to give the scale factor"
+    )
     accelerometer_bias_in_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
     accelerometer_bias_run_to_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
     accelerometer_scale_run_to_run_ppm: float = Field(200.0, gt=0.0, le=1e6)
@@ -106,13 +108,7 @@ class Result(Outcome):
 def resolve(params: Params, context: Context) -> Params:
     """Dwell from the unit; site and table accuracy from the bench. Refuses a correction that the unit does not have."""
     full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
-    if full.thermal_correction == "current":
-        if context.unit.thermal_correction is None:
-            raise BadParameter(
-                "thermal_correction", "current", f"none: unit {context.unit.serial} has no thermal correction yet"
-            )
-        if full.dwell_s is not None and full.dwell_s < LEAST_DWELL_S:
-            raise BadParameter("dwell_s", full.dwell_s, f"at least {LEAST_DWELL_S:g}: temperatures are read beside")
+    require_correctable(full.thermal_correction, full.dwell_s, context.unit)
     return full
 
 
@@ -184,6 +180,17 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
     return tuple(f"{triad}{n}" for triad in TRIAD_NAMES for n in (*checks, *(f".{c}" for c in COEFFICIENT_NAMES)))
 
 
+def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
+    """Checks of the error per axis δ/√3, in sample."""
+    params = resolve(params, context)
+    limits = params.limits
+    maxima = {"gyro": limits.gyro_bias_in_run_deg_h, "accelerometer": limits.accelerometer_bias_in_run_m_s2}
+    level = limits.residual_p_value_min
+    name, limit = "residuals, p-value of chi-square", Limit("1", minimum=level, source="ours: a test of significance")
+    found = [in_run_check(_plan(triad, params, context), maxima[triad]) for triad in TRIAD_NAMES]
+    return (*found, *(PlannedCheck(f"{triad} {name}", limit, level=level) for triad in TRIAD_NAMES))
+
+
 def report(result: Result) -> Report:
     """Coefficients, checks, residuals and magnitudes (thesis Tables 5.1-5.4, figures 5.6-5.12)."""
     magnitudes = [t.magnitudes for t in result.triads]
@@ -231,14 +238,14 @@ def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
 def _warnings(params: Params, plans: Sequence[TriadPlan]) -> tuple[str, ...]:
     """Warnings of limits that the plan cannot resolve, and of triads with unknown noise."""
     limits = params.limits
-    requirements = run_to_run_requirements(
+    wanted = run_to_run_requirements(
         limits.gyro_bias_run_to_run_deg_h,
         limits.gyro_scale_run_to_run_ppm,
         limits.accelerometer_bias_run_to_run_m_s2,
         limits.accelerometer_scale_run_to_run_ppm,
     )
     by_triad = {plan.triad: plan for plan in plans}
-    found = [unresolved(by_triad[r.triad], r) for r in requirements]
+    found = [unresolved(by_triad[r.triad], r) for r in wanted]
     deg_h = units.DEG_PER_HOUR
     found += [
         in_run_unresolved(by_triad["gyro"], limits.gyro_bias_in_run_deg_h * deg_h, "deg/h", deg_h),
@@ -262,7 +269,7 @@ def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
         check(
             f"{triad} bias in run, δ/√3",
             m.per_axis / size,
-            Limit(unit, maximum=in_run, source="thesis 4.3, 5.1"),
+            Limit(unit, maximum=in_run, source=IN_RUN_SOURCE),
             m.per_axis_sd / size,
         ),
         check(f"{triad} condition number", t.condition, Limit("1", maximum=limits.condition_max)),
@@ -279,18 +286,9 @@ def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
 
 
 PROCEDURE = Procedure(
-    "calibration_12_orientations",
-    "Calibration in twelve orientations",
-    "1.4.0",
-    Params,
-    Result,
-    resolve,
-    schedule,
-    predict,
-    acquire,
-    analyse,
-    report,
-    calibrations,
+    *("calibration_12_orientations", "Calibration in twelve orientations", "1.4.0"),
+    *(Params, Result, resolve, schedule, predict, acquire, analyse, report, calibrations),
     uses_corrections=lambda params: ("thermal",) if params.thermal_correction == "current" else (),
     quantities=quantities,
+    planned_checks=planned_checks,
 )

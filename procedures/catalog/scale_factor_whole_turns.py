@@ -26,7 +26,7 @@ from procedures.core import units
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
 from procedures.core.recording import AXES, Recording, Station
 from procedures.core.report import Report
 from procedures.core.site import Site
@@ -218,22 +218,50 @@ def _warnings(params: Params, plan: TurnPlan) -> tuple[str, ...]:
     return () if coarse is None else (coarse,)
 
 
+def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
+    """Checks of the three standard uncertainties of each scale factor, by the plan, and on the terms."""
+    params = resolve(params, context)
+    made = _plan(params, context).estimator()
+    if made is None:
+        return ()
+    sd = dict(
+        zip(coefficient_names(params.terms), (made.covariance.diagonal() ** 0.5 / units.PPM).tolist(), strict=True)
+    )
+    of_scale = Limit("ppm", maximum=params.limits.scale_factor_3_sigma_ppm, source="ours")
+    found: list[PlannedCheck] = []
+    for number, axis in enumerate(AXES, start=1):
+        three = 3.0 * sd[f"K{number}{number}"]
+        found.append(PlannedCheck(f"gyro scale factor {axis}, 3σ", of_scale, None, None, three))
+        for term in params.terms:
+            name, maximum = _named(term, params.limits)
+            limit = Limit("ppm", maximum=maximum, source=TERM_SOURCE)
+            found.append(PlannedCheck(f"gyro {name} {axis}", limit, sd[f"{term}_{axis}"]))
+    level = params.limits.residual_p_value_min
+    limit = Limit("1", minimum=level, source="ours: a test of significance")
+    return (*found, PlannedCheck("gyro residuals, p-value of chi-square", limit, level=level))
+
+
+TERM_SOURCE = "ours, after thesis 4.3"
+
+
+def _named(term: Term, limits: Limits) -> tuple[str, float]:
+    """Name of a term in its check, and its limit [ppm]."""
+    if term == "asymmetry":
+        return "asymmetry", limits.asymmetry_ppm
+    return f"nonlinearity, {term}", limits.nonlinearity_ppm
+
+
 def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
     limits, ppm = params.limits, units.PPM
     of_scale = Limit("ppm", maximum=limits.scale_factor_3_sigma_ppm, source="ours")
-    maxima = {
-        "asymmetry": ("asymmetry", limits.asymmetry_ppm),
-        "quadratic": ("nonlinearity, quadratic", limits.nonlinearity_ppm),
-        "cubic": ("nonlinearity, cubic", limits.nonlinearity_ppm),
-    }
     checks: list[Check] = []
     for number, axis in enumerate(AXES, start=1):
         k = found.coefficient(f"K{number}{number}")
         checks.append(check(f"gyro scale factor {axis}, 3σ", 3.0 * k.standard_uncertainty / ppm, of_scale))
         for term in params.terms:
-            name, maximum = maxima[term]
+            name, maximum = _named(term, limits)
             c = found.coefficient(f"{term}_{axis}")
-            limit = Limit("ppm", maximum=maximum, source="ours, after thesis 4.3")
+            limit = Limit("ppm", maximum=maximum, source=TERM_SOURCE)
             checks.append(check(f"gyro {name} {axis}", abs(c.estimate) / ppm, limit, c.standard_uncertainty / ppm))
     if found.p_value is not None:
         limit = Limit("1", minimum=limits.residual_p_value_min)
@@ -242,16 +270,7 @@ def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
 
 
 PROCEDURE = Procedure(
-    "scale_factor_whole_turns",
-    "Gyro scale factor by whole turns",
-    "1.1.0",
-    Params,
-    Result,
-    resolve,
-    schedule,
-    predict,
-    acquire,
-    analyse,
-    report,
-    calibrations,
+    *("scale_factor_whole_turns", "Gyro scale factor by whole turns", "1.1.0"),
+    *(Params, Result, resolve, schedule, predict, acquire, analyse, report, calibrations),
+    planned_checks=planned_checks,
 )

@@ -15,11 +15,12 @@ from procedures.analysis.calibration.station_plan import windows
 from procedures.analysis.launch.prediction import predicted_noise, unresolved_noise
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
+from procedures.core.limits import PlannedCheck
 from procedures.core.recording import TRIADS, Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
-from procedures.launches import LAUNCH, NoiseParameters, NoiseResult, analyse_launches
+from procedures.launches import LAUNCH, NoiseParameters, NoiseResult, analyse_launches, noise_checks
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 from procedures.reports.launch import noise_report
 
@@ -139,6 +140,11 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
     return (*walks, *(f"{name} bias instability" for name, _ in rates)) if rates else ("noise processes observed",)
 
 
+def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
+    """Checks of the noise coefficients, the mean over the launches."""
+    return tuple(noise_checks(params, context.unit, params.duration_s, params.launches))
+
+
 def _origins(unit: Unit) -> str:
     return ", ".join(dict.fromkeys(r.noise_origin for r in (unit.gyro, unit.accelerometer) if r is not None))
 
@@ -157,5 +163,6 @@ PROCEDURE = Procedure(
     report,
     learns=learns,
     quantities=quantities,
+    planned_checks=planned_checks,
     inspection=lambda _: LAUNCH,
 )

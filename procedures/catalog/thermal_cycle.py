@@ -15,7 +15,7 @@ from pydantic import Field
 from procedures import steps
 from procedures.analysis.calibration.reference import site_with
 from procedures.analysis.thermal.cycle.analysis import KnownOfUnit, analyse_cycle
-from procedures.analysis.thermal.cycle.checks import CycleLimits, cycle_checks
+from procedures.analysis.thermal.cycle.checks import CycleLimits, cycle_checks, planned_cycle_checks
 from procedures.analysis.thermal.cycle.results import ThermalCycle
 from procedures.analysis.thermal.cycle.runs import CycleSettings
 from procedures.analysis.thermal.cycle.series import read_cycle
@@ -37,8 +37,6 @@ from procedures.reports import thermal_figures, thermal_tables
 
 LEAST_OFF_S = 3.0 * units.HOUR
 """Least time switched off between runs, three hours (thesis 4.2.1)."""
-UPRIGHT_SHARE = 0.99
-"""Least share of gravity along an axis that counts as up."""
 
 
 class Leg(Parameters):
@@ -179,16 +177,16 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 def predict(params: Params, context: Context) -> Prediction:
     """Predict the duration and name what is missing. Raises `BadParameter` where the cycle could give nothing."""
-    profile = params.profile()
     params.settings()
     _require_possible(params, context)
-    duration_s = len(AXES) * (params.power_off_s + profile.expected_s())
     basis = (
         "each soak begins with the end of its ramp, or when its least time is over; uncertainties of temperature "
         "coefficients are not predicted: they rest on how the unit's own temperatures part on ramps, which the cycle "
         "itself is to show"
     )
-    return Prediction(duration_s, (), _warnings(params, context), basis)
+    return Prediction(
+        len(AXES) * (params.power_off_s + params.profile().expected_s()), (), _warnings(params, context), basis
+    )
 
 
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
@@ -214,15 +212,11 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
         None if unit.gyro is None else unit.gyro.noise,
     )
     cycle = analyse_cycle(
-        series,
-        params.settings(),
-        params.form,
-        site.gravity_m_s2,
-        known,
+        *(series, params.settings(), params.form, site.gravity_m_s2, known),
         judge_current=params.correction == "current",
         noise_from_cycle=params.gyro_noise == "cycle",
     )
-    checks = cycle_checks(cycle, CycleLimits(**params.limits.model_dump(), level=params.level))
+    checks = cycle_checks(cycle, _limits(params))
     return Result(checks=checks, verdict=verdict(checks), warnings=cycle.warnings, cycle=cycle)
 
 
@@ -242,6 +236,10 @@ def report(result: Result) -> Report:
     return Report(thermal_tables.summary(cycle), (*thermal_tables.tables(cycle), *thermal_figures.figures(cycle)))
 
 
+def _limits(params: Params) -> CycleLimits:
+    return CycleLimits(**params.limits.model_dump(), level=params.level)
+
+
 def _up(recording: Recording, context: Context) -> int:
     """The axis that stood upwards, by the station's attitude."""
     station = recording.info.station
@@ -249,7 +247,7 @@ def _up(recording: Recording, context: Context) -> int:
         raise UnfitRecording(f"recording {recording.info.id}: nobody told how the unit stood")
     force = specific_force_b([station.angles], context.bench.site)[0]
     up = int(force.argmax())
-    if force[up] < UPRIGHT_SHARE * context.bench.site.gravity_m_s2:
+    if force[up] < 0.99 * context.bench.site.gravity_m_s2:
         raise UnfitRecording(f"recording {recording.info.id}: no axis of the unit stood upwards")
     return up
 
@@ -296,5 +294,6 @@ PROCEDURE = Procedure(
     uses_calibration=("accelerometer",),
     corrections=corrections,
     uses_corrections=uses_corrections,
+    planned_checks=lambda params, _: planned_cycle_checks(_limits(params)),
     inspection=lambda _: replace(STATIONS, temperatures=True),
 )

@@ -43,6 +43,27 @@ class Check:
     note: str = ""
 
 
+@dataclass(frozen=True)
+class PlannedCheck:
+    """A check that a result will have, and how well the plan measures its value; for decisions before a job.
+
+    The value is an estimate with Gaussian errors, or a root mean square of so many degrees of freedom, as a sample
+    standard deviation or a noise coefficient is: then ``value² = (true² + u²)·χ²/ν``.
+    """
+
+    check: str
+    limit: Limit
+    standard_uncertainty: float | None = None
+    """Standard uncertainty of the value by the plan, in the limit's unit; of a root mean square the part u of the
+    measurement. None: not predicted."""
+    degrees_of_freedom: float | None = None
+    """Degrees of freedom ν of a root mean square; None: an estimate."""
+    expected: float | None = None
+    """Value to expect of this unit by its record, without the measurement's part; None: not known."""
+    level: float | None = None
+    """Of a test of significance: chance that a sound unit fails it."""
+
+
 def check(name: str, value: float, limit: Limit, standard_uncertainty: float | None = None, note: str = "") -> Check:
     """Compare a value with its limit. A value that is not finite never passes."""
     passed = (

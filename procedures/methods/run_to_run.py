@@ -8,21 +8,22 @@ from procedures.analysis.calibration.run_to_run import Scatter, run_to_run
 from procedures.core import units
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
-from procedures.procedure import Evidence, Method, Outcome, Parameters
+from procedures.procedure import Evidence, Method, Outcome, Parameters, Planned
 
 TRIADS = ("gyro", "accelerometer")
+SOURCE = "thesis 4.3, 5.6"
 
 
 class Params(Parameters):
-    """Requirements on the standard deviation between launches (thesis 4.3, 5.6)."""
+    """Requirements on the standard deviation between launches (thesis 4.3, 5.6); None: it is not judged."""
 
-    gyro_bias_run_to_run_deg_h: float = Field(0.015, gt=0.0, le=1e6)
-    gyro_scale_run_to_run_ppm: float = Field(10.0, gt=0.0, le=1e6)
-    accelerometer_bias_run_to_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
-    accelerometer_scale_run_to_run_ppm: float = Field(200.0, gt=0.0, le=1e6)
+    gyro_bias_run_to_run_deg_h: float | None = Field(0.015, gt=0.0, le=1e6)
+    gyro_scale_run_to_run_ppm: float | None = Field(10.0, gt=0.0, le=1e6)
+    accelerometer_bias_run_to_run_m_s2: float | None = Field(0.0005, gt=0.0, le=100.0)
+    accelerometer_scale_run_to_run_ppm: float | None = Field(200.0, gt=0.0, le=1e6)
 
 
 class Result(Outcome):
@@ -48,8 +49,14 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
         for s, limit in judged
         if limit is not None and not s.resolves(_si(s, limit))
     )
-    in_counts = tuple(f"{s.triad} {s.name} is in counts: no limit applies" for s, limit in judged if limit is None)
-    return Result(checks=checks, verdict=verdict(checks), warnings=(*warnings, *in_counts), scatters=tuple(found))
+    unjudged = tuple(
+        f"{s.triad} {s.name} is in counts: no limit applies"
+        if s.unit == "count"
+        else f"{s.triad} {s.name} was not judged: no limit was given"
+        for s, limit in judged
+        if limit is None
+    )
+    return Result(checks=checks, verdict=verdict(checks), warnings=(*warnings, *unjudged), scatters=tuple(found))
 
 
 def report(result: Result) -> Report:
@@ -90,15 +97,15 @@ def _show(s: Scatter, value: float) -> str:
 
 
 def _limit(s: Scatter, params: Params) -> Limit | None:
-    """Limit in a display unit; None for a bias in counts."""
-    if s.unit == "count":
-        return None
-    gyro, bias = s.triad == "gyro", s.name.startswith("bias")
-    if bias:
-        maximum = params.gyro_bias_run_to_run_deg_h if gyro else params.accelerometer_bias_run_to_run_m_s2
-    else:
-        maximum = params.gyro_scale_run_to_run_ppm if gyro else params.accelerometer_scale_run_to_run_ppm
-    return Limit(_display(s)[0], maximum=maximum, source="thesis 4.3, 5.6")
+    """Limit in a display unit; None for a bias in counts, and where none was given."""
+    maximum = None if s.unit == "count" else _maximum(s.triad, s.name.startswith("bias"), params)
+    return None if maximum is None else Limit(_display(s)[0], maximum=maximum, source=SOURCE)
+
+
+def _maximum(triad: str, bias: bool, params: Params) -> float | None:
+    if triad == "gyro":
+        return params.gyro_bias_run_to_run_deg_h if bias else params.gyro_scale_run_to_run_ppm
+    return params.accelerometer_bias_run_to_run_m_s2 if bias else params.accelerometer_scale_run_to_run_ppm
 
 
 def _si(s: Scatter, limit: Limit) -> float:
@@ -112,9 +119,37 @@ def _check(s: Scatter, limit: Limit) -> Check:
     return check(f"{s.triad} {s.name} run to run", s.sd / size, limit, standard_uncertainty, note)
 
 
+def planned_checks(params: Params, unit: Unit, planned: Planned) -> tuple[PlannedCheck, ...]:
+    """Checks of the scatter over calibrations that are planned, by their predicted uncertainties.
+
+    Of a scale factor the nominal one is taken for 1, as in the preview of a unit that has no calibration.
+    """
+    found: list[PlannedCheck] = []
+    for triad in TRIADS:
+        names = [(f"bias {axis}", f"{triad}.b_{axis}") for axis in "xyz"]
+        names += [(f"scale factor {axis}", f"{triad}.K{k}{k}") for k, axis in enumerate("xyz", start=1)]
+        for name, coefficient in names:
+            bias = name.startswith("bias")
+            maximum = _maximum(triad, bias, params)
+            own = [p for one in planned for p in one if p.name == coefficient]
+            if maximum is None or len(own) < 2:
+                continue
+            display, size = units.DISPLAY[own[0].unit] if bias else ("ppm", units.PPM)
+            record, u = unit.triad(triad), sqrt(sum(p.standard_uncertainty**2 for p in own) / len(own)) / size
+            sd = None if record is None else record.bias_run_to_run_sd if bias else record.scale_factor_run_to_run_sd
+            limit = Limit(display, maximum=maximum, source=SOURCE)
+            expected = None if sd is None else sd / size
+            found.append(PlannedCheck(f"{triad} {name} run to run", limit, u, len(own) - 1.0, expected))
+    return tuple(found)
+
+
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
     """No calibrations to store: they are the input of this method."""
     return ()
 
 
-METHOD = Method("run_to_run", "Stability from launch to launch", "1.0.0", Params, Result, analyse, report, calibrations)
+METHOD = Method(
+    *("run_to_run", "Stability from launch to launch", "1.1.0"),
+    *(Params, Result, analyse, report, calibrations),
+    planned_checks=planned_checks,
+)

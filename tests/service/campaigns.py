@@ -7,13 +7,13 @@ from tests.kit.thermal_plan import SHORT as THERMAL
 from tests.service.client import Client
 
 SHORT = {"dwell_s": 2.0, "settle_s": 0.5}
+DWELL = {"dwell_s": 10.0, "settle_s": 0.5}
+"""The shortest dwell whose temperatures can be read beside it."""
 SCALED_DOWN: dict[str, dict[str, Any]] = {
     "static": {"launches": 1, "duration_s": 600.0, "off_time_s": 10.0, "wavelet_levels": 4},
+    "converter": {"temperatures_c": [-20.0, 0.0, 20.0, 40.0, 60.0], "record_s": 10.0},
     "thermal": THERMAL,
-    "calibration_1": SHORT,
-    "calibration_2": SHORT,
-    "calibration_3": SHORT,
-    "verification": SHORT,
+    **{f"{name}_{number}": DWELL for name in ("calibration", "verification") for number in (1, 2, 3)},
 }
 """The thesis's campaign in minutes of bench time: its course is tested with it, not the numbers."""
 OPEN = ("queued", "running", "paused")

@@ -14,19 +14,21 @@ from tests.service.client import Client
 
 CALIBRATION = {"procedure": "calibration_12_orientations"}
 METHOD = {"procedure": None, "method": "run_to_run"}
-NO_SUCH_LIMIT = {"limits": [{"quantity": "noise", "unit": "1", "maximum": 1.0}]}
+NO_SUCH_LIMIT = {"limits": [{"quantity": "noise", "unit": "1", "maximum": 1.0, "source": "a test"}]}
 SCHEDULE = {"cron": "0 1 * * *", "time_zone": "Europe/Kyiv", "campaign": "thesis_acceptance", "unit": "SIM-0001"}
 
 
 def limits(**limit: Any) -> dict[str, Any]:
-    return {**CALIBRATION, "limits": [{"quantity": "gyro condition number", "unit": "1", **limit}]}
+    return {**CALIBRATION, "limits": [{"quantity": "gyro condition number", "unit": "1", "source": "a test", **limit}]}
 
 
 CONTRADICTORY = [
-    {"quantity": "gyro.b_x", "unit": "deg/h", "minimum": 5.0},
-    {"quantity": "gyro.b_x", "unit": "rad/s", "maximum": 1e-6},
+    {"quantity": "gyro.b_x", "unit": "deg/h", "minimum": 5.0, "source": "a test"},
+    {"quantity": "gyro.b_x", "unit": "rad/s", "maximum": 1e-6, "source": "a test"},
 ]
-OF_ANOTHER_KIND = [{"quantity": "gyro.b_x", "unit": "kg", "maximum": 1.0}]
+OF_ANOTHER_KIND = [{"quantity": "gyro.b_x", "unit": "kg", "maximum": 1.0, "source": "a test"}]
+BEHIND_A: dict[str, Any] = {"gates": [{"step": "a"}]}
+FAIL_OF_A = {"step": "a", "verdict": "fail"}
 NEVER_JUDGED = [{"quantity": "gyro.b_x", "at_least": 50, "last": 5}]
 
 
@@ -54,6 +56,12 @@ NEVER_JUDGED = [{"quantity": "gyro.b_x", "at_least": 50, "last": 5}]
         (named("x", {**CALIBRATION, "parameters": {"orientations": [[0, 0]]}}), "steps.0.parameters", "rank"),
         (named("x", {}, {"name": "a"}), "steps.1.name", "a name of its own"),
         (named("x", {"procedure": "static_run"}, window_h=20.0), "window_h", "at least 28"),
+        (named("x", limits(maximum=1.0, source="")), "steps.0.limits.0.source", "the origin of the limit"),
+        (named("x", {}, {"gates": [{"step": "z"}]}), "steps.1.gates.0.step", "earlier step"),
+        (named("x", {}, {"gates": [{"step": "b"}]}), "steps.1.gates.0.step", "earlier step"),
+        (named("x", {}, {"gates": [{"step": "a"}, {"step": "a", "verdict": "fail"}]}), "steps.1.gates.1", "no run"),
+        (named("x", {}, BEHIND_A, {"gates": [{"step": "b"}, FAIL_OF_A]}), "steps.2.gates.1", "a to pass and to fail"),
+        (named("x", {"on_fail": "stop"}, {"gates": [FAIL_OF_A]}), "steps.1.gates.0", "which ends the run"),
         (named("x", {"retries": -1}), "steps.0.retries", "greater than or equal to 0"),
         (named("x", {"on_fail": "explode"}), "steps.0.on_fail", "'stop' or 'continue'"),
         (named("x", {}, seeds={"rule": "vary", "base": 3}), "seeds", "rule repeat"),
@@ -73,7 +81,7 @@ def test_a_campaign_that_cannot_be(sqlite_client: Client, campaign: dict[str, An
 
 
 def test_a_limit_that_the_plan_cannot_resolve_is_a_warning(sqlite_client: Client) -> None:
-    narrow = {"quantity": "gyro.b_x", "unit": "deg/h", "minimum": -1e-6, "maximum": 1e-6}
+    narrow = {"quantity": "gyro.b_x", "unit": "deg/h", "minimum": -1e-6, "maximum": 1e-6, "source": "a test"}
     made = add(sqlite_client, named("narrow", {**CALIBRATION, "parameters": SHORT, "limits": [narrow]}))
     assert any("gyro.b_x cannot be resolved: ±1e-06 deg/h" in warning for warning in made["warnings"])
     wide = {**narrow, "minimum": -1e3, "maximum": 1e3}

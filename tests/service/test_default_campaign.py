@@ -126,7 +126,7 @@ def test_limits_and_history_of_a_golden_unit(sqlite_client: Client) -> None:
     step = {
         "procedure": "calibration_12_orientations",
         "parameters": {**SHORT, "limits": {"gyro_bias_in_run_deg_h": 1.0}},
-        "limits": [{"quantity": "gyro.b_x", "unit": "deg/h", "minimum": -100.0, "maximum": 100.0}],
+        "limits": [{"quantity": "gyro.b_x", "unit": "deg/h", "minimum": -100.0, "maximum": 100.0, "source": "a test"}],
         "trends": [{"quantity": "gyro.b_x", "at_least": 2, "outcome": "fail"}],
     }
     add(sqlite_client, named("golden", step, seeds={"rule": "repeat", "base": 9}))

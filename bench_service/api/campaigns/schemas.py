@@ -60,6 +60,10 @@ class CampaignPreview(BaseModel):
     duration_s: float = Field(description="Bench time by the plans")
     data_bytes: int
     warnings: list[str]
+    decision: str = Field(description="Rule by which values are held to limits")
+    false_alarm: float = Field(
+        description="Probability that the unit as recorded fails a limit of known false alarm, were they independent"
+    )
 
 
 class StepRunView(BaseModel):

@@ -8,13 +8,15 @@ import numpy as np
 
 from procedures.analysis.calibration.estimator import Estimator, TableShare, Weighting, estimator, table_share
 from procedures.analysis.calibration.magnitude import magnitude_covariance, magnitude_gradient
-from procedures.analysis.calibration.reference import reference_vectors
+from procedures.analysis.calibration.reference import INPUT_UNITS, reference_vectors
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.station_plan import dwell_for, windows
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
 from procedures.analysis.calibration.verification import predicted_sd
 from procedures.core import units
 from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter
+from procedures.core.limits import Limit, PlannedCheck
 from procedures.core.recording import Station
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
@@ -155,13 +157,17 @@ def basis(plans: Sequence[TriadPlan]) -> str:
 
 
 def run_to_run_requirements(
-    gyro_bias_deg_h: float, gyro_scale_ppm: float, accelerometer_bias_m_s2: float, accelerometer_scale_ppm: float
+    gyro_bias_deg_h: float,
+    gyro_scale_ppm: float | None,
+    accelerometer_bias_m_s2: float,
+    accelerometer_scale_ppm: float,
 ) -> tuple[Requirement, ...]:
-    """The four limits on stability from launch to launch (thesis 4.3, 5.6)."""
+    """The limits on stability from launch to launch (thesis 4.3, 5.6); without that of the gyro scale where None."""
     deg_h, ppm = units.DEG_PER_HOUR, units.PPM
+    scale = () if gyro_scale_ppm is None else (gyro_scale_ppm * ppm,)
     return (
         Requirement("gyro", "bias", BIASES, gyro_bias_deg_h * deg_h, "deg/h", deg_h),
-        Requirement("gyro", "scale factor", SCALE_FACTORS, gyro_scale_ppm * ppm, "ppm", ppm),
+        *(Requirement("gyro", "scale factor", SCALE_FACTORS, limit, "ppm", ppm) for limit in scale),
         Requirement("accelerometer", "bias", BIASES, accelerometer_bias_m_s2, "m/s^2", 1.0),
         Requirement("accelerometer", "scale factor", SCALE_FACTORS, accelerometer_scale_ppm * ppm, "ppm", ppm),
     )
@@ -215,6 +221,33 @@ def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size:
         f"{plan.triad} bias in run: the limit of {limit / display_size:g} {display} cannot be resolved, the noise of "
         f"the dwells alone makes δ/√3 about {expected / display_size:.3g} {display}"
     )
+
+
+IN_RUN_SOURCE = "thesis 4.3, 5.1"
+
+
+def in_run_check(plan: TriadPlan, maximum: float | None, covariance: Array | None = None) -> PlannedCheck:
+    """Planned check of the error per axis δ/√3 of n stations, its limit in the triad's unit of display.
+
+    δ² is a mean square of n − 1 degrees of freedom; its part of the measurement is what the noise of the dwells leaves,
+    or errors of magnitude with the `covariance` (n, n) given. Without a maximum the limit is the plan's expanded
+    uncertainty, k = 2. Raises `BadParameter` where that is not known.
+    """
+    display, size = units.DISPLAY[INPUT_UNITS[plan.triad]]
+    name = f"{plan.triad} bias in run, δ/√3"
+    planned = plan.at_dwell()
+    if covariance is None and planned is not None:
+        gradient = magnitude_gradient(plan.vectors, np.linalg.inv(plan.matrix))
+        covariance = magnitude_covariance(gradient, planned.noise_covariance)
+    floor = None if covariance is None else predicted_sd(covariance) / float(np.sqrt(3.0)) / size
+    if maximum is not None:
+        limit = Limit(display, maximum=maximum, source=IN_RUN_SOURCE)
+    elif floor is not None:
+        limit = Limit(display, maximum=2.0 * floor, source="expanded uncertainty of the plan, k = 2")
+    else:
+        field = f"limits.{plan.triad}_bias_in_run_{'deg_h' if plan.triad == 'gyro' else 'm_s2'}"
+        raise BadParameter(field, None, "a number: the noise is not known, so the plan has no uncertainty to take")
+    return PlannedCheck(name, limit, floor, None if floor is None else float(len(plan.stations) - 1), 0.0)
 
 
 def _length(dwell_s: float) -> str:

@@ -36,6 +36,7 @@ from procedures.core.thermal_correction import (
     ThermalCorrection,
     terms,
 )
+from procedures.core.unit import Unit
 
 SENSORS = ("temperature_case", "temperature_converter")
 """Channels of Δt and Δb."""
@@ -43,6 +44,20 @@ CELLS = 12
 """Stretches of a dwell that its temperatures' line is fitted to."""
 LEAST_CELL_S = 1.0
 """Interval at which a unit sends its temperatures: once a second."""
+
+
+LEAST_DWELL_S = 10.0
+"""Least dwell for the temperatures of a station: means, slopes, and their scatter [s]."""
+
+
+def require_correctable(thermal_correction: str, dwell_s: float | None, unit: Unit) -> None:
+    """Refuse `thermal_correction` "current" of a unit without one, or with too short a dwell. Raises `BadParameter`."""
+    if thermal_correction != "current":
+        return
+    if unit.thermal_correction is None:
+        raise BadParameter("thermal_correction", "current", f"none: unit {unit.serial} has no thermal correction yet")
+    if dwell_s is not None and dwell_s < LEAST_DWELL_S:
+        raise BadParameter("dwell_s", dwell_s, f"at least {LEAST_DWELL_S:g}: temperatures are read beside")
 
 
 @dataclass(frozen=True)

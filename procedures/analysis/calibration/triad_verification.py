@@ -9,7 +9,8 @@ import numpy as np
 
 from procedures.analysis.calibration.plan import TriadPlan
 from procedures.analysis.calibration.reference import reference_magnitude, reference_vectors
-from procedures.analysis.calibration.station_means import require_unit_of, station_means
+from procedures.analysis.calibration.reference_temperature import bring_to_reference, thermal_warnings
+from procedures.analysis.calibration.station_means import StationMeans, require_unit_of, station_means
 from procedures.analysis.calibration.station_noise import outputs_covariance
 from procedures.analysis.calibration.verification import Magnitudes, error_covariance, magnitudes
 from procedures.analysis.least_squares.chi_square import chi_square, tail_probability
@@ -17,6 +18,7 @@ from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Recording
 from procedures.core.site import Site
+from procedures.core.thermal_correction import ThermalCorrection
 from procedures.core.unit import Unit
 
 
@@ -52,8 +54,30 @@ def verify_triad(recordings: Sequence[Recording], triad: str, site: Site, unit: 
 
     Raises `UnfitRecording` where the recordings' unit is not the calibration's, or a station carries no angles.
     """
+    return _verified(station_means(recordings, triad), site, unit)
+
+
+def verify_at_reference(
+    recordings: Sequence[Recording],
+    site: Site,
+    unit: Unit,
+    correction: ThermalCorrection,
+    lag_s: tuple[float, float],
+) -> tuple[TriadVerification, tuple[str, ...]]:
+    """Verify the accelerometers with their means brought to the reference temperatures, and warn of that step's doubts.
+
+    The correction's covariance counts in full beside the calibration's own, though both may rest on one correction: at
+    like temperatures its errors cancel, and the prediction is then too wide. Raises as `verify_triad` and
+    `bring_to_reference`.
+    """
+    brought = bring_to_reference(recordings, station_means(recordings, "accelerometer"), correction, lag_s)
+    return _verified(brought.means, site, unit, brought.covariance), thermal_warnings(brought, correction)
+
+
+def _verified(means: StationMeans, site: Site, unit: Unit, more: Array | None = None) -> TriadVerification:
+    """Verify one triad from its station means; `more` is their covariance from causes other than noise, (3, n, n)."""
+    triad = means.triad
     calibration = calibration_of(unit, triad)
-    means = station_means(recordings, triad)
     require_unit_of(calibration, means)
     angles = [a for a in means.angles if a is not None]
     record = unit.triad(triad)
@@ -61,6 +85,7 @@ def verify_triad(recordings: Sequence[Recording], triad: str, site: Site, unit: 
     reference = reference_magnitude(triad, site)
     if noise is None or len(angles) < len(means.angles):
         return TriadVerification(magnitudes(means.outputs, calibration, reference, means.labels), None, None, False)
+    noise = noise if more is None else noise + more
     covariance = error_covariance(reference_vectors(triad, angles, site), calibration, noise, record)
     found = magnitudes(means.outputs, calibration, reference, means.labels, np.sqrt(np.diagonal(covariance)))
     statistic = chi_square(np.array(found.errors), covariance)

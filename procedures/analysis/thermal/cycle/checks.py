@@ -6,7 +6,7 @@ import numpy as np
 
 from procedures.analysis.thermal.cycle.results import GyroNoise, ThermalCycle
 from procedures.core import units
-from procedures.core.limits import Check, Limit, check
+from procedures.core.limits import Check, Limit, PlannedCheck, check
 from procedures.core.recording import AXES
 
 THESIS = "thesis 4.3, 5.6"
@@ -53,6 +53,19 @@ def cycle_checks(cycle: ThermalCycle, limits: CycleLimits) -> tuple[Check, ...]:
         found.append(_noise(f"gyro_{name} random walk in the cycle", noises, 1, limits.gyro_random_walk_deg_sqrt_h))
         found.append(_noise(f"gyro_{name} bias instability in the cycle", noises, 2, limits.gyro_bias_in_run_deg_h))
     return tuple(found)
+
+
+def planned_cycle_checks(limits: CycleLimits) -> tuple[PlannedCheck, ...]:
+    """Checks that a cycle will have. Its uncertainties rest on the temperatures to come and are not predicted."""
+    force = Limit("m/s^2", maximum=limits.three_sigma_m_s2, source=THESIS)
+    rms = Limit("m/s^2", maximum=limits.magnitude_rms_m_s2, source=THESIS)
+    level = limits.level / len(AXES)
+    independent = Limit("1", minimum=level, source="thesis table 4.6: no correlation")
+    of_axes = [PlannedCheck(f"accelerometer_{axis} 3σ after correction", force) for axis in AXES]
+    gyros = [
+        PlannedCheck(f"gyro_{axis} independence of temperature, p-value", independent, level=level) for axis in AXES
+    ]
+    return (*of_axes, PlannedCheck("|ĝ| over the cycle, rms about its mean", rms), *gyros)
 
 
 def _noise(name: str, noises: list[GyroNoise], process: int, maximum: float) -> Check:
