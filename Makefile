@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := calibration multi_position allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit access
+VALIDATIONS := calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit access
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
