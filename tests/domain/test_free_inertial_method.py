@@ -22,13 +22,15 @@ WALK = {"gyro": 0.002 * units.DEG_PER_SQRT_HOUR, "accelerometer": 20.0 * units.M
 LAUNCH = {"gyro": 0.003 * units.DEG_PER_HOUR, "accelerometer": 20.0 * units.MICRO_G}
 BIAS_SD = {"gyro": 0.005 * units.DEG_PER_HOUR, "accelerometer": 30.0 * units.MICRO_G}
 ATTITUDE = turn("y", -40.0) @ turn("z", 5.0) @ turn("x", -8.0)
-TRIADS = ("gyro", "accelerometer")
-UNIT = Unit(
-    "S-1",
-    1.0 / CELL_S,
-    CHANNELS,
-    *(TriadRecord((NoiseCoefficients(random_walk=WALK[t]),) * 3, LAUNCH[t]) for t in TRIADS),
-)
+
+
+def record(triad: str) -> TriadRecord:
+    noise = NoiseCoefficients(random_walk=WALK[triad])
+    return TriadRecord((noise, noise, noise), LAUNCH[triad])
+
+
+PARAMS = METHOD.params.model_validate({"latitude_deg": 50.0, "gravity_m_s2": 9.81})
+UNIT = Unit("S-1", 1.0 / CELL_S, CHANNELS, record("gyro"), record("accelerometer"))
 
 
 def drawn(rng: np.random.Generator, hours: float = 2.0, more_deg_h: float = 0.0) -> tuple[Any, DatedCalibration]:
@@ -55,7 +57,7 @@ def drawn(rng: np.random.Generator, hours: float = 2.0, more_deg_h: float = 0.0)
 
 def analysed(recording: Any, calibration: DatedCalibration, unit: Unit | None = UNIT, **more: Any) -> Any:
     given = {"latitude_deg": LATITUDE_DEG, "gravity_m_s2": GRAVITY, "cell_s": CELL_S} | more
-    return METHOD.analyse(Evidence((recording,), (calibration,)), METHOD.params(**given), unit)
+    return METHOD.analyse(Evidence((recording,), (calibration,)), METHOD.params.model_validate(given), unit)
 
 
 def test_the_distance_of_many_units_is_as_chance_has_it():
@@ -99,11 +101,11 @@ def test_refusals_name_the_way_out():
     with pytest.raises(BadParameter, match="one recording of a unit at rest"):
         METHOD.analyse(
             Evidence((recording,) * 2, (calibration,)),
-            METHOD.params(latitude_deg=50.0, gravity_m_s2=9.81),
+            PARAMS,
             UNIT,
         )
     with pytest.raises(BadParameter, match="the gyro triad has no calibration"):
-        METHOD.analyse(Evidence((recording,)), METHOD.params(latitude_deg=50.0, gravity_m_s2=9.81), UNIT)
+        METHOD.analyse(Evidence((recording,)), PARAMS, UNIT)
     channels = tuple(Channel(c.name, Quantity(c.quantity), "count") for c in CHANNELS)
     counts = MemoryRecording(RecordingInfo("r", "S-1", channels, 0.1, len(recording.raw)), recording.raw)
     with pytest.raises(UnfitRecording, match="the gyro channels are in count, the calibration is for rad/s"):

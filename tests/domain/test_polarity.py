@@ -32,7 +32,7 @@ def wired(taken: Sequence[MemoryRecording], rows: dict[str, tuple[tuple[str, int
     """The recordings with some channels made of others, each a sum of (channel, sign): counts keep their meaning."""
     made: list[MemoryRecording] = []
     for r in taken:
-        raw = np.array(r.raw)
+        raw = np.array(r.raw, dtype=np.float64)
         for name, parts in rows.items():
             raw[:, r.info.column(name)] = sum(sign * r.raw[:, r.info.column(other)] for other, sign in parts)
         made.append(MemoryRecording(r.info, raw))
@@ -50,7 +50,9 @@ def test_a_good_unit_passes_in_two_minutes(taken: list[MemoryRecording], context
     assert result.verdict is Verdict.PASS
     assert result.sentences == result.warnings == ()
     assert [a.axes for a in result.triads] == [("+x", "+y", "+z")] * 2
-    assert tuple(c.name for c in result.checks) == POLARITY.quantities(PARAMS, context)
+    quantities = POLARITY.quantities
+    assert quantities is not None
+    assert tuple(c.name for c in result.checks) == quantities(PARAMS, context)
     assert POLARITY.predict(PARAMS, context).duration_s < 120.0
     # The default unit's K of the thesis's tables 5.1, 5.2, to what pulses, level and rest leave of one turn.
     assert np.array(result.triads[0].matrix).diagonal() == pytest.approx([1.0048, 1.0017, 1.0009], abs=0.002)

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import log_ndtr, ndtri, ndtri_exp
 from scipy.stats import chi2
 
@@ -107,7 +108,8 @@ def residual_covariance(
 
 def coefficient_columns(vectors: Array) -> Array:
     """Outputs per change of the twelve coefficients, stacked channel by channel: A, shape (3n, 12)."""
-    return np.kron(np.eye(3), np.column_stack([np.ones(len(vectors)), vectors]))
+    one = np.column_stack([np.ones(len(vectors)), vectors])
+    return np.asarray(np.kron(np.eye(3), one), dtype=np.float64)
 
 
 def diagnose(
@@ -151,7 +153,7 @@ def inseparable(vectors: Array) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(4 * channel + k for k in group) for channel in range(3) for group in groups)
 
 
-def _reached(start: int, tied: Array) -> tuple[int, ...]:
+def _reached(start: int, tied: NDArray[np.bool_]) -> tuple[int, ...]:
     """Columns tied to `start`, by way of others too."""
     found, waiting = {start}, [start]
     while waiting:
@@ -224,7 +226,7 @@ def _movements(
     matrix = calibration.matrix_array
     mounted = np.stack([np.cross(vectors, axis) for axis in np.eye(3)], axis=2)
     kinds = [("turn of the unit on the table about its x, y, z", mounted)]
-    azimuth = table.sensitivity[:, :, table.columns("azimuth")]
+    azimuth = np.take(table.sensitivity, np.flatnonzero(table.columns("azimuth")), axis=2)
     if calibration.triad == "gyro" and azimuth.size:
         kinds.append(("turn of the table's zero about the vertical", azimuth))
     found: list[Movement] = []
