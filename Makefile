@@ -2,13 +2,14 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit access
-BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
+VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit access
+FOREIGN := basil edie instro ixcom visa
+BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
 
 .DEFAULT_GOAL := help
-.PHONY: help run test browser clients bench chaos soak format check validate rights lock audit images clean
+.PHONY: help run test browser clients bench chaos soak format check validate rights lock audit images clean foreign
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -77,5 +78,13 @@ rights: $(VENV)/.ready  ## write docs/rights.md anew, from the routes and their 
 	@$(BIN)/python -m tests.kit.rights_page
 
 
+foreign: $(addprefix .foreign/,$(addsuffix /.ready,$(FOREIGN)))  ## environments of the programs by others that the tests talk to
+
+.foreign/%/.ready: tests/foreign/%.lock
+	@test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	@test -x .foreign/$*/bin/python || $(PYTHON) -m venv --without-pip .foreign/$*
+	@VIRTUAL_ENV=$(CURDIR)/.foreign/$* $(BIN)/uv pip install --quiet --require-hashes -r $<
+	@touch $@
+
 clean:  ## remove the environment and the demo's data
-	rm -rf $(VENV) .venv-audit .bench
+	rm -rf $(VENV) .venv-audit .foreign .bench

@@ -39,16 +39,14 @@ from bench_service.api.units import routes as units
 from bench_service.bench.devices import BenchDevices
 from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.live.values import Heartbeat, LiveBoard
-from bench_service.bench.prompts import AskedOperator, Asking
+from bench_service.bench.prompts import AskedOperator
 from bench_service.bench.safety import SafetyService
 from bench_service.bench.stop.elsewhere import StopAddresses
 from bench_service.bench.stop.road import StopRoads
 from bench_service.bench_files import BenchFiles
 from bench_service.campaigns.stores import Stores
-from bench_service.drivers.device_faults import FaultPlan
-from bench_service.drivers.device_register import DeviceRegister
-from bench_service.drivers.registered import RegisteredDevices
-from bench_service.drivers.simulated import SimulatedDriver, drawn_unit
+from bench_service.drivers.composition import devices_of, driver_of, own_devices
+from bench_service.drivers.simulated import drawn_unit
 from bench_service.evidence.catalogue import Catalogue
 from bench_service.evidence.work_processes import WorkProcesses
 from bench_service.jobs.dispatcher import Dispatcher, JobEngine
@@ -57,7 +55,7 @@ from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.worker import Worker
-from bench_service.notifications.opening import open_notifier
+from bench_service.notifications.opening import begin_notifier
 from bench_service.pages import (
     access_pages,
     campaign_pages,
@@ -123,7 +121,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     threadpool_limits(1)  # the matrices have at most 72 rows: BLAS threads would only spin against the bench's own
     stores, opened = open_stores(settings.database_url, settings.copies_in())
     closing.callback(opened.dispose)
-    driver = _driver(settings, partial(AskedOperator, stores.prompts)) if drive else None
+    driver = driver_of(settings, partial(AskedOperator, stores.prompts)) if drive else None
     holder = partial(lease_holder, opened, settings.database_url)
     planner = Planner(
         stores.units,
@@ -152,15 +150,13 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         guard.begin()
         closing.callback(guard.end)
         closing.callback(files.keep_books(stores).end)
-        if settings.notify is not None:
-            closing.callback(open_notifier(settings, stores, database.free_bytes, LEAST_FREE_BYTES).end)
+        begin_notifier(settings, stores, opened.free_bytes, LEAST_FREE_BYTES, closing)
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
     roads = _roads(settings, opened, closing)
     processes = _work_apart(settings, code, closing) if apart else None
-    whole = DatabaseContents(opened), settings.scrub_at
-    service = BenchService(
+    made_of = (
         stores,
         driver,
         planner,
@@ -173,17 +169,22 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         roads,
         rescued,
         processes,
-        *whole,
     )
+    service = BenchService(*made_of, DatabaseContents(opened), settings.scrub_at)
+    _keep_access(service, settings, closing)
+    closing.callback(service.stop)
+    service.register()
+    return service
+
+
+def _keep_access(service: BenchService, settings: Settings, closing: ExitStack) -> None:
+    """Follow accounts and tokens that other processes change, and end stretches of the audit trail that are old."""
     if settings.audit_days is not None:
-        retention = AuditRetention(stores.audit, timedelta(days=settings.audit_days))
+        retention = AuditRetention(service.stores.audit, timedelta(days=settings.audit_days))
         retention.begin()
         closing.callback(retention.end)
     service.access.book.begin()
     closing.callback(service.access.book.end)
-    closing.callback(service.stop)
-    service.register()
-    return service
 
 
 def _roads(settings: Settings, opened: Database, closing: ExitStack) -> StopRoads:
@@ -205,17 +206,8 @@ def _work_apart(settings: Settings, code: str, closing: ExitStack) -> WorkProces
 
 
 def _devices(settings: Settings, bench_id: str) -> BenchDevices:
-    """A bench's devices on this host, known by their register, without driving them."""
-    return RegisteredDevices(DeviceRegister(settings.devices_in(), bench_id))
-
-
-def _driver(settings: Settings, asking: Asking) -> SimulatedDriver:
-    """The simulated bench's driver, with the state that its devices have kept."""
-    register = DeviceRegister(settings.devices_in(), settings.bench_id)
-    faults = None if settings.device_faults is None else FaultPlan.parse(settings.device_faults)
-    truths = settings.unit_truth, settings.bench_truth
-    asked = asking if settings.ask_operator else None
-    return SimulatedDriver(settings.bench_id, *truths, settings.real_time_factor, register, faults, asked)
+    """A bench's devices on this host, without driving them; of this process's own bench by its bench file."""
+    return own_devices(settings) if bench_id == settings.bench_id else devices_of(settings.devices_in(), bench_id)
 
 
 def _engine(settings: Settings, runner: JobRunner) -> JobEngine:

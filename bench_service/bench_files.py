@@ -13,8 +13,7 @@ from bench_service.bench.stop.guard import StopGuard
 from bench_service.bench.stop.keeper import StopKeeper
 from bench_service.bench.stop.word import StopWord
 from bench_service.campaigns.stores import Stores
-from bench_service.drivers.device_register import DeviceRegister
-from bench_service.drivers.registered import RegisteredDevices
+from bench_service.drivers.composition import own_devices
 from bench_service.jobs.stop_entry import StopEntry
 from bench_service.model.errors import StorageFull
 from bench_service.model.records import BenchStop
@@ -31,7 +30,7 @@ class BenchFiles:
         self._folder = folder
         self._channel = StopChannel(folder, self._bench_id)
         self._heartbeat = HeartbeatFile(folder, self._bench_id)
-        self._devices = RegisteredDevices(DeviceRegister(folder, self._bench_id))
+        self._devices = own_devices(settings)
 
     def rescue(self) -> Rescue | None:
         """Make safe the devices that a dead process left, before a database is opened; see `before_anything_else`."""

@@ -3,11 +3,21 @@
 `bench stop` reads only these settings, so that it starts at once and no invalid setting keeps it from working.
 """
 
+import tomllib
 from pathlib import Path
 from urllib.parse import urlsplit
 
 DATABASE_URL = "sqlite:///.bench/bench.sqlite"
 BENCH_ID = "sim"
+
+
+def bench_id_in(bench_file: Path) -> str | None:
+    """Id of the bench that a bench file describes; None where it cannot be read: its full reading says why."""
+    try:
+        found = tomllib.loads(bench_file.read_text(encoding="utf-8"))["bench"]["id"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return found if isinstance(found, str) else None
 
 
 def device_folder(database_url: str, given: Path | None) -> Path:

@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from ipaddress import ip_network
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from bench_service.device_folder import BENCH_ID, DATABASE_URL, device_folder
+from bench_service.device_folder import BENCH_ID, DATABASE_URL, bench_id_in, device_folder
 
 LEAST_TOKEN = 20
 """Number of characters of the shortest valid token."""
@@ -59,6 +59,8 @@ class Settings(BaseModel):
     port: int = Field(8000, ge=0, le=65535)
     bench_id: str = Field(BENCH_ID, pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")
     """Id of the bench that this process drives."""
+    bench_file: Path | None = None
+    """Bench file of the bench that this process drives, with its id; None: the bench is simulated."""
     unit_truth: Path | None = None
     """Truth file of the simulated unit; None: the one that ships."""
     bench_truth: Path | None = None
@@ -107,6 +109,15 @@ class Settings(BaseModel):
     """TOML file of mail servers and webhooks that get messages (`docs/who-is-told.md`); None: nobody is told."""
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported [MB]."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named_by_its_file(cls, given: Any) -> Any:
+        """Take the bench's id from its bench file where it is not given."""
+        if not isinstance(given, dict) or given.get("bench_file") is None or given.get("bench_id") is not None:
+            return given
+        found = bench_id_in(Path(given["bench_file"]))
+        return given if found is None else {**given, "bench_id": found}
 
     @model_validator(mode="after")
     def _proxy_is_whole(self) -> "Settings":

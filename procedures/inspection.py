@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from procedures.analysis.fitness.findings import Kind
 from procedures.analysis.fitness.watched import Inspection, Watch
+from procedures.analysis.measured_stations import at_measured_angles
 from procedures.core.errors import BadParameter, DomainError, MissingChannel
 from procedures.core.recording import Recording, cut
 from procedures.core.unit import Unit
@@ -16,8 +17,14 @@ from procedures.procedure import Context, Evidence, Method, P, Procedure, R, Rec
 
 
 def analyse_procedure(procedure: Procedure[P, R], recordings: Sequence[Recording], params: P, context: Context) -> R:
-    """`Procedure.analyse` on inspected recordings. Raises `DomainError`."""
-    return _inspected(recordings, procedure.inspection(params), lambda r: procedure.analyse(r, params, context))
+    """`Procedure.analyse` on inspected recordings. Raises `DomainError`.
+
+    Where the bench declares that its encoders are the better witness, the stations stand at the measured angles, and
+    the first warning says so.
+    """
+    used, sentence = at_measured_angles(recordings) if context.bench.accuracy.measured else (recordings, "")
+    outcome = _inspected(used, procedure.inspection(params), lambda r: procedure.analyse(r, params, context))
+    return outcome.model_copy(update={"warnings": (sentence, *outcome.warnings)}) if sentence else outcome
 
 
 def analyse_method(method: Method[P, R], evidence: Evidence, params: P, unit: Unit | None) -> R:

@@ -49,18 +49,23 @@ class SimClock:
         real_time_factor: float | None = None,
         wait: Wait | None = None,
         slice_s: float | None = None,
+        follows: Callable[[], float] | None = None,
     ) -> None:
         """Start at tick 0. `real_time_factor`: bench seconds per real second, None: unlimited; `wait`: real seconds.
 
-        `slice_s`: instead of `SLICE_S`.
+        `slice_s`: instead of `SLICE_S`. `follows`: bench time of another clock [s], which sleeping keeps pace with and
+        `catch_up` moves the world to; it comes with a `wait`, and without a factor.
         """
         if real_time_factor is not None and (not 0.0 < real_time_factor < float("inf") or wait is None):
             raise ValueError(f"real_time_factor = {real_time_factor!r} must be above zero and comes with a `wait`")
+        if follows is not None and (real_time_factor is not None or wait is None):
+            raise ValueError("a clock that follows another one comes with a `wait`, and has no real-time factor")
         self.rate_hz = rate_hz
         self.ticks = 0
         self._slice_s = slice_s
         self._factor = real_time_factor
         self._wait = wait
+        self._follows = follows
         self._advance: Callable[[int], None] = lambda _ticks: None
 
     def connect(self, advance: Callable[[int], None]) -> None:
@@ -86,14 +91,35 @@ class SimClock:
         longest = SLICE_S if self._slice_s is None else self._slice_s
         if self._factor is not None:
             longest = min(longest, REAL_TIME_SLICE_S * self._factor)
+        if self._follows is not None:
+            longest = min(longest, REAL_TIME_SLICE_S)
         longest_ticks = max(1, int(longest * self.rate_hz))
         await _let_others_run()
         while ticks > 0:
             step = min(ticks, longest_ticks)
-            self._advance(step)
-            self.ticks += step
+            self.advance_world(step)
             ticks -= step
             if self._factor is not None and self._wait is not None:
                 await self._wait(step / self.rate_hz / self._factor)
+            elif self._follows is not None and self._wait is not None:
+                await self._wait(max(0.0, self.now_s() - self._follows()))
             else:
                 await _let_others_run()
+
+    @property
+    def following(self) -> bool:
+        """Return whether time passes by another clock, whether or not anyone sleeps on this one."""
+        return self._follows is not None
+
+    def catch_up(self) -> None:
+        """Move the world to the time of the clock that it follows, without waiting; nothing where it is ahead."""
+        behind = 0 if self._follows is None else int((self._follows() - self.now_s()) * self.rate_hz)
+        longest = max(1, int(SLICE_S * self.rate_hz))
+        while behind > 0:
+            self.advance_world(min(behind, longest))
+            behind -= longest
+
+    def advance_world(self, ticks: int) -> None:
+        """Move the world by whole ticks, now."""
+        self._advance(ticks)
+        self.ticks += ticks

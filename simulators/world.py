@@ -3,7 +3,7 @@
 Knows how clock, table, supply, unit, chamber and operator are wired; knows none of their physics.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -12,9 +12,6 @@ import numpy as np
 
 from procedures.bench import Bench
 from procedures.bench.errors import DeviceFault, OtherVersion
-from procedures.core import units
-from procedures.core.recording import Station
-from procedures.core.table_angles import TableAngles
 from simulators.chamber.device import SimChamber, Warmth
 from simulators.clock import SimClock, Wait
 from simulators.converter_bench import converter_alone, current_source
@@ -22,17 +19,18 @@ from simulators.current_source.device import SimCurrentSource
 from simulators.imu.climate import Climate, Drift
 from simulators.imu.converter_link import ConverterLink
 from simulators.imu.device import SimImu
-from simulators.imu.sensor import TRIADS, Coefficients, launch_coefficients, station_means
+from simulators.imu.sensor import TRIADS, Coefficients, launch_coefficients
 from simulators.operator.person import SimOperator
 from simulators.supply.device import SimSupply
 from simulators.truth import Array, BenchTruth, UnitTruth, default_bench, default_unit
-from simulators.turntable.device import SETTLE_S, SimTurntable, pointing_error_rad
-from simulators.turntable.kinematics import at_rest, attitude
-from simulators.turntable.profile import move_ticks
+from simulators.turntable.device import SimTurntable
 
 CHECKPOINT_VERSION = 3
 WARM_SLICE_S = 60.0
 """Length of slices and blocks of a world with a chamber: a thermal run is half a day, at few samples a second."""
+
+FOLLOWING_BLOCK_S = 0.5
+"""Length of blocks of a world that follows another clock: shorter than anyone waits for a real unit."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,9 @@ class WorldConfig:
     real_time_factor: float | None = None
     """Number of bench seconds per real second; None: as fast as it can."""
     wait: Wait | None = field(default=None, repr=False)
-    """Function that waits real seconds; needed with a real-time factor."""
+    """Function that waits real seconds; needed with a real-time factor, and to follow a clock."""
+    follows: Callable[[], float] | None = field(default=None, repr=False)
+    """Bench time of the clock that the world follows, as beside real devices; None: it has a clock of its own."""
 
     @property
     def rate_hz(self) -> float:
@@ -61,6 +61,8 @@ class WorldConfig:
     @property
     def slice_s(self) -> float | None:
         """Longest slice of time and longest block [s]; None: the clock's own."""
+        if self.follows is not None:
+            return FOLLOWING_BLOCK_S
         return WARM_SLICE_S if self.thermal and self.real_time_factor is None else None
 
 
@@ -101,26 +103,35 @@ class SimulatedBench(Bench):
         return launch_truth(self.config, max(1, self.supply.launches))
 
 
-def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> SimulatedBench:
+def build(
+    config: WorldConfig,
+    checkpoint: Mapping[str, Any] | None = None,
+    clock: SimClock | None = None,
+    table: Callable[[BenchTruth, int, SimClock], SimTurntable] = SimTurntable,
+) -> SimulatedBench:
     """Build a bench with the table at zero and the unit off, or as a checkpoint of the same seed and rate left it.
 
+    `clock`: another one than the configuration's; `table`: makes the table.
     Raises `DeviceFault` where a chamber is wanted and the bench has none, `OtherVersion` for another's checkpoint.
     """
-    clock = SimClock(config.rate_hz, config.real_time_factor, config.wait, config.slice_s)
-    table = SimTurntable(config.bench, config.seed, clock)
-    supply = SimSupply(clock.now_s, _load_w(config), config.bench.description.supply)
+    if clock is None:
+        clock = SimClock(config.rate_hz, config.real_time_factor, config.wait, config.slice_s, config.follows)
+    turntable = table(config.bench, config.seed, clock)
+    heat = config.unit.thermal.network
+    load_w = heat.converter_w if config.currents else heat.power_w
+    supply = SimSupply(clock.now_s, load_w, config.bench.description.supply)
     chamber = _chamber(config, clock) if config.thermal else None
     source = current_source(config.bench, config.seed, clock.now_s) if config.currents else None
     door = (lambda _is_open: None) if chamber is None else chamber.set_door
-    operator = SimOperator(config.bench.operator, config.seed, clock, supply.is_on, door, table.place)
+    operator = SimOperator(config.bench.operator, config.seed, clock, supply.is_on, door, turntable.place)
     if source is None:
-        imu = _unit(config, clock, table, supply, chamber)
+        imu = _unit(config, clock, turntable, supply, chamber)
     else:
         imu = converter_alone(config.unit, clock, supply, chamber, source)
     bench = SimulatedBench(
         config.bench.description,
         clock,
-        table,
+        turntable,
         imu,
         supply,
         chamber,
@@ -131,14 +142,6 @@ def build(config: WorldConfig, checkpoint: Mapping[str, Any] | None = None) -> S
     if checkpoint is not None:
         _resume(bench, checkpoint)
     return bench
-
-
-def _load_w(config: WorldConfig) -> float:
-    """Power that the unit takes, all of which becomes its heat [W]; of a converter alone, the converter's."""
-    heat = config.unit.thermal.network
-    if config.currents:
-        return heat.converter_w
-    return heat.case_w + heat.converter_w + heat.accelerometer_block_w + 3.0 * heat.gyro_w
 
 
 def _chamber(config: WorldConfig, clock: SimClock) -> SimChamber:
@@ -230,69 +233,3 @@ def launch_coefficients_of(config: WorldConfig, launch: int = 1) -> dict[str, Co
 def launch_truth(config: WorldConfig, launch: int = 1) -> dict[str, tuple[Array, Array]]:
     """Triad -> (bias (3,) [rad/s or m/s²], K (3, 3)) of a launch, without running anything."""
     return {name: (c.bias, c.matrix) for name, c in launch_coefficients_of(config, launch).items()}
-
-
-@dataclass(frozen=True)
-class DwellMeans:
-    """Station means made without samples, each (n, 3) in the unit's axes: nominal outputs, and the true inputs."""
-
-    gyro: Array
-    """Nominal gyro outputs [rad/s]."""
-    accelerometer: Array
-    """Nominal accelerometer outputs [m/s²]."""
-    rate_b: Array
-    """True angular rate [rad/s]."""
-    specific_force_b: Array
-    """True specific force [m/s²]."""
-
-
-def true_inputs(
-    config: WorldConfig, angles: Sequence[TableAngles], moves: Sequence[int] | None = None
-) -> tuple[Array, Array]:
-    """True angular rate and specific force at commanded angles, each (n, 3), pointing errors of the moves included.
-
-    Pure numpy. `moves`: number of the move to each of the angles since the bench was opened; None: 1, 2, …
-    """
-    table = config.bench.table
-    numbers = range(1, len(angles) + 1) if moves is None else moves
-    errors = np.array([pointing_error_rad(table, config.seed, move) for move in numbers]).reshape(-1, 3)
-    axes = _axes_rad(angles) + errors
-    return at_rest(attitude(axes, table, config.bench.description.site.azimuth_deg), config.bench.site)
-
-
-def _axes_rad(angles: Sequence[TableAngles]) -> Array:
-    return units.DEG * np.array([(a.outer_deg, a.middle_deg, a.inner_deg) for a in angles]).reshape(-1, 3)
-
-
-def dwell_means(config: WorldConfig, stations: Sequence[Station], launch: int = 1) -> DwellMeans:
-    """Compute the means of the stations' recordings, in milliseconds of time, for Monte Carlo (`tests.validation`).
-
-    The unit is switched on with the table at zero and the stations follow as in a procedure: move, settle, record. See
-    `simulators.imu.sensor.station_means` for what is equal to a full run and what only has the same distribution.
-    Start times differ from those of a full run by what the servo needs to settle beyond half a second.
-    """
-    angles: list[TableAngles] = []
-    moves: list[int] = []
-    ticks: list[tuple[int, int]] = []
-    now, move, here, rate = 0, 0, TableAngles(), config.rate_hz
-    description = config.bench.description
-    limits = (description.outer, description.middle, description.inner)
-    for station in stations:
-        if round(station.record_s * rate) < 1:
-            raise ValueError(f"station {station.label!r}: record_s = {station.record_s!r} holds no sample")
-        if station.angles is not None:
-            distance_rad = (_axes_rad([station.angles]) - _axes_rad([here]))[0]
-            now += move_ticks(distance_rad / units.DEG, limits, rate) + round(SETTLE_S * rate)
-            move, here = move + 1, station.angles
-        now += round(station.settle_s * rate)
-        ticks.append((now, now + round(station.record_s * rate)))
-        now = ticks[-1][1]
-        angles.append(here)
-        moves.append(move)
-    rate_b, force_b = true_inputs(config, angles, moves)
-    spans = np.array(ticks, dtype=np.float64).reshape(-1, 2)
-    means = {
-        name: station_means(config.unit.triad(name), rate, (config.seed, launch, name), spans, v)
-        for name, v in (("gyro", rate_b), ("accelerometer", force_b))
-    }
-    return DwellMeans(means["gyro"], means["accelerometer"], rate_b, force_b)

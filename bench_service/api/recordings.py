@@ -26,6 +26,7 @@ from bench_service.mapping import copied
 from bench_service.model.records import RecordingState, StoredRecording
 from bench_service.service import BenchService
 from procedures.core.errors import BadParameter
+from procedures.core.measured import Measured
 from procedures.core.recording import Channel, Station
 
 router = APIRouter(prefix="/api/v1/recordings", tags=["recordings"])
@@ -46,12 +47,16 @@ class RecordingView(BaseModel):
     duration_s: float
     start_s: float
     launched_s: float | None = Field(description="Bench time at which the unit was switched on; null: not known")
+    measured: Measured | None = Field(description="Means of encoders and supply meanwhile; null: they were not read")
     content_hash: str = Field(description="SHA-256 of samples and channel description, whatever the chunks")
     simulated: bool
     stored_bytes: int
     chunks: int
     created_at: datetime
-    source: dict[str, Any] = Field(description="Of an import: files, description, and `clock`, what its stamps say")
+    source: dict[str, Any] = Field(
+        description="Of an import: files, description, and `clock`, what its stamps say. Of a bench with a bench file: "
+        "`origin` (real, mixed or simulated) and `devices`, with identities and certificates"
+    )
     warnings: list[str] = Field(description="Of an import: what was found in the file that a person should know")
     results: list[str] | None = Field(None, description="Results that used it; only where one recording is asked for")
 

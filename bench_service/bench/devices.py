@@ -37,6 +37,8 @@ class DeviceState:
     """The job for which the command was sent."""
     openings: int = 0
     """The number of times that the devices' link was taken so far."""
+    bench_file: str = ""
+    """Path of the bench file of real devices; empty: all are simulated, and the register is all that there is."""
     linked: bool = False
     """True while a process has the devices' link, or had it when it died."""
 
@@ -67,6 +69,14 @@ class BenchDevices(Protocol):
 
     def device_state(self) -> DeviceState | None:
         """The devices' last reported state; None where unknown on this host. Never waits for the driving process."""
+        ...
+
+    def compare(self, by: str) -> tuple[str, ...]:
+        """Ask the devices themselves: sentences about what differs from their last reported state.
+
+        Where something differs, the reported state becomes what the devices say. Nothing is commanded; nothing is asked
+        where another process has the devices' link. A device that does not answer is no difference.
+        """
         ...
 
     def make_safe(self, by: str) -> DeviceState:

@@ -11,10 +11,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.bench import Bench, Chamber, Imu, Operator, Supply, Turntable
+from bench_service.bench.together import make_safe_together
+from procedures.bench import SAFE_ORDER, Bench, Chamber, Environment, Imu, Operator, Supply, Turntable
 from procedures.bench.chamber import ChamberLimits, ChamberReading
 from procedures.bench.current_source import CurrentSource, CurrentSourceLimits, CurrentSourceReading
 from procedures.bench.device import DeviceIdentity, Status
+from procedures.bench.environment import EnvironmentReading
 from procedures.bench.imu import Stream
 from procedures.bench.supply import SupplyLimits, SupplyReading
 from procedures.bench.turntable import TableReading
@@ -187,6 +189,22 @@ class ObservedCurrentSource(_Seen):
             await self._source.make_safe()
 
 
+class ObservedEnvironment(_Seen):
+    """An `Environment` that reports its verbs to an observer."""
+
+    def __init__(self, environment: Environment, observer: Observer) -> None:
+        super().__init__(observer)
+        self._environment = environment
+
+    async def identify(self) -> DeviceIdentity:
+        with self._seen("environment.identify"):
+            return await self._environment.identify()
+
+    async def read(self) -> EnvironmentReading:
+        with self._seen("environment.read"):
+            return await self._environment.read()
+
+
 class ObservedOperator(_Seen):
     """An `Operator` that reports its requests to an observer."""
 
@@ -256,8 +274,17 @@ class ObservedBench(Bench):
             None if bench.chamber is None else ObservedChamber(bench.chamber, observer),
             None if bench.operator is None else ObservedOperator(bench.operator, observer),
             None if bench.current_source is None else ObservedCurrentSource(bench.current_source, observer),
+            None if bench.environment is None else ObservedEnvironment(bench.environment, observer),
+            bench.safe_s,
         )
         self.inner = bench
+
+    async def make_safe(self) -> None:
+        """Make the devices safe as `Bench.make_safe` does: at the same time where they have deadlines of their own."""
+        if self.safe_s:
+            await make_safe_together({d: t for d in SAFE_ORDER if (t := getattr(self, d)) is not None}, self.safe_s)
+        else:
+            await super().make_safe()
 
     def checkpoint(self) -> dict[str, Any] | None:
         return self.inner.checkpoint()

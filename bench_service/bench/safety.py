@@ -106,17 +106,29 @@ class SafetyService:
         """Make safe the devices that a dead process left unsafe, first of all; the bench's lease must be held.
 
         Where that fails the bench is stopped: the service answers, but nothing moves until a person has looked.
-        `rescued`: the state found, and the attempt made, before the database was opened.
+        A device that is not as its last reported state says stops the bench too. `rescued`: the state found, and the
+        attempt made, before the database was opened.
         """
         devices = self._devices(bench_id)
         state = devices.device_state()
+        if self._make_safe_at_start(bench_id, devices, state, rescued) and (found := devices.compare(self._by)):
+            obstacle = over_new_link(devices, self._by)
+            more = "" if obstacle is None else f"; {obstacle}"
+            self.stop_unsafe(bench_id, f"the devices are not as they were left: {'; '.join(found)}{more}")
+
+    def _make_safe_at_start(
+        self, bench_id: str, devices: BenchDevices, state: DeviceState | None, rescued: Rescue | None
+    ) -> bool:
+        """Make the devices safe; False where that failed, which was said."""
         if state is None:  # the first start on this host: from now on the devices are known here
             obstacle = over_new_link(devices, self._by)
-            if obstacle is not None:
+            if obstacle is not None and not obstacle.busy:
+                self.stop_unsafe(bench_id, str(obstacle))
+            elif obstacle is not None:
                 log.warning("bench %s: %s", bench_id, obstacle)
-            return
+            return obstacle is None
         if state.safe and rescued is None:
-            return
+            return True
         deadline = monotonic_s() + START_S
         obstacle = over_new_link(devices, self._by)
         while obstacle is not None and monotonic_s() < deadline:
@@ -129,6 +141,7 @@ class SafetyService:
         else:
             self.stop_unsafe(bench_id, str(obstacle))
             self._note(left.job, text + str(obstacle))
+        return obstacle is None
 
     def stop_unsafe(self, bench_id: str, why: str) -> None:
         """Stop a bench that could not be made safe: nothing may run on it until a person releases it."""

@@ -9,6 +9,7 @@ from contextlib import aclosing
 from typing import Any, TypeVar
 
 from bench_service.background import NonBlockingQuery
+from bench_service.bench.device_log import DeviceLog, made_by
 from bench_service.bench.live.tap import LiveTap
 from bench_service.bench.live.values import PUBLISH_S
 from bench_service.bench.observed import ObservedBench
@@ -64,7 +65,7 @@ class BenchSession:
     ) -> None:
         self.job = job
         self._procedure = procedure
-        self._watchdog = Watchdog(bench.clock, bench.description.simulated, PATIENCE)
+        self._watchdog = Watchdog(bench.clock, bench.description.origin == "simulated", PATIENCE)
         self._bench = ObservedBench(bench, self._watchdog)
         self._recordings = recordings
         self._stop_wanted = NonBlockingQuery("stop", stop_wanted)
@@ -244,19 +245,22 @@ class BenchSession:
                 bench=self.job.bench,
                 station=station,
                 launched_s=stream.launched_s,
+                source=made_by(self._bench.description),
             )
         )
         tap, begins_s = self._tap, stream.start_s
+        devices = DeviceLog(self._bench, station)
         if tap is not None:
             tap.stream(stream)
         try:
             async for block in stream.blocks:
                 writer.write(block)
+                await devices.look()
                 if tap is not None:
                     tap.block(begins_s, block)
                     begins_s += len(block) / stream.rate_hz
                 await asyncio.sleep(0)  # noqa: TID251  lets a cancel land; no time passes
-            return writer.seal(self._bench.checkpoint())
+            return writer.seal(self._bench.checkpoint(), devices.measured())
         except BaseException:
             writer.abandon()
             raise

@@ -47,6 +47,8 @@ PANELS = {
         benches.stop,
         benches.release,
         benches.queue,
+        benches.check_file,
+        benches.simulate,
     ),
     "Jobs": (plans.procedures, plans.preview, jobs.run, jobs.jobs),
     "Evidence": (

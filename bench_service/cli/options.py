@@ -3,6 +3,7 @@
 import json
 from contextlib import suppress
 from math import isfinite
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -18,6 +19,9 @@ errors = Console(stderr=True, markup=False, emoji=False)
 """Texts come from people and from the service, with brackets and colons that are no markup: colours are styles."""
 
 Server = Annotated[str | None, typer.Option(help="Address of a service; without it, work in this process")]
+BenchFile = Annotated[
+    Path | None, typer.Option("--bench-file", dir_okay=False, help="Bench file of the bench; else that of the settings")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables")]
 Limit = Annotated[int, typer.Option(min=1, help="How many")]
 By = Annotated[str | None, typer.Option(help="Your name, for the job and the audit trail")]
@@ -98,9 +102,17 @@ def named(by: str | None) -> dict[str, str]:
     return {"X-Requested-By": by}
 
 
-def of_bench(settings: Settings, bench: str | None) -> Settings:
-    """Return the settings of another bench. Raises `Refused` for a name that no bench can have."""
+def of_bench(settings: Settings, bench: str | None, bench_file: Path | None = None) -> Settings:
+    """Return the settings of another bench, or of the bench of a file.
+
+    Raises `Refused` for a name that no bench can have.
+    """
+    given = settings.model_dump()
+    if bench_file is not None:
+        given = {name: value for name, value in given.items() if name != "bench_id"} | {"bench_file": bench_file}
+    if bench is not None:
+        given["bench_id"] = bench
     try:
-        return Settings.model_validate({**settings.model_dump(), "bench_id": bench or settings.bench_id})
+        return Settings.model_validate(given)
     except ValidationError as error:
         raise Refused(f"--bench {bench}: {error.errors()[0]['msg']}") from error

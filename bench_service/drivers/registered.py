@@ -9,9 +9,9 @@ from bench_service.drivers.device_cables import DeviceCables
 from bench_service.drivers.device_faults import DeviceFaults
 from bench_service.drivers.device_register import DeviceLink, DeviceRegister
 from procedures.bench import SAFE_ORDER, Bench
-from procedures.bench.errors import Disconnected, OutOfRange
+from procedures.bench.errors import BenchError, Disconnected, OutOfRange
 
-READS = frozenset(f"{device}.{verb}" for device in (*SAFE_ORDER, "imu") for verb in ("read", "identify"))
+READS = frozenset(f"{device}.{verb}" for device in (*SAFE_ORDER, "imu", "environment") for verb in ("read", "identify"))
 """Verbs that change nothing and are not noted."""
 REMEMBERED = ("table", "powered", "chamber_target_c", "current_ma")
 """Fields of the state that change as soon as a demand is made; a refused demand does not change them."""
@@ -26,6 +26,11 @@ LOST = "as the bench's truth file has it"
 """Reason of a lost link that neither a person nor an exercise has lost."""
 
 
+def simulated_safe_state(device: str, state: DeviceState) -> dict[str, Any]:
+    """Changes of the register once a simulated device was made safe."""
+    return SAFE[device](state)
+
+
 class RegisterObserver:
     """Turns verbs into the state that real devices would have, and stops verbs to devices whose link is lost."""
 
@@ -36,8 +41,13 @@ class RegisterObserver:
         faults: DeviceFaults | None,
         devices: frozenset[str],
         lost: Callable[[], frozenset[str]],
+        safe_state: Callable[[str, DeviceState], dict[str, Any]],
     ) -> None:
-        """Observe `devices`, which are to be made safe; `lost`: returns those whose link the simulation has lost."""
+        """Observe `devices`, which are to be made safe; `lost`: returns those whose link the simulation has lost.
+
+        `safe_state`: changes of the state once a device was made safe.
+        """
+        self._safe_state = safe_state
         self._link = link
         self._cables = cables
         self._faults = faults
@@ -112,7 +122,7 @@ class RegisterObserver:
     def _done(self, device: str, action: str) -> dict[str, Any]:
         changes: dict[str, Any] = {}
         if action == "make_safe":
-            changes = SAFE[device](self._link.state)
+            changes = self._safe_state(device, self._link.state)
             self._not_safe.discard(device)
             self._refusals.pop(device, None)
             if not self._not_safe:
@@ -141,11 +151,15 @@ class RegisteredBench(ObservedBench):
         cables: DeviceCables,
         faults: DeviceFaults | None = None,
         lost: Callable[[], frozenset[str]] = frozenset,
+        safe_state: Callable[[str, DeviceState], dict[str, Any]] = simulated_safe_state,
     ) -> None:
-        """Wrap a bench; `lost`: returns the devices whose links the simulation has lost by now."""
+        """Wrap a bench; `lost`: returns the devices whose links the simulation has lost by now.
+
+        `safe_state`: changes of the register once a device was made safe.
+        """
         devices = {"turntable", "supply"}
         devices |= {name for name in ("chamber", "current_source") if getattr(bench, name) is not None}
-        super().__init__(bench, RegisterObserver(link, cables, faults, frozenset(devices), lost))
+        super().__init__(bench, RegisterObserver(link, cables, faults, frozenset(devices), lost, safe_state))
         self._link = link
 
     def close(self) -> None:
@@ -163,6 +177,10 @@ class RegisteredDevices:
     def device_state(self) -> DeviceState | None:
         return self._register.read()
 
+    def compare(self, by: str) -> tuple[str, ...]:
+        """Nothing: simulated devices are what their register has."""
+        return ()
+
     def make_safe(self, by: str) -> DeviceState:
         """Stop, lead to ambient, switch off. The table of a dead process stops at once, at an unknown position.
 
@@ -172,6 +190,10 @@ class RegisteredDevices:
         state = self._register.read()
         if state is not None and state.safe:
             return state
+        if state is not None and state.bench_file:
+            raise BenchError(
+                f"the devices are real: only with their bench file, {state.bench_file}, can they be reached"
+            )
         link = self._register.open(by, None if state is None else state.job)
         try:
             failures = [failure for device in SAFE_ORDER if (failure := self._make_safe(link, device)) is not None]

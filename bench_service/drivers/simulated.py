@@ -14,7 +14,7 @@ from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.registered import RegisteredBench, RegisteredDevices
 from bench_service.model.errors import Misconfigured, NotMounted
 from bench_service.wall_clock import pause_async
-from procedures.bench import Bench, BenchDescription, BenchNeeds
+from procedures.bench import Bench, BenchDescription, BenchNeeds, Clock
 from procedures.bench.errors import BenchError
 from procedures.core.unit import Unit
 from simulators.truth import (
@@ -29,7 +29,7 @@ from simulators.truth import (
 )
 
 if TYPE_CHECKING:
-    from simulators.world import WorldConfig
+    from simulators.world import SimulatedBench, WorldConfig
 
 RANDOM_UNIT = re.compile(r"^RANDOM-(\d{1,9})$")
 """Serial of a unit whose truth is drawn from the number in it: as many different units as a test needs."""
@@ -121,6 +121,29 @@ class SimulatedDriver:
         faults = None if self._faults is None else DeviceFaults(self._faults, f"{job} {link.openings}", cables)
         return self._asked(RegisteredBench(bench, link, cables, faults, bench.lost_links), job)
 
+    def world(
+        self, unit: str, seed: int, needs: BenchNeeds, description: BenchDescription, clock: Clock
+    ) -> "SimulatedBench":
+        """A world that stands beside real devices and follows their clock; a unit that it does not have is the default.
+
+        `description`: the limits of the mixed bench, to which its simulated devices hold.
+        """
+        from simulators.world import WorldConfig, build
+
+        known = unit == self._unit.serial or _drawn_truth(unit) is not None
+        return build(
+            WorldConfig(
+                unit=self._truth_of(unit) if known else self._unit,
+                bench=replace(self._bench, description=description),
+                seed=seed,
+                sample_rate_hz=needs.sample_rate_hz,
+                thermal=needs.temperatures,
+                currents=needs.currents,
+                wait=pause_async,
+                follows=clock.now_s,
+            )
+        )
+
     def _asked(self, bench: Bench, job: str | None) -> Bench:
         """Replace the simulated operator by a person in the bench that is shown; the world within keeps its own."""
         if self._asking is not None and job is not None:
@@ -130,6 +153,10 @@ class SimulatedDriver:
     def device_state(self) -> DeviceState | None:
         """Read the devices' state from the register; None without one."""
         return None if self._register is None else RegisteredDevices(self._register).device_state()
+
+    def compare(self, by: str) -> tuple[str, ...]:
+        """Nothing: simulated devices are what their register has."""
+        return ()
 
     def make_safe(self, by: str) -> DeviceState:
         """Open the devices over the register, without a world. Raises `DeviceBusy`; `BenchError` without register."""

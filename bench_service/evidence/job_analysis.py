@@ -49,6 +49,9 @@ def analysed(
         raise UnfitRecording(f"job {job.id} has {len(recordings)} of its {len(job.stations)} recordings")
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
     outcome = analyse_procedure(procedure, recordings, params, context)
+    overdue = context.bench.overdue(job.created_at.date().isoformat())
+    if overdue:
+        outcome = outcome.model_copy(update={"warnings": (*overdue, *outcome.warnings)})
     used = (context.unit.calibration_id(triad) for triad in procedure.uses_calibration)
     corrections = (context.unit.correction_id(kind) for kind in procedure.uses_corrections(params))
     stored = StoredResult(

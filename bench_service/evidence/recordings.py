@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bench_service.model.errors import DamagedRecording
 from bench_service.model.records import NewRecording, Page, StoredRecording
 from bench_service.model.search import EVERYTHING, Search
+from procedures.core.measured import Measured
 from procedures.core.recording import RawArray, Recording, RecordingInfo
 
 NAMED = 10
@@ -37,8 +38,11 @@ class RecordingWriter(Protocol):
         """Append samples, shape (n, channels), in the order of the channels. Raises `StorageFull`."""
         ...
 
-    def seal(self, checkpoint: dict[str, Any] | None = None) -> RecordingInfo:
-        """Write the rest, the count and the content hash, with the world's checkpoint. Raises `StorageFull`."""
+    def seal(self, checkpoint: dict[str, Any] | None = None, measured: Measured | None = None) -> RecordingInfo:
+        """Write the rest, the count and the content hash, with the world's checkpoint and what devices read meanwhile.
+
+        Raises `StorageFull`.
+        """
         ...
 
     def abandon(self) -> None:

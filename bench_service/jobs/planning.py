@@ -7,6 +7,7 @@ from bench_service.bench.directory import BenchDirectory
 from bench_service.evidence.catalogue import AnyProcedure, Catalogue
 from bench_service.evidence.units import UnitStore
 from bench_service.model.errors import NotFound, NotMounted
+from bench_service.wall_clock import now
 from procedures.bench import BenchDescription
 from procedures.core.errors import ProcedureDefect
 from procedures.core.recording import Station
@@ -66,10 +67,14 @@ class Planner:
         procedure = self.catalogue.procedure(name)
         parameters = procedure.resolve(procedure.params.model_validate(requested), context)
         stations = stations_of(procedure, parameters)
-        violations = tuple(
+        overdue = context.bench.overdue(now().date().isoformat())
+        refused = overdue if context.bench.expired_certificates == "refuse" else ()
+        violations = refused + tuple(
             f"station {s.index} ({s.label}): {sentence}" for s in stations for sentence in _violations(s, context.bench)
         )
         prediction = procedure.predict(parameters, context)
+        if overdue and not refused:
+            prediction = replace(prediction, warnings=(*prediction.warnings, *overdue))
         data_bytes = sum(_samples(s, context.unit) for s in stations) * BYTES_PER_SAMPLE
         return Plan(procedure, parameters, context, stations, prediction, data_bytes, violations)
 
@@ -96,6 +101,13 @@ def stations_of(procedure: AnyProcedure, parameters: Parameters) -> tuple[Statio
 
 def _violations(station: Station, bench: BenchDescription) -> tuple[str, ...]:
     """The bench's limits that a station exceeds, as sentences."""
+    if station.temperatures and bench.no_thermal_jobs:
+        return (bench.no_thermal_jobs,)
+    if station.supply_voltage_v is not None:
+        if bench.supply is None:
+            return (f"supply_voltage_v = {station.supply_voltage_v:g}: the supply of bench {bench.id} only switches",)
+        if found := bench.supply.violations(station.supply_voltage_v):
+            return found
     if station.current_ma is not None:
         return bench.current_violations(station.current_ma, station.profile)
     return () if station.angles is None else bench.violations(station.angles, station.turn, station.profile)

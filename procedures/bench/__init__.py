@@ -1,6 +1,6 @@
 """PORTS, the interfaces of a bench. A driver or a simulator implements them; a procedure sees only these."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from procedures.bench.chamber import Chamber
@@ -8,6 +8,7 @@ from procedures.bench.clock import Clock
 from procedures.bench.current_source import CurrentSource
 from procedures.bench.description import BenchDescription
 from procedures.bench.device import Device, DeviceIdentity, StatusWord
+from procedures.bench.environment import Environment
 from procedures.bench.imu import Imu
 from procedures.bench.needs import BenchNeeds
 from procedures.bench.operator import Operator
@@ -24,6 +25,7 @@ __all__ = [
     "CurrentSource",
     "Device",
     "DeviceIdentity",
+    "Environment",
     "Imu",
     "Operator",
     "StatusWord",
@@ -47,6 +49,10 @@ class Bench:
     chamber: Chamber | None = None
     operator: Operator | None = None
     current_source: CurrentSource | None = None
+    environment: Environment | None = None
+    """Conditions of the room; None: nobody knows them."""
+    safe_s: dict[str, float] = field(default_factory=dict[str, float])
+    """Time within which each real device must be safe [s]; empty: devices are made safe one after the other."""
 
     async def make_safe(self) -> None:
         """Stop the table, lead the chamber to ambient, take the current away, switch the unit off.

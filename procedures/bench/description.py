@@ -1,15 +1,20 @@
 """Declaration of a bench by its laboratory: site, axis limits, and accuracy of the table."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from procedures.bench.chamber import ChamberLimits
 from procedures.bench.current_source import CurrentSourceLimits
+from procedures.bench.declared_device import DeclaredDevice
 from procedures.bench.supply import SupplyLimits
 from procedures.core.sinusoid import PEAK_ACCELERATION, Sinusoid
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.temperature_profile import TemperatureProfile
 from procedures.core.turn import AxisName, Turn
+
+NO_SOURCES = ("site", "environment", "operator")
+"""Sections of a bench file that make no data: whether they are simulated does not matter."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,8 @@ class TableAccuracy:
     orthogonality_sd_arcsec: float = 0.0
     pointing_sd_arcsec: float = 0.0
     level_sd_arcsec: float = 0.0
+    measured: bool = False
+    """True if analyses use the angles that the encoders measured, and `pointing` is theirs; False: the commanded."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +65,26 @@ class BenchDescription:
     """Limits of the unit's supply; None: its voltage cannot be set, the supply only switches."""
     sinusoidal: bool = False
     """True where the table can follow a sinusoid (`Turntable.command_sinusoid`)."""
+    devices: tuple[DeclaredDevice, ...] = ()
+    """Devices of a bench that has a bench file, with their identities and certificates; empty: all are simulated."""
+    expired_certificates: Literal["refuse", "warn"] = "refuse"
+    """Policy for a certificate that has expired: no job is planned, or its result is marked."""
+    no_thermal_jobs: str = ""
+    """The reason why no job that reads temperatures can run here; empty: one can, where there is a chamber."""
+
+    @property
+    def origin(self) -> Literal["real", "mixed", "simulated"]:
+        """Origin of data: of real devices alone, of simulated ones alone, or of both."""
+        kinds = {device.simulated for device in self.devices if device.name not in NO_SOURCES} or {self.simulated}
+        return "mixed" if len(kinds) > 1 else "simulated" if kinds == {True} else "real"
+
+    def overdue(self, today: str) -> tuple[str, ...]:
+        """Certificates that have expired on a day (ISO 8601), a sentence each."""
+        return tuple(
+            f"the certificate {c.number} of the {d.name} expired after {c.due}"
+            for d in self.devices
+            if (c := d.certificate) is not None and c.overdue(today)
+        )
 
     @property
     def axis_motion(self) -> tuple[tuple[float, float], ...]:

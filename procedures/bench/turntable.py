@@ -21,6 +21,8 @@ class TableReading:
     """True while an axis follows a demand, or settles after it."""
     status: Status = ()
     """Status words of the controller: interlocks, limiters, faults."""
+    homed: bool = True
+    """False where the encoders do not know their zero: no angle is known, and no axis may move by it."""
 
 
 class Turntable(Device, Protocol):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, MissingChannel, UnfitRecording
+from procedures.core.measured import Measured
 from procedures.core.table_angles import TableAngles
 from procedures.core.temperature_profile import TemperatureProfile
 from procedures.core.turn import Turn
@@ -150,6 +151,8 @@ class RecordingInfo:
     simulated: bool = False
     launched_s: float | None = None
     """Bench time at which the unit was switched on for this launch [s]; None where it is not known."""
+    measured: Measured | None = None
+    """Readings of table and supply meanwhile; None where there are none. The station keeps the commanded angles."""
 
     @property
     def duration_s(self) -> float:

@@ -39,6 +39,35 @@ class TriadRecord:
 
 
 @dataclass(frozen=True)
+class CoefficientsAt:
+    """Coefficients of a triad by a certificate: ``U = bias + matrix·v`` in the rate unit of its channels."""
+
+    state: str
+    """"as found" or "as left"."""
+    day: str
+    """Day of the calibration, ISO 8601."""
+    certificate: str
+    triad: str
+    bias: tuple[float, float, float]
+    matrix: tuple[tuple[float, float, float], ...]
+
+
+@dataclass(frozen=True)
+class UnitDeclaration:
+    """Declaration of a real unit by its laboratory: for people and for lineage, not used by analyses."""
+
+    model: str = ""
+    part: str = ""
+    firmware: str = ""
+    lags_s: dict[str, float] = field(default_factory=dict[str, float])
+    """Delay of each channel's samples against their stamps, by the data sheet."""
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
+    """Smallest and largest value of a channel, in its unit."""
+    coefficients: tuple[CoefficientsAt, ...] = ()
+    """Coefficients as found and as left at former calibrations."""
+
+
+@dataclass(frozen=True)
 class WithheldCalibration:
     """The calibration of a triad that would be in use, but was rejected or has expired."""
 
@@ -71,6 +100,8 @@ class Unit:
     converter: ConverterTriad | None = field(default=None, repr=False)
     """Current models of the signal converter, x, y, z, or None."""
     converter_id: str | None = None
+    declaration: UnitDeclaration | None = field(default=None, repr=False)
+    """Declaration from the unit's own file; None for a simulated unit."""
 
     def calibration(self, triad: str) -> TriadCalibration | None:
         """The current calibration of a triad, or None. Raises `NoCalibration` for one that is rejected or expired."""

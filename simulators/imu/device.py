@@ -12,7 +12,7 @@ from procedures.core.recording import Channel, Station
 from simulators.clock import Motion, SimClock
 from simulators.imu.climate import Climate
 from simulators.imu.sensor import TRIADS, TriadSensor
-from simulators.imu.tape import Tapes
+from simulators.imu.tape import Tape, Tapes
 from simulators.truth import UnitTruth, temperature_channels, unit_channels
 
 
@@ -107,6 +107,15 @@ class SimImu:
         launched_s = (start - self._ticks) / self.rate_hz
         blocks = self._tapes.blocks(samples, start, len(channels))
         return Stream(channels, self.rate_hz, start / self.rate_hz, blocks, station, launched_s)
+
+    @property
+    def since_launch_s(self) -> float:
+        """Time since the unit was switched on; it stands still while it is off [s]."""
+        return self._ticks / self.rate_hz
+
+    def listen(self, tape: Tape) -> None:
+        """Give a tape all counts from now on, launch after launch; one that is wider than six gets temperatures too."""
+        self._tapes.running.append(tape)
 
     def sensor(self, triad: str) -> TriadSensor:
         """Return a triad of the present launch. Raises `NotPowered`."""

@@ -52,12 +52,23 @@ class Tapes:
         if self._launch() == 0 or (tape is not None and tape.broken):
             raise NotPowered("the unit is switched off")
 
-    async def blocks(self, samples: int, start: int, columns: int) -> AsyncIterator[Counts]:
-        """Yield the blocks of a recording that began at tick `start`; time passes while they are read."""
-        if self._clock.ticks != start:
-            raise DeviceFault("samples were lost: time passed between the recording's beginning and its first reading")
+    def blocks(self, samples: int, start: int, columns: int) -> AsyncIterator[Counts]:
+        """The blocks of a recording that begins at tick `start`; time passes while they are read.
+
+        In a world that follows another clock the counts are kept from now on: time passes there before they are read.
+        """
         tape = Tape(columns)
-        self.running.append(tape)
+        if self._clock.following:
+            self.running.append(tape)
+        return self._read(tape, samples, start)
+
+    async def _read(self, tape: Tape, samples: int, start: int) -> AsyncIterator[Counts]:
+        if not self._clock.following:
+            if self._clock.ticks != start:
+                raise DeviceFault(
+                    "samples were lost: time passed between the recording's beginning and its first reading"
+                )
+            self.running.append(tape)
         longest = max(1, int((BLOCK_S if self._block_s is None else self._block_s) * self._clock.rate_hz))
         try:
             while samples > 0:

@@ -106,6 +106,11 @@ class NetworkTruth:
         check_fields("network", self, {n: (0.0, 1e4) for n in names if n.endswith("_w")})
         check_fields("network", self, {n: (1e-6, 1e9) for n in names if n.endswith("_k")})
 
+    @property
+    def power_w(self) -> float:
+        """Power that the whole unit takes, all of which becomes heat [W]."""
+        return self.case_w + self.converter_w + self.accelerometer_block_w + 3.0 * self.gyro_w
+
 
 @dataclass(frozen=True)
 class ThermometerTruth:

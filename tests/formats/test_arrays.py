@@ -49,8 +49,8 @@ def _count(column: str) -> dict[str, Any]:
 
 
 def test_a_mat_file_longer_than_a_block_is_read_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bench_service.formats.logs.mat5.BLOCK_ROWS", 7)
-    monkeypatch.setattr("bench_service.formats.logs.mat5_source._PIECE", 100)
+    monkeypatch.setattr("bench_service.formats.logs.arrays_by_name.mat5.BLOCK_ROWS", 7)
+    monkeypatch.setattr("bench_service.formats.logs.arrays_by_name.mat5_source._PIECE", 100)
     for packed in (False, True):
         require_motion(_mat({"gyro": RATES, "acc": FORCES, "t": TIME_S}, packed), 0.0)
 

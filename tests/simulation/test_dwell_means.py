@@ -8,9 +8,10 @@ import pytest
 
 from procedures.core.recording import Station
 from procedures.core.table_angles import TableAngles
+from simulators.dwell_means import dwell_means
 from simulators.imu.sensor import TriadSensor, launch_coefficients, station_means
 from simulators.truth import TriadTruth
-from simulators.world import WorldConfig, build, dwell_means
+from simulators.world import WorldConfig, build
 
 SEEDS = 600
 RATE = 20.0

@@ -9,12 +9,13 @@ import pytest
 
 from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
 from procedures.core.table_angles import TableAngles
+from simulators.dwell_means import true_inputs
 from simulators.truth import TableTruth, default_bench, random_table_truth
 from simulators.turntable.device import pointing_error_rad
 from simulators.turntable.kinematics import at_rest, attitude
 from simulators.turntable.plant import Plant
 from simulators.turntable.profile import Quintic, move_ticks
-from simulators.world import SimulatedBench, build, true_inputs
+from simulators.world import SimulatedBench, build
 
 ARCSEC = pi / 648000.0
 DEG = pi / 180.0

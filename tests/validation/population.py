@@ -21,6 +21,7 @@ from procedures.catalog import discover
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import ACCELEROMETER, GYRO, Channel, MemoryRecording, Quantity, RecordingInfo, Station
 from procedures.procedure import Context
+from simulators.dwell_means import DwellMeans, dwell_means
 from simulators.truth import (
     Array,
     BenchTruth,
@@ -30,7 +31,7 @@ from simulators.truth import (
     random_table_truth,
     random_unit_truth,
 )
-from simulators.world import DwellMeans, WorldConfig, dwell_means, launch_truth
+from simulators.world import WorldConfig, launch_truth
 from tests.validation.theory import Reference, bounds, dwell_covariance, dwell_windows, reference
 
 CALIBRATION = discover()["calibration_12_orientations"]

@@ -30,6 +30,18 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
+class LiveStatus:
+    """A status word of a device, and since when it is as it is."""
+
+    device: str
+    name: str
+    raw: str
+    bits: tuple[str, ...]
+    """Names of the bits that are set: interlocks, limiters, faults."""
+    since: datetime
+
+
+@dataclass(frozen=True)
 class LiveDevices:
     """The state that the devices report; angles are those of the encoders."""
 
@@ -41,6 +53,8 @@ class LiveDevices:
     unit_on: bool
     chamber: ChamberReading | None = None
     """Reading of the chamber; None: the bench has none."""
+    status: tuple[LiveStatus, ...] = ()
+    """Status words of all devices, as they were last read."""
 
 
 @dataclass(frozen=True)

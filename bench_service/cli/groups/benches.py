@@ -1,12 +1,13 @@
 """Commands of a bench: drive it, watch over it, stop and release it on its own host; its queue."""
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from bench_service.cli.asking.client import answer, call, connect, segment
-from bench_service.cli.options import AsJson, Server, announce, console, of_bench, wide
+from bench_service.cli.options import AsJson, BenchFile, Server, announce, console, of_bench, wide
 from bench_service.cli.refusal import Refused
 from bench_service.settings import Settings
 
@@ -17,11 +18,12 @@ if TYPE_CHECKING:
 def worker(
     context: typer.Context,
     bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
+    bench_file: BenchFile = None,
 ) -> None:
     """Run the jobs of a bench, without HTTP, until SIGTERM or SIGINT. Its running job is left for the next start."""
     from bench_service.cli.processes.working import work
 
-    settings = of_bench(context.obj, bench)
+    settings = of_bench(context.obj, bench, bench_file)
     work(settings, announce)
 
 
@@ -29,6 +31,7 @@ def supervise(
     context: typer.Context,
     bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
     companion: Annotated[bool, typer.Option(help="End with the process that drives the bench")] = False,
+    bench_file: BenchFile = None,
 ) -> int:
     """Watch a bench on its own host, and make it safe where the process that drives it is gone or hangs.
 
@@ -36,7 +39,7 @@ def supervise(
     """
     from bench_service.cli.processes.supervising import supervise as watch_over
 
-    settings = of_bench(context.obj, bench)
+    settings = of_bench(context.obj, bench, bench_file)
     return watch_over(settings, companion, announce)
 
 
@@ -54,6 +57,16 @@ def stop(
 
     settings = of_bench(context.obj, bench)
     return stop_here(settings.bench_id, settings.devices_in(), reason, wait, announce)
+
+
+def check_file(
+    bench_file: Annotated[Path, typer.Argument(dir_okay=False, help="The bench file")],
+    ask: Annotated[bool, typer.Option("--connect", help="Ask the devices; nothing is commanded")] = False,
+) -> int:
+    """Check a bench file, its units and drivers; with --connect the devices too. Exit code 1: something is refused."""
+    from bench_service.cli.processes.checking import check_bench_file
+
+    return check_bench_file(bench_file, ask, console)
 
 
 def queue(
@@ -118,3 +131,17 @@ def _only_stop(stops: list[dict[str, Any]], bench: str) -> str:
         raise Refused(f"bench {bench} is not stopped: nothing is to be released")
     named = "; ".join(f"{stop['id']}: {stop['reason']}" for stop in stops)
     raise Refused(f"several stops of bench {bench} stand; the one that is meant is to be named: {named}")
+
+
+def simulate(
+    bench_file: Annotated[Path, typer.Option("--bench-file", dir_okay=False, help="Bench file with the addresses")],
+    faults: Annotated[Path | None, typer.Option(dir_okay=False, help="Plan of faults, tables [[fault]]")] = None,
+) -> None:
+    """Serve the devices of a bench file as simulators on its addresses, in the makers' bytes, until SIGTERM or SIGINT.
+
+    One world stands behind them, at the seed and time_factor of the file's simulation. A device that it calls
+    "simulated" is not served.
+    """
+    from bench_service.cli.processes.simulating import simulate as serve_simulators
+
+    serve_simulators(bench_file, faults, announce)

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from bench_service.cli.asking.client import answer, connect
-from bench_service.cli.options import Server, announce, console
+from bench_service.cli.options import BenchFile, Server, announce, console, of_bench
 from bench_service.settings import Settings
 
 
@@ -15,12 +15,13 @@ def serve(
     host: Annotated[str | None, typer.Option(help="Address to listen on")] = None,
     port: Annotated[int | None, typer.Option(help="Port to listen on")] = None,
     no_worker: Annotated[bool, typer.Option("--no-worker", help="Drive no bench: workers of the database do")] = False,
+    bench_file: BenchFile = None,
 ) -> None:
     """Serve the API and the pages, and run jobs on the bench, until interrupted."""
     from bench_service.cli.processes.companion import accompanied
     from bench_service.cli.processes.serving import check_port, ready
 
-    settings = _with(context.obj, host=host, port=port)
+    settings = of_bench(_with(context.obj, host=host, port=port), None, bench_file)
     check_port(settings)
     if no_worker or not settings.drive:
         with ready(settings, drive=False, level="info") as server:

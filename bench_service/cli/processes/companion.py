@@ -127,6 +127,7 @@ def _spawn(settings: Settings) -> Process:
         "BENCH_ID": settings.bench_id,
         "BENCH_DEVICE_FOLDER": str(folder),
         "BENCH_LOG_FILE": str(log_of(settings)),
+        **({} if settings.bench_file is None else {"BENCH_FILE": str(settings.bench_file)}),
     }
     with output_of(settings).open("wb") as output:  # what is no line of its log: the end of one that did not start
         return subprocess.Popen(

@@ -15,7 +15,7 @@ from pathlib import Path
 from bench_service.bench.processes import HOST
 from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.stop.word import StopWord
-from bench_service.device_folder import BENCH_ID, DATABASE_URL, device_folder
+from bench_service.device_folder import BENCH_ID, DATABASE_URL, bench_id_in, device_folder
 from bench_service.wall_clock import monotonic_s, pause
 
 LOOK_S = 0.02
@@ -77,7 +77,7 @@ def stop_command(arguments: Sequence[str], environ: Mapping[str, str]) -> int:
     Of the environment it reads what it needs: a setting that another command would refuse does not keep a stop out.
     """
     parser = argparse.ArgumentParser(prog="bench stop", description=HELP)
-    parser.add_argument("--bench", default=environ.get("BENCH_ID", BENCH_ID), help="else that of the settings")
+    parser.add_argument("--bench", default=_own(environ), help="else that of the settings")
     parser.add_argument("--reason", default=REASON, help="for whoever releases it")
     parser.add_argument("--wait", type=float, default=WAIT_S, metavar="SECONDS", help="until it is safe")
     try:
@@ -90,6 +90,13 @@ def stop_command(arguments: Sequence[str], environ: Mapping[str, str]) -> int:
     folder = environ.get("BENCH_DEVICE_FOLDER")
     where = device_folder(environ.get("BENCH_DATABASE_URL", DATABASE_URL), None if folder is None else Path(folder))
     return stop_here(given.bench, where, given.reason or REASON, given.wait, _say)
+
+
+def _own(environ: Mapping[str, str]) -> str:
+    """The bench of the settings: by its id, or by its bench file."""
+    file = environ.get("BENCH_FILE")
+    named = None if file is None else bench_id_in(Path(file))
+    return environ.get("BENCH_ID", named or BENCH_ID)
 
 
 def _say(line: str) -> None:
@@ -112,11 +119,9 @@ def _known(folder: Path, bench: str) -> bool:
 def _make_safe(folder: Path, bench: str) -> tuple[bool, str]:
     """Make safe over the devices' own link, where no other process has it; numerics are loaded here, and only here."""
     from bench_service.bench.make_safe import over_new_link
-    from bench_service.drivers.device_register import DeviceRegister
-    from bench_service.drivers.registered import RegisteredDevices
+    from bench_service.drivers.composition import devices_of
 
-    devices = RegisteredDevices(DeviceRegister(folder, bench))
-    obstacle = over_new_link(devices, f"bench stop by {_person()}")
+    obstacle = over_new_link(devices_of(folder, bench), f"bench stop by {_person()}")
     return obstacle is None, "" if obstacle is None else f"bench {bench}: {obstacle}"
 
 

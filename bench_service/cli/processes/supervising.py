@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 
+from bench_service.bench.devices import BenchDevices
 from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.stop.listener import StopListener
@@ -16,8 +17,7 @@ from bench_service.bench.supervisor import Supervisor
 from bench_service.cli.processes.ending import ending_on_signals
 from bench_service.cli.processes.logs import set_up
 from bench_service.cli.processes.private_files import protect
-from bench_service.drivers.device_register import DeviceRegister
-from bench_service.drivers.registered import RegisteredDevices
+from bench_service.drivers.composition import own_devices
 from bench_service.model.errors import BenchBusy
 from bench_service.persistence import acquire_lease
 from bench_service.persistence.bench.host_files import HostFiles, SupervisorLock
@@ -54,7 +54,7 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
         books = SqlSafetyBooks(settings.database_url, bench)
         closing.callback(books.close)
         take_lease = partial(acquire_lease, settings.database_url, bench, SUPERVISOR)
-        devices = RegisteredDevices(DeviceRegister(folder, bench))
+        devices = own_devices(settings)
         channel, heartbeat = StopChannel(folder, bench), HeartbeatFile(folder, bench)
         try:
             channel.prepare()
@@ -72,7 +72,7 @@ def supervise(settings: Settings, companion: bool, say: Callable[[str], object])
     return 0
 
 
-def _listener(settings: Settings, channel: StopChannel, devices: RegisteredDevices) -> StopListener | None:
+def _listener(settings: Settings, channel: StopChannel, devices: BenchDevices) -> StopListener | None:
     """Takes stops from other hosts; None where the settings want none, or no secret can be had."""
     if not settings.stop_listen:
         return None

@@ -138,7 +138,7 @@ def _with(part: P, path: Sequence[str], bound: Bound) -> P:
     value = getattr(part, first, None)
     if rest and isinstance(value, Section):
         return part.model_copy(update={first: _with(value, rest, bound)})
-    if rest or not _is_number(value):
+    if rest or value is None or not _is_number(value):
         raise ValueError(f"{type(part).__name__} has no limit {bound.field!r}")
     return part.model_copy(update={first: narrowest(value, bound.value, bound.lower)})
 

@@ -13,7 +13,15 @@ from bench_service.drivers.interface.driver import DeviceDriver, Kind
 from bench_service.model.errors import Misconfigured
 
 GROUP = "bench.drivers"
-SHIPPED: dict[tuple[Kind, str], str] = {}
+SHIPPED: dict[tuple[Kind, str], str] = {
+    ("turntable", "acutrol"): "bench_service.drivers.devices.acutrol_turntable:DRIVER",
+    ("chamber", "simserv"): "bench_service.drivers.devices.simserv_chamber:DRIVER",
+    ("chamber", "ascii2"): "bench_service.drivers.devices.ascii2_chamber:DRIVER",
+    ("chamber", "modbus"): "bench_service.drivers.devices.modbus_chamber:DRIVER",
+    ("supply", "scpi"): "bench_service.drivers.devices.scpi_supply:DRIVER",
+    ("unit_link", "framed"): "bench_service.drivers.devices.framed_unit:DRIVER",
+    ("unit_link", "ixcom"): "bench_service.drivers.devices.ixcom_unit:DRIVER",
+}
 """Kind and name of each driver that ships -> "module:attribute" of its `DeviceDriver`."""
 
 

@@ -36,7 +36,7 @@ class Certificate(Section):
 class DeviceSection(Section):
     """Fields of every device."""
 
-    driver: str = Field(SIMULATED, pattern=r"^[a-z][a-z0-9_-]*$")
+    driver: str = Field(default=SIMULATED, pattern=r"^[a-z][a-z0-9_-]*$")
     """Name of the driver; "simulated": the device of the simulated bench."""
     certificate: Certificate | None = None
 
@@ -99,9 +99,9 @@ class TurntableSection(DeviceSection):
 class WireTurntable(TurntableSection, Wire):
     """Base of the section of a real turntable: its axes must be declared."""
 
-    outer: Axis
-    middle: Axis
-    inner: Axis
+    outer: Axis  # pyright: ignore[reportGeneralTypeIssues, reportIncompatibleVariableOverride]
+    middle: Axis  # pyright: ignore[reportGeneralTypeIssues, reportIncompatibleVariableOverride]
+    inner: Axis  # pyright: ignore[reportGeneralTypeIssues, reportIncompatibleVariableOverride]
     safe_s: Seconds = 60.0
 
 
@@ -133,7 +133,7 @@ class ChamberSection(DeviceSection):
 class WireChamber(ChamberSection, Wire):
     """Base of the section of a real chamber: its limits must be declared."""
 
-    limits: ChamberBounds
+    limits: ChamberBounds  # pyright: ignore[reportGeneralTypeIssues, reportIncompatibleVariableOverride]
 
 
 class SupplyBounds(Section):
@@ -158,14 +158,13 @@ class SupplySection(DeviceSection):
     """Section ``[supply]``."""
 
     limits: SupplyBounds | None = None
-    on_safe: Literal["off", "hold"] = "off"
-    """"hold": the unit keeps its power when the bench is made safe, for a unit that must not be switched off."""
+    on_safe: Literal["off"] = "off"
 
 
 class WireSupply(SupplySection, Wire):
     """Base of the section of a real supply: its limits must be declared."""
 
-    limits: SupplyBounds
+    limits: SupplyBounds  # pyright: ignore[reportGeneralTypeIssues, reportIncompatibleVariableOverride]
 
 
 class UnitLinkSection(DeviceSection):
@@ -194,7 +193,7 @@ class CurrentSourceSection(DeviceSection):
 class WireCurrentSource(CurrentSourceSection, Wire):
     """Base of the section of a real current source."""
 
-    limits: CurrentBounds
+    limits: CurrentBounds  # pyright: ignore[reportGeneralTypeIssues, reportIncompatibleVariableOverride]
 
 
 class OperatorSection(DeviceSection):
@@ -204,7 +203,7 @@ class OperatorSection(DeviceSection):
 class EnvironmentSection(DeviceSection):
     """Section ``[environment]``: conditions of the room, entered (`driver = "entered"`) or read by a driver."""
 
-    driver: str = Field("entered", pattern=r"^[a-z][a-z0-9_-]*$")
+    driver: str = Field(default="entered", pattern=r"^[a-z][a-z0-9_-]*$")
     temperature_c: Annotated[float, Field(ge=-40.0, le=60.0)] | None = None
     humidity_percent: Annotated[float, Field(ge=0.0, le=100.0)] | None = None
     pressure_hpa: Annotated[float, Field(ge=500.0, le=1100.0)] | None = None

@@ -97,8 +97,8 @@ class Rows:
         except ValueError as error:
             raise UnreadableFile(
                 self._name,
-                f"the {self._key}A at byte {at} has {len(values)} fields, {len(self._body)} are known, or one of them "
-                "is no number",
+                f"the {self._key}A at byte {at} has {len(values)} fields, {len(_RECORDS[self._key])} are known, or one "
+                "of them is no number",
             ) from error
 
     def _close_binary(self) -> None:

@@ -5,22 +5,18 @@ from typing import BinaryIO, cast
 
 from bench_service.formats.logs import (
     dataflash,
-    hdf5,
     hg4930,
     imr,
     ixcom_log,
     kvh1750,
-    mat5,
-    mcap,
     novatel,
-    rosbag1,
-    rosbag2,
     stim300,
-    tdms,
     ulog,
     vectornav,
     zipped,
 )
+from bench_service.formats.logs.arrays_by_name import hdf5, mat5, tdms
+from bench_service.formats.logs.ros import mcap, rosbag1, rosbag2
 from bench_service.formats.logs.table import Log, LogFormat
 from procedures.core.errors import BadParameter
 

@@ -179,7 +179,7 @@ class Zipped:
         asked = ([time] if time is not None else []) + values
         with self._open(table.name) as text:
             for block in text_columns(text, f"{self._name}: {table.name}", asked, description, Bounds()):
-                taken = {name: block.values[:, place] for place, name in enumerate(values)}
+                taken: dict[str, Numbers] = {name: block.values[:, place] for place, name in enumerate(values)}
                 if time is not None and block.stamps is not None:
                     taken[time] = block.stamps
                 yield [taken[name] for name in columns]

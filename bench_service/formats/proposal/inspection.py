@@ -1,4 +1,4 @@
-"""What the rows of a file say of a proposal: the clocks by the one inspection of time stamps, and plain statistics."""
+"""Rows held against a proposal: the clocks by the one inspection of time stamps, and plain statistics."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

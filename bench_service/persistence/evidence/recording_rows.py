@@ -8,10 +8,12 @@ from pydantic import TypeAdapter
 from bench_service.mapping import copied
 from bench_service.model.records import NewRecording, RecordingState, StoredRecording
 from bench_service.persistence.tables.evidence import RecordingRow
+from procedures.core.measured import Measured
 from procedures.core.recording import Channel, RecordingInfo, Station
 
 CHANNELS = TypeAdapter(tuple[Channel, ...])
 STATION = TypeAdapter(Station)
+MEASURED = TypeAdapter(Measured)
 
 
 def station_of_row(row: RecordingRow) -> Station | None:
@@ -27,6 +29,7 @@ def info_of_row(row: RecordingRow) -> RecordingInfo:
         channels=CHANNELS.validate_python(row.channels),
         count=row.samples,
         station=station_of_row(row),
+        measured=None if row.measured is None else MEASURED.validate_python(row.measured),
     )
 
 
@@ -54,4 +57,5 @@ def row_of_new(new: NewRecording, recording_id: str, created_at: datetime, chunk
         stored_bytes=0,
         content_hash="",
         checkpoint=None,
+        measured=None,
     )

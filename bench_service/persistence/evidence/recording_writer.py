@@ -24,10 +24,11 @@ from bench_service.formats.content_hash import ContentHash
 from bench_service.model.errors import StorageFailure, StorageFull
 from bench_service.model.records import NewRecording, RecordingState
 from bench_service.persistence.database import Conflict, Database
-from bench_service.persistence.evidence.recording_rows import info_of_row, row_of_new
+from bench_service.persistence.evidence.recording_rows import MEASURED, info_of_row, row_of_new
 from bench_service.persistence.idempotency import made_before, remember
 from bench_service.persistence.tables.evidence import ChunkRow, RecordingRow
 from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.measured import Measured
 from procedures.core.recording import RawArray, RecordingInfo
 
 log = logging.getLogger(__name__)
@@ -72,7 +73,7 @@ class SqlRecordingWriter:
                     self._closed = True
                     raise
 
-    def seal(self, checkpoint: dict[str, Any] | None = None) -> RecordingInfo:
+    def seal(self, checkpoint: dict[str, Any] | None = None, measured: Measured | None = None) -> RecordingInfo:
         """Write the rest and complete the recording. Where the job's station is complete already, that one is returned.
 
         The second happens when a step is repeated because the process died between its last commit and its note
@@ -85,7 +86,7 @@ class SqlRecordingWriter:
         if self._committed + self._filled == 0:
             raise UnfitRecording("a recording without samples cannot be sealed")
         try:
-            self._sealed = self._complete(checkpoint)
+            self._sealed = self._complete(checkpoint, measured)
         except Conflict:
             first = self._complete_before()
             if first is None:
@@ -119,7 +120,7 @@ class SqlRecordingWriter:
         self._chunks += 1
         self._filled = 0
 
-    def _complete(self, checkpoint: dict[str, Any] | None) -> RecordingInfo:
+    def _complete(self, checkpoint: dict[str, Any] | None, measured: Measured | None) -> RecordingInfo:
         rest = self._hash.copy()
         rest.update(self._buffer[: self._filled])
         with self._database.write() as session:
@@ -128,6 +129,7 @@ class SqlRecordingWriter:
                 self._add_chunk(session, row)
             row.content_hash = rest.hexdigest()
             row.checkpoint = checkpoint
+            row.measured = None if measured is None else MEASURED.dump_python(measured, mode="json")
             row.state = RecordingState.COMPLETE.value
             remember(session, self._new.idempotency, "recording", self.id, self._created_at)
             session.flush()

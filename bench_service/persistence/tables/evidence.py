@@ -54,6 +54,7 @@ class RecordingRow(Table):
     created_at: Mapped[datetime]
     source: Mapped[dict[str, Any]]
     checkpoint: Mapped[dict[str, Any] | None] = mapped_column(Document)
+    measured: Mapped[dict[str, Any] | None] = mapped_column(Document)
 
 
 class ChunkRow(Table):

@@ -1,0 +1,88 @@
+"""Choice of a bench's driver and devices by the settings: the one place, for service, supervisor and `bench stop`.
+
+Light imports: simulators and drivers are loaded where they are used.
+"""
+
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bench_service.bench.devices import BenchDevices
+from bench_service.bench.driver import BenchDriver
+from bench_service.bench.prompts import Asking
+from bench_service.drivers.device_register import DeviceRegister
+from bench_service.drivers.registered import RegisteredDevices
+from bench_service.model.errors import Misconfigured
+from bench_service.settings import Settings
+
+if TYPE_CHECKING:
+    from bench_service.drivers.bench_file.document import BenchFile
+
+
+def driver_of(settings: Settings, asking: Asking) -> BenchDriver:
+    """The driver of the settings' bench: by its bench file, or simulated. Raises `Misconfigured`, `NotMounted`."""
+    from bench_service.drivers.device_faults import FaultPlan
+    from bench_service.drivers.simulated import SimulatedDriver
+
+    register = DeviceRegister(settings.devices_in(), settings.bench_id)
+    if settings.bench_file is None:
+        faults = None if settings.device_faults is None else FaultPlan.parse(settings.device_faults)
+        truths = settings.unit_truth, settings.bench_truth
+        asked = asking if settings.ask_operator else None
+        return SimulatedDriver(settings.bench_id, *truths, settings.real_time_factor, register, faults, asked)
+    from bench_service.drivers.bench_file.document import read_bench_file
+    from bench_service.drivers.wired.driver import BenchFileDriver
+
+    file = read_bench_file(settings.bench_file)
+    _require_id(file.id, settings)
+    simulation = file.rest.simulation
+    unit_truth, bench_truth = (
+        None if truth is None else file.folder / truth for truth in (simulation.unit_truth, simulation.bench_truth)
+    )
+    bench_id = file.id if bench_truth is None else _id_in(bench_truth)
+    return BenchFileDriver(file, SimulatedDriver(bench_id, unit_truth, bench_truth), register, asking)
+
+
+def devices_of(folder: Path, bench_id: str, bench_file: Path | None = None) -> BenchDevices:
+    """The devices of a bench on this host: by a bench file, given or remembered by their register; else simulated.
+
+    Their state can be read whatever becomes of the file. It is read when the devices are first commanded or compared,
+    and kept: a change of it holds from the process's next start.
+    """
+    register = DeviceRegister(folder, bench_id)
+    if bench_file is None:
+        state = register.read()
+        if state is None or not state.bench_file:
+            return RegisteredDevices(register)
+        bench_file = Path(state.bench_file)
+    from bench_service.drivers.wired.devices import WiredDevices
+
+    return WiredDevices(partial(_kept, bench_file.absolute()), register)
+
+
+@lru_cache(maxsize=16)
+def _kept(path: Path) -> "BenchFile":
+    """A bench file as this process read it first. One that cannot be read is tried again."""
+    from bench_service.drivers.bench_file.document import read_bench_file
+
+    return read_bench_file(path)
+
+
+def own_devices(settings: Settings) -> BenchDevices:
+    """The devices of the settings' own bench. Raises `Misconfigured` for a bench file that cannot be used."""
+    if settings.bench_file is not None:
+        _require_id(_kept(settings.bench_file.absolute()).id, settings)
+    return devices_of(settings.devices_in(), settings.bench_id, settings.bench_file)
+
+
+def _require_id(found: str, settings: Settings) -> None:
+    if found != settings.bench_id:
+        raise Misconfigured(f"{settings.bench_file} is of bench {found!r}, and the settings of {settings.bench_id!r}")
+
+
+def _id_in(truth: Path) -> str:
+    """Id of the bench in a truth file: the simulated devices of any bench may be taken from it."""
+    from bench_service.drivers.bench_file.reading import document_of, text_of
+
+    described = document_of(truth, text_of(truth)).get("description", {})
+    return str(described.get("id", ""))

@@ -1,0 +1,1 @@
+"""Drivers of devices: a port of the bench over a protocol and a line."""

@@ -1,0 +1,219 @@
+"""Driver of a three-axis table with an ACUTROL controller: implements `procedures.bench.turntable.Turntable`.
+
+Not confirmed on a device. Limits go out before a demand, a demand before its mode; the servo holds the axes at rest.
+"""
+
+import asyncio
+from math import sqrt
+
+from bench_service.drivers.devices.acutrol_link import AcutrolSection
+from bench_service.drivers.devices.acutrol_watch import POLL_S, STOPPED, WatchedTable
+from bench_service.drivers.devices.table_axes import AXES, TurnProgress, angles_of, declared, steps, wrapped
+from bench_service.drivers.interface.driver import DeviceDriver, Found, narrowed
+from procedures.bench.device import DeviceIdentity
+from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
+from procedures.bench.turntable import TableReading
+from procedures.core.sinusoid import Sinusoid
+from procedures.core.table_angles import TableAngles
+from procedures.core.turn import Turn
+
+MOST_LEFT_DEG = 170.0
+"""Largest angle between the stop of turns and their end: beyond it the shorter way would be another number of turns."""
+
+
+class AcutrolTurntable(WatchedTable):
+    """Table whose every motion is watched by its encoders. A motion that is cancelled goes on to its end by itself."""
+
+    async def connect(self) -> Found:
+        """Make the line, identify, read status and factory limits; see `WireDevice`."""
+        identity = await self.identify()
+        await self._states()
+        return Found(identity, await self._link.status(), self._link.own)
+
+    async def identify(self) -> DeviceIdentity:
+        """Ask for the identity; see the port."""
+        return await self._link.identify()
+
+    async def read(self) -> TableReading:
+        """Read encoders and status words; see the port."""
+        states, status = await self._states(), await self._link.status()
+        moving = self._under_way() or any(abs(s.rate_deg_s) > self._section.rest_rate_deg_s for s in states)
+        return TableReading(self._clock.now_s(), angles_of([s.position_deg for s in states]), moving, status)
+
+    async def move_to(self, angles: TableAngles) -> None:
+        """Move all axes, settle; see the port."""
+        self._require_allowed(declared(self._section).violations(angles))
+        demand = self._begin()
+        try:
+            start = await self._require_ready()
+            self._require_allowed(declared(narrowed(self._section, self._link.own)).violations(angles))
+            end = [angles.outer_deg, angles.middle_deg, angles.inner_deg]
+            positions = [state.position_deg for state in start]
+            for step in steps(positions, end, [count.counts for count in self._counts]):
+                await self._go(positions, step, demand)
+                positions = step
+        finally:
+            self._end(demand)
+
+    async def command_turn(self, turn: Turn) -> None:
+        """Begin whole turns of one axis; see the port. They are followed from here on, while time passes elsewhere."""
+        index = AXES.index(turn.axis)
+        demand = self._begin()
+        try:
+            states = await self._require_ready()
+            here = angles_of([state.position_deg for state in states])
+            self._require_allowed(declared(narrowed(self._section, self._link.own)).violations(here, turn))
+            rate = turn.rate_deg_s if turn.turns > 0 else -turn.rate_deg_s
+            await self._prepare_brake(demand)
+            self._can_brake = False
+            await self._link.limit("rate", index, turn.rate_deg_s, turn.rate_deg_s / turn.ramp_s)
+            self._require_current(demand)
+            await self._link.demand("rate", index, rate)
+            self._require_current(demand)
+            await self._link.mode("rate", [index])
+        except BaseException:
+            self._end(demand)
+            raise
+        self._turning = asyncio.create_task(self._follow(turn, index, [s.position_deg for s in states], demand))
+
+    async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
+        """Refuse; see the port: how this controller begins a sinusoid is not known. Raises `OutOfRange`."""
+        raise OutOfRange(f"{sinusoid.axis}: the driver of this table demands no sinusoid")
+
+    async def settle(self) -> None:
+        """Wait for the end of the commanded turns; see the port."""
+        if (turning := self._turning) is not None:
+            await asyncio.wait([turning])
+            if self._turning is turning:
+                self._turning = None
+            if turning.cancelled():
+                raise Stopped(STOPPED)
+            turning.result()
+        elif not await self._rests():
+            raise NotSettled("the table moves, and no motion of it was commanded here")
+
+    async def make_safe(self) -> None:
+        """Ramp down to rest and hold, or with the servo off as `on_safe` says; see the port."""
+        self._demand += 1
+        if self._turning is not None:
+            self._turning.cancel()
+        self._busy = False
+        if await self._rests():
+            return
+        longest = max(axis.rate_deg_s / axis.acceleration_deg_s2 for axis in self._axes())
+        try:
+            await self._brake()
+        except DeviceFault:  # an open interlock refuses, and brakes by itself: rest is what counts
+            await self._wait_for_rest(None, longest, self._demand)
+            return
+        await self._wait_for_rest(None, longest, self._demand)
+        if self._section.on_safe == "off":
+            await self._link.mode("off")
+            return
+        for index, state in enumerate(await self._link.states()):
+            await self._link.demand("position", index, state.position_deg)
+        await self._link.mode("position")
+
+    async def _prepare_brake(self, demand: int) -> None:
+        """Set the limits of rate mode before a motion, so that a stop needs two statements an axis."""
+        if self._can_brake:
+            return
+        for index, axis in enumerate(self._axes()):
+            self._require_current(demand)
+            await self._link.limit("rate", index, axis.rate_deg_s, axis.acceleration_deg_s2)
+        self._can_brake = True
+
+    async def _brake(self) -> None:
+        """Take the rate away from each axis that moves, the fastest one first."""
+        states = await self._link.states()
+        moving = [k for k, state in enumerate(states) if abs(state.rate_deg_s) > self._section.rest_rate_deg_s]
+        for index in sorted(moving, key=lambda k: -abs(states[k].rate_deg_s)):
+            await self._link.demand("rate", index, 0.0)
+            await self._link.mode("rate", [index])
+
+    def close(self) -> None:
+        """Drop the line; see `WireDevice`."""
+        self._link.close()
+
+    def restore(self, angles: TableAngles) -> None:
+        """Take up the unwrapped angles that were remembered, before the first reading of an encoder of one turn."""
+        for count, angle in zip(self._counts, (angles.outer_deg, angles.middle_deg, angles.inner_deg), strict=True):
+            count.restore(angle)
+
+    async def _go(self, start: list[float], end: list[float], demand: int) -> None:
+        """Set limits, then demands, then the mode; wait until the axes rest where they were asked."""
+        longest = 0.0
+        await self._prepare_brake(demand)
+        for index, axis in enumerate(self._axes()):
+            self._require_current(demand)
+            await self._link.limit("position", index, axis.rate_deg_s, axis.acceleration_deg_s2)
+            distance = abs(end[index] - start[index])
+            longest = max(longest, _duration_s(distance, axis.rate_deg_s, axis.acceleration_deg_s2))
+        for index, count in enumerate(self._counts):
+            self._require_current(demand)
+            await self._link.demand("position", index, wrapped(end[index]) if count.counts else end[index])
+        self._require_current(demand)
+        await self._link.mode("position")
+        await self._wait_for_rest(end, longest, demand)
+
+    async def _follow(self, turn: Turn, index: int, start: list[float], demand: int) -> None:
+        """Count the turns of an axis in rate mode, stop it before their end, and lead it to the angle of the start."""
+        try:
+            sign = 1.0 if turn.turns > 0 else -1.0
+            progress = TurnProgress(start[index], sign * turn.rate_deg_s, self._clock.now_s())
+            until_stop = abs(turn.angle_deg) - 0.5 * turn.rate_deg_s * turn.ramp_s
+            while True:
+                states, now = await self._link.states(), self._clock.now_s()
+                left_s = (until_stop - sign * progress.read(states[index].position_deg, now)) / turn.rate_deg_s
+                if left_s <= POLL_S:
+                    break
+                await self._clock.sleep(min(POLL_S, left_s))
+            await self._clock.sleep(max(0.0, left_s))
+            self._require_current(demand)
+            await self._link.demand("rate", index, 0.0)
+            stopped = self._clock.now_s()
+            await self._wait_for_rest(None, turn.ramp_s, demand)
+            rested = self._clock.now_s()
+            not_turned = progress.rate_deg_s * (rested - stopped - 0.5 * turn.ramp_s)
+            states = await self._states()
+            progress.read(states[index].position_deg, rested, not_turned)
+            await self._return(turn, index, start, turn.angle_deg - progress.turned_deg, demand)
+        except BaseException:
+            await self._stop_axis(index)
+            raise
+        finally:
+            self._end(demand)
+
+    async def _return(self, turn: Turn, index: int, start: list[float], left_deg: float, demand: int) -> None:
+        """Lead the axis that has turned by what is left of its turns, the others compared with where they stood."""
+        axis, here = self._axes()[index], (await self._states())[index].position_deg
+        if abs(left_deg) > MOST_LEFT_DEG:
+            raise DeviceFault(f"the {turn.axis} axis stopped {left_deg:g} deg before the end of its turns")
+        end = here + left_deg
+        await self._link.limit("position", index, axis.rate_deg_s, axis.acceleration_deg_s2)
+        await self._link.demand("position", index, self._demanded(index, end))
+        await self._link.mode("position", [index])
+        ends = [end if k == index else angle for k, angle in enumerate(start)]
+        await self._wait_for_rest(ends, _duration_s(abs(left_deg), axis.rate_deg_s, axis.acceleration_deg_s2), demand)
+
+    def _demanded(self, index: int, angle_deg: float) -> float:
+        """Angle as the controller takes it: of one turn where its encoder reads within one."""
+        within_one = self._counts[index].counts or getattr(self._section, AXES[index]).continuous
+        return wrapped(angle_deg) if within_one else angle_deg
+
+    async def _stop_axis(self, index: int) -> None:
+        """Take the rate away from an axis whose turns are not followed any more; quiet where that fails as well."""
+        try:
+            await asyncio.shield(self._link.demand("rate", index, 0.0))
+        except Exception:
+            return
+
+
+def _duration_s(distance_deg: float, rate_deg_s: float, acceleration_deg_s2: float) -> float:
+    """Time from rest to rest over a distance within rate and acceleration [s]."""
+    if distance_deg * acceleration_deg_s2 < rate_deg_s**2:
+        return 2.0 * sqrt(distance_deg / acceleration_deg_s2)
+    return distance_deg / rate_deg_s + rate_deg_s / acceleration_deg_s2
+
+
+DRIVER = DeviceDriver("turntable", "acutrol", AcutrolSection, AcutrolTurntable)

@@ -1,0 +1,117 @@
+"""Watching of an ACUTROL table by its encoders: states, rest, one demand at a time, what took over from what."""
+
+import asyncio
+
+from bench_service.drivers.devices.acutrol_link import AcutrolLink, AcutrolSection
+from bench_service.drivers.devices.table_axes import AXES, TurnCount, declared, wrapped
+from bench_service.drivers.interface.driver import DriverContext, narrowed
+from bench_service.drivers.protocols.acutrol import AxisState
+from procedures.bench.description import AxisLimits
+from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
+
+POLL_S = 0.05
+"""Time between two readings of a moving table [s]."""
+AT_REST = 3
+"""Number of readings in a row that make rest."""
+STATUS_EVERY = 20
+"""Number of readings of a motion after which the interlocks are read again."""
+STOPPED = "the table was stopped by another demand"
+
+
+class WatchedTable:
+    """Table whose state is what its encoders say; knows no verb of the port."""
+
+    def __init__(self, section: AcutrolSection, context: DriverContext) -> None:
+        self._section, self._clock = section, context.clock
+        self._link = AcutrolLink(section, context.note)
+        self._counts = [
+            TurnCount(section.encoder == "single_turn" and not getattr(section, name).continuous) for name in AXES
+        ]
+        self._demand = 0
+        self._busy = False
+        self._turning: asyncio.Task[None] | None = None
+        self._can_brake = False
+        """True while the limits of rate mode, by which the table is braked, are the declared ones."""
+
+    def _axes(self) -> tuple[AxisLimits, AxisLimits, AxisLimits]:
+        description = declared(narrowed(self._section, self._link.own))
+        return description.outer, description.middle, description.inner
+
+    def _under_way(self) -> bool:
+        return self._busy or (self._turning is not None and not self._turning.done())
+
+    def _begin(self) -> int:
+        """Begin a demand. Raises `DeviceFault` while another is under way."""
+        if self._under_way():
+            raise DeviceFault("the table is moving: one demand at a time")
+        self._busy, self._turning = True, None
+        self._demand += 1
+        return self._demand
+
+    def _require_current(self, demand: int) -> None:
+        """Check before each statement that no later demand took over. Raises `Stopped`."""
+        if demand != self._demand:
+            raise Stopped(STOPPED)
+
+    def _end(self, demand: int) -> None:
+        if demand == self._demand:
+            self._busy = False
+
+    def _require_allowed(self, violations: tuple[str, ...]) -> None:
+        if violations:
+            raise OutOfRange("; ".join(violations))
+
+    async def _require_ready(self) -> tuple[AxisState, ...]:
+        """Read interlocks and states. Raises `DeviceFault` where an interlock is not closed or an axis moves."""
+        await self._link.require_closed()
+        states = await self._states()
+        for name, state in zip(AXES, states, strict=True):
+            if abs(state.rate_deg_s) > self._section.rest_rate_deg_s:
+                raise DeviceFault(f"the table is moving: its {name} axis turns at {state.rate_deg_s:g} deg/s")
+        return states
+
+    async def _states(self) -> tuple[AxisState, ...]:
+        """States of the axes with unwrapped positions."""
+        states = await self._link.states()
+        return tuple(
+            AxisState(count.read(state.position_deg), state.rate_deg_s)
+            for count, state in zip(self._counts, states, strict=True)
+        )
+
+    async def _wait_for_rest(self, end: list[float] | None, longest_s: float, demand: int) -> None:
+        """Wait for readings in a row at rest, and at the end where one is given. Raises `NotSettled`, `DeviceFault`."""
+        deadline = self._clock.now_s() + longest_s + self._section.settle_s
+        resting = readings = 0
+        while resting < AT_REST:
+            await self._clock.sleep(POLL_S)
+            self._require_current(demand)
+            states, late = await self._states(), self._clock.now_s() > deadline
+            resting = resting + 1 if self._at_rest(states, end) else 0
+            readings += 1
+            if late and resting == 0:
+                await self._link.require_closed()
+                away = "" if end is None else f", {self._away(states, end):g} deg from its demand"
+                raise NotSettled(
+                    f"the table did not come to rest within {self._section.settle_s:g} s of its move{away}"
+                )
+            if readings % STATUS_EVERY == 0:
+                await self._link.require_closed()
+
+    def _at_rest(self, states: tuple[AxisState, ...], end: list[float] | None) -> bool:
+        still = all(abs(state.rate_deg_s) <= self._section.rest_rate_deg_s for state in states)
+        return still and (end is None or self._away(states, end) <= self._section.tolerance_deg)
+
+    def _away(self, states: tuple[AxisState, ...], end: list[float]) -> float:
+        """Largest distance of an axis from its end; one with slip rings may read a turn more or less [deg]."""
+        return max(
+            abs(wrapped(state.position_deg - angle) if axis.continuous else state.position_deg - angle)
+            for state, angle, axis in zip(states, end, self._axes(), strict=True)
+        )
+
+    async def _rests(self) -> bool:
+        """True if some readings in a row show rest; false at the first that does not."""
+        for _ in range(AT_REST):
+            if not self._at_rest(await self._states(), None):
+                return False
+            await self._clock.sleep(POLL_S)
+        return True

@@ -1,0 +1,1 @@
+"""Lines to devices: addresses, transports, one thread a device, and streams of frames. Knows no protocol."""

@@ -1,0 +1,260 @@
+"""Questions and answers over one line, and what happens when the line is lost in between. Blocking; knows no thread.
+
+Rules: a question goes out on a line that is in step, which means that every earlier answer was read or the connection
+was given up. A read may be repeated over a new connection, a demand never. After a reconnect the device's identity and
+status are asked first.
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
+
+from bench_service import wall_clock
+from bench_service.drivers.answers import BadAnswer, shown
+from bench_service.drivers.interface.address import Address
+from bench_service.drivers.link.framing import NoFrame
+from bench_service.drivers.link.transport import LineCut, Transport, open_transport
+from procedures.bench.errors import DeviceBusy, Disconnected
+
+T = TypeVar("T")
+log = logging.getLogger(__name__)
+AGAIN_S = 0.1
+"""Pause before a line that was given up is made again where the device still holds it [s]."""
+
+
+@dataclass(frozen=True)
+class Question(Generic[T]):
+    """Bytes to send, and the meaning of the answer."""
+
+    data: bytes
+    name: str
+    """Name of the question in messages, as in "the set point"."""
+    read: Callable[[bytes], T]
+    """Value of an answer. Raises `BadAnswer` where it is none to this question, `Refusal` where the device says no."""
+    demand: bool = False
+    """True if it changes the device: such a question is never sent twice."""
+    answered: bool = True
+    """False where the device sends no answer; `read` then gets empty bytes at once."""
+
+
+@dataclass(frozen=True)
+class Patience:
+    """Times of a line [s]."""
+
+    answer_s: float = 2.0
+    """Longest time from a question to its whole answer."""
+    deadline_s: float = 6.0
+    """Longest time of a verb's question, with waiting for its turn, a new connection and a second try."""
+    connect_s: float = 2.0
+    after_demand_s: float = 0.0
+    """Pause after a demand, for controllers that lose a command that comes too soon."""
+
+
+class Framer(Protocol):
+    """Where one answer ends; see `framing`."""
+
+    def take(self, buffer: bytearray) -> bytes | None: ...
+
+
+class Greeting(Protocol):
+    """First words on each new connection: identity, then status."""
+
+    @property
+    def identity(self) -> Question[Any]:
+        """Question of the identity; its `read` refuses the answer to any other question."""
+        ...
+
+    def check(self, identity: Any, ask: "Ask") -> None:
+        """Ask for status, compare the identity with the former one. Raises `BenchError` where it may not go on."""
+        ...
+
+
+class Ask(Protocol):
+    """Ask a question on the new connection, without a second try."""
+
+    def __call__(self, question: Question[T]) -> T: ...
+
+
+class _Lost(Exception):
+    """No answer came: the line was cut, stayed silent, or sent what is no answer."""
+
+
+@dataclass
+class LineCounts:
+    """Counts of what has happened to a line; for tests, metrics and messages."""
+
+    questions: int = 0
+    connections: int = 0
+    silences: int = 0
+    cuts: int = 0
+    surplus: int = 0
+    """Answers that nobody had asked for, as a doubled or a late one."""
+
+
+class Exchange:
+    """Conversation with one device, which reconnects where that is allowed."""
+
+    def __init__(self, device: str, address: Address, framer: Framer, greeting: Greeting, patience: Patience) -> None:
+        self.device, self.address, self.patience = device, address, patience
+        self._framer, self._greeting = framer, greeting
+        self._transport: Transport | None = None
+        self._buffer = bytearray()
+        self._stale = False
+        self._not_before = 0.0
+        self._closing = False
+        self._greeted = False
+        self.counts = LineCounts()
+
+    def ask(self, question: Question[T], until: float) -> T:
+        """Ask until a moment of the monotonic clock. Raises `Disconnected`, `DeviceBusy`, `Refusal`."""
+        self._connect(until)
+        try:
+            return self._once(question, until)
+        except _Lost as lost:
+            self._give_up()
+            if question.demand:
+                raise Disconnected(
+                    f"{self._named()}: {lost}; whether {question.name} was carried out is not known, and it is not "
+                    "sent again"
+                ) from None
+            log.warning("%s: %s; %s is asked again over a new line", self._named(), lost, question.name)
+        self._connect(until)
+        try:
+            return self._once(question, until)
+        except _Lost as lost:
+            self._give_up()
+            raise Disconnected(f"{self._named()} does not answer, asked twice: {lost}") from None
+
+    def close(self) -> None:
+        """Close the line; the next question opens it again."""
+        if self._transport is not None:
+            self._transport.close()
+        self._transport = None
+        self._buffer.clear()
+
+    def stop(self) -> None:
+        """End the question under way, from another thread: it raises `Disconnected`, and no new line is opened."""
+        self._closing = True
+        transport = self._transport
+        if transport is not None:
+            transport.cut()
+
+    def _named(self) -> str:
+        return f"the {self.device} at {self.address}"
+
+    def _give_up(self) -> None:
+        """Leave a line that is out of step. A serial one stays open and is brought into step by its identity."""
+        if self._transport is not None and self.address.scheme == "serial":
+            self._stale = True
+            self._buffer.clear()
+        else:
+            self.close()
+
+    def _connect(self, until: float) -> None:
+        """Have a line in step: nothing in it that was not asked for, the device greeted.
+
+        A controller may hold the former line for a while after it was given up: then it is tried again until the time
+        is over. A device that was never reached is tried once.
+        """
+        if self._transport is not None and not self._stale and self._in_step():
+            return
+        while True:
+            try:
+                self._open(until)
+                self._greet(until)
+                self._greeted = True
+                return
+            except DeviceBusy:
+                if not self._greeted or until - wall_clock.monotonic_s() < 2.0 * AGAIN_S:
+                    raise
+                wall_clock.pause(AGAIN_S)
+
+    def _open(self, until: float) -> None:
+        left = until - wall_clock.monotonic_s()
+        if self._closing:
+            raise Disconnected(f"the line of {self._named()} was closed by its bench")
+        if left <= 0.0:
+            raise Disconnected(f"{self._named()} does not answer in time")
+        if self._transport is None:
+            try:
+                self._transport = open_transport(self.address, min(left, self.patience.connect_s))
+            except LineCut as cut:
+                raise Disconnected(f"{self._named()} cannot be reached: {cut}") from None
+            self.counts.connections += 1
+
+    def _in_step(self) -> bool:
+        """Check that nothing stands in the line before a question; else leave it."""
+        assert self._transport is not None
+        try:
+            rest = bytes(self._buffer) + self._transport.receive(0.0)
+        except LineCut as cut:
+            self.counts.cuts += 1
+            log.warning("%s: the line was cut between two questions: %s", self._named(), cut)
+            self.close()
+            return False
+        if not rest:
+            return True
+        self.counts.surplus += 1
+        log.warning("%s: an answer came that nobody asked for: %s; the line is given up", self._named(), shown(rest))
+        self._give_up()
+        return False
+
+    def _greet(self, until: float) -> None:
+        """Ask identity and status; on a line that cannot be dropped leave out what answers earlier questions."""
+        stale, self._stale = self._stale, False
+        try:
+            identity = self._once(self._greeting.identity, until, leave_out_others=stale)
+            self._greeting.check(identity, lambda question: self._once(question, until))
+        except _Lost as lost:
+            self._stale = stale
+            self._give_up()
+            raise DeviceBusy(
+                f"{self._named()} takes the line and does not say who it is ({lost}): another master may have it, or "
+                "it speaks another dialect"
+            ) from None
+        except BaseException:
+            self.close()
+            raise
+
+    def _once(self, question: Question[T], until: float, leave_out_others: bool = False) -> T:
+        """Send a question and read its answer. Raises `_Lost`."""
+        transport = self._transport
+        if transport is None:
+            raise _Lost("the line is closed")
+        pause = self._not_before - wall_clock.monotonic_s()
+        if pause > 0.0:
+            wall_clock.pause(pause)
+        self.counts.questions += 1
+        until = min(until, wall_clock.monotonic_s() + self.patience.answer_s)
+        try:
+            transport.send(question.data)
+            while True:
+                answer = self._answer(transport, question, until) if question.answered else b""
+                try:
+                    return question.read(answer)
+                except BadAnswer as bad:
+                    if not leave_out_others:
+                        raise _Lost(f"the answer to {question.name} is none: {bad}") from None
+        except LineCut as cut:
+            self.counts.cuts += 1
+            raise _Lost(f"the line was cut at {question.name}: {cut}") from None
+        finally:
+            if question.demand and self.patience.after_demand_s > 0.0:
+                self._not_before = wall_clock.monotonic_s() + self.patience.after_demand_s
+
+    def _answer(self, transport: Transport, question: Question[T], until: float) -> bytes:
+        """Read one answer. Raises `_Lost`, `LineCut`."""
+        while True:
+            try:
+                answer = self._framer.take(self._buffer)
+            except NoFrame as bad:
+                raise _Lost(f"the answer to {question.name} has no end: {bad}") from None
+            if answer is not None:
+                return answer
+            left = until - wall_clock.monotonic_s()
+            if left <= 0.0:
+                self.counts.silences += 1
+                half = f", only {shown(bytes(self._buffer))} came" if self._buffer else ""
+                raise _Lost(f"no answer to {question.name} within {self.patience.answer_s:g} s{half}")
+            self._buffer += transport.receive(left)

@@ -1,0 +1,51 @@
+"""Readings of table and supply over a recording, beside what was commanded of them."""
+
+from dataclasses import dataclass
+
+from procedures.core.table_angles import TableAngles
+
+
+@dataclass(frozen=True)
+class MeasuredAngles:
+    """Encoder readings while a recording was made, at a table that was to stand still."""
+
+    mean: TableAngles
+    """Mean of the readings of each axis [deg]; whole turns as the encoders count them."""
+    spread: TableAngles
+    """Standard deviation of the readings of each axis [deg]; zero for one reading."""
+    readings: int
+
+
+@dataclass(frozen=True)
+class MeasuredSupply:
+    """Readings of the unit's supply while a recording was made."""
+
+    voltage_v: float
+    """Mean of the readings."""
+    current_a: float
+    """Mean of the readings."""
+    current_spread_a: float
+    """Standard deviation of the readings; zero for one reading."""
+    limiting: bool
+    """True if the supply limited the current at any reading."""
+    readings: int
+
+
+@dataclass(frozen=True)
+class MeasuredEnvironment:
+    """Means of the room's conditions while a recording was made; None: not measured."""
+
+    temperature_c: float | None = None
+    humidity_percent: float | None = None
+    pressure_hpa: float | None = None
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Readings of the devices around the unit while a recording was made; None: not read."""
+
+    angles: MeasuredAngles | None = None
+    supply: MeasuredSupply | None = None
+    environment: MeasuredEnvironment | None = None
+    status: tuple[str, ...] = ()
+    """Status words of table, supply and unit that were read meanwhile, each once, by first appearance."""

@@ -1,0 +1,189 @@
+"""Promises of the unit's data link, for every implementation of it."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from procedures.bench.errors import BenchError, DeviceFault, Disconnected, NotPowered
+from simulators.served.faults import Fault
+from tests.conformance.served import opened
+from tests.conformance.units import IMPLEMENTATIONS, UnitRig, unit
+
+STREAMS = ("framed", "ixcom")
+
+
+async def _record(rig: UnitRig, seconds: float) -> np.ndarray:
+    blocks = [block async for block in rig.port.record(seconds).blocks]
+    return np.concatenate(blocks) if blocks else np.empty((0, 6), dtype=np.int32)
+
+
+async def _drain(blocks: AsyncIterator[np.ndarray]) -> None:
+    async for _ in blocks:
+        continue
+
+
+async def _ready(rig: UnitRig) -> None:
+    """Switch on and wait until the data are valid."""
+    rig.power(True)
+    await rig.clock.sleep(2.0)
+
+
+@pytest.fixture(params=IMPLEMENTATIONS)
+def rig(request: pytest.FixtureRequest, tmp_path: Path):
+    with unit(request.param, tmp_path) as made:
+        yield made
+
+
+def test_a_recording_has_exactly_its_samples_and_the_units_own_counts(rig: UnitRig) -> None:
+    async def scene() -> None:
+        await _ready(rig)
+        tape = rig.listen()
+        found = await _record(rig, 5.0)
+        assert found.shape == (2000, 6)
+        assert found.dtype == np.int32
+        assert await _record(rig, 0.0) is not None
+        made = np.concatenate(list(tape.blocks))
+        places = [k for k in range(len(made) - len(found) + 1) if np.array_equal(made[k], found[0])]
+        assert any(np.array_equal(made[k : k + len(found)], found) for k in places), "counts are those that were made"
+
+    asyncio.run(scene())
+
+
+def test_a_unit_without_power_sends_nothing(rig: UnitRig) -> None:
+    async def scene() -> None:
+        with pytest.raises(NotPowered):
+            await _record(rig, 1.0)
+        await _ready(rig)
+        await _record(rig, 1.0)
+        rig.power(False)
+        with pytest.raises(NotPowered):
+            await _record(rig, 1.0)
+        await _ready(rig)
+        assert len(await _record(rig, 1.0)) == 400
+
+    asyncio.run(scene())
+
+
+def test_power_that_goes_during_a_recording_ends_it(rig: UnitRig) -> None:
+    async def scene() -> None:
+        await _ready(rig)
+        blocks = rig.port.record(600.0).blocks
+        await anext(blocks)
+        rig.power(False)
+        with pytest.raises(NotPowered):
+            await _drain(blocks)
+
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize("name", STREAMS)
+def test_data_that_are_not_valid_yet_are_refused(tmp_path: Path, name: str) -> None:
+    async def scene(rig: UnitRig) -> None:
+        rig.power(True)
+        with pytest.raises(DeviceFault, match=r"says that its data are not valid, in frame \d+: .*status 0x"):
+            await _record(rig, 1.0)
+        assert any(word.bits for word in rig.port.status())
+
+    with unit(name, tmp_path, valid_after_s=60.0) as rig:
+        asyncio.run(scene(rig))
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("lost_counter", r"1 frames were lost: after counter \d+ came \d+"),
+        ("wrong_crc", r"1 frames were lost: after counter \d+ came \d+ \(a frame in between was spoiled\)"),
+        ("half", r"were? lost: after counter \d+ came \d+ \(a frame in between was spoiled\)"),
+        ("doubled", r"a frame came twice: counter \d+"),
+        ("invalid", r"data are not valid, in frame \d+"),
+    ],
+)
+@pytest.mark.parametrize("name", STREAMS)
+def test_a_frame_that_is_lost_is_named_with_its_counter(tmp_path: Path, name: str, kind: str, words: str) -> None:
+    async def scene(rig: UnitRig) -> None:
+        await _ready(rig)
+        blocks = rig.port.record(60.0).blocks
+        await anext(blocks)
+        sent = rig.behind.do(lambda bench: bench.plan.sent["unit_link"])
+        rig.behind.do(lambda bench: setattr(bench.plan, "faults", (Fault("unit_link", kind, at=sent + 900),)))
+        with pytest.raises(BenchError, match=words):
+            await _drain(blocks)
+        rig.behind.plan()
+        assert len(await _record(rig, 1.0)) == 400
+
+    with unit(name, tmp_path) as rig:
+        asyncio.run(scene(rig))
+
+
+@pytest.mark.parametrize("name", STREAMS)
+def test_a_counter_that_wraps_round_loses_nothing(tmp_path: Path, name: str) -> None:
+    async def scene(rig: UnitRig) -> None:
+        await _ready(rig)
+        if name == "framed":
+            imu_streams = rig.behind.do(lambda bench: bench.bench.imu._tapes.running)
+            rig.behind.do(lambda bench: setattr(imu_streams[0], "counter", 65_000))
+            await rig.clock.sleep(1.0)
+        # 2000 frames: an 8-bit counter wraps seven times, the 16-bit one once.
+        assert len(await _record(rig, 5.0)) == 2000
+
+    with unit(name, tmp_path) as rig:
+        asyncio.run(scene(rig))
+
+
+@pytest.mark.parametrize("name", STREAMS)
+def test_a_cut_line_ends_the_recording_and_the_next_one_has_a_new_line(tmp_path: Path, name: str) -> None:
+    async def scene(rig: UnitRig) -> None:
+        await _ready(rig)
+        blocks = rig.port.record(600.0).blocks
+        await anext(blocks)
+        rig.behind.do(lambda bench: bench.ports["unit_link"].cut())
+        with pytest.raises(Disconnected, match=r"the unit link at tcp://127\.0\.0\.1:\d+ is cut: "):
+            await _drain(blocks)
+        assert len(await _record(rig, 1.0)) == 400
+
+    with unit(name, tmp_path, section={"answer_s": 2.0}) as rig:
+        asyncio.run(scene(rig))
+
+
+def test_silence_is_told_by_its_deadline(tmp_path: Path) -> None:
+    async def scene(rig: UnitRig) -> None:
+        await _ready(rig)
+        await _record(rig, 1.0)
+        rig.behind.do(lambda bench: bench.ports["unit_link"].cut())
+        with pytest.raises(Disconnected, match=r"sent nothing for 0\.3 s"):
+            await _record(rig, 10.0)
+
+    with unit("datagrams", tmp_path, section={"answer_s": 0.3}) as rig:
+        asyncio.run(scene(rig))
+
+
+@pytest.mark.parametrize("name", STREAMS)
+def test_a_recording_that_is_cancelled_leaves_the_link_usable(tmp_path: Path, name: str) -> None:
+    async def scene(rig: UnitRig) -> None:
+        await _ready(rig)
+        for pause_s in (0.0, 0.005, 0.05):
+            recording = asyncio.create_task(_record(rig, 60.0))
+            await asyncio.sleep(pause_s)
+            recording.cancel()
+            await asyncio.wait([recording])
+            assert recording.cancelled()
+        assert len(await _record(rig, 1.0)) == 400
+
+    with unit(name, tmp_path) as rig:
+        asyncio.run(scene(rig))
+
+
+def test_a_second_master_of_an_ixcom_channel_is_refused(tmp_path: Path) -> None:
+    async def scene(rig: UnitRig) -> None:
+        await _ready(rig)
+        await _record(rig, 1.0)
+        other = opened("unit_link", "ixcom", rig.behind.numbers["unit_link"], tmp_path)
+        with pytest.raises(Disconnected, match=r"invalid channel \(code 8\)"):
+            await other.connect()
+        other.close()
+
+    with unit("ixcom", tmp_path) as rig:
+        asyncio.run(scene(rig))

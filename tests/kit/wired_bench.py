@@ -1,0 +1,53 @@
+"""A bench file whose devices are served simulators, with the files of its unit and of the unit's frames."""
+
+from pathlib import Path
+from typing import Any
+
+from simulators.served.unit_frames import CountFrames
+
+LANGUAGES = {"turntable": "acutrol", "supply": "scpi", "unit_link": "framed"}
+UNIT = """
+serial = "GL017"
+sample_rate_hz = 400
+"""
+
+
+def bench_file(folder: Path, behind: Any, factor: float) -> Path:
+    """The bench file, the unit's file and the file of its frames."""
+    frames = behind.bench.frames
+    assert isinstance(frames, CountFrames)
+    (folder / "frame.toml").write_text(frames.description())
+    channels = "".join(
+        f'[[channels]]\nname = "{c.name}"\nquantity = "{c.quantity.value}"\nunit = "{c.unit}"\nscale = {c.scale!r}\n'
+        for c in behind.bench.bench.imu.channels
+    )
+    (folder / "units").mkdir()
+    (folder / "units" / "GL017.toml").write_text(UNIT + channels)
+    axis = "minimum_deg = -400, maximum_deg = 400, rate_deg_s = 60, acceleration_deg_s2 = 100"
+    numbers = behind.numbers
+    path = folder / "east.toml"
+    path.write_text(f"""
+[bench]
+id = "east"
+[site]
+latitude_deg = 50.45
+gravity_m_s2 = 9.810553
+[turntable]
+driver = "acutrol"
+address = "tcp://127.0.0.1:{numbers["turntable"]}"
+outer = {{ number = 3, {axis}, continuous = true }}
+middle = {{ number = 2, {axis} }}
+inner = {{ number = 1, {axis} }}
+accuracy = {{ pointing_sd_arcsec = 2 }}
+[supply]
+driver = "scpi"
+address = "tcp://127.0.0.1:{numbers["supply"]}"
+limits = {{ maximum_v = 36.0, maximum_a = 5.0, nominal_v = 28.0, nominal_a = 3.0 }}
+[unit_link]
+driver = "framed"
+address = "tcp://127.0.0.1:{numbers["unit_link"]}"
+frame = "frame.toml"
+[simulation]
+time_factor = {factor}
+""")
+    return path

@@ -1,0 +1,141 @@
+"""A mixed bench behind the service: a job over real wires, what its recordings and its result say, and certificates."""
+
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bench_service.cli.asking.client import connect
+from bench_service.drivers.interface import registry
+from bench_service.settings import Settings
+from tests.kit import line_devices
+from tests.kit.line_devices import LineDevice, bench_text, served
+from tests.service.client import Client
+
+CERTIFICATE = 'certificate = { number = "AT-117", laboratory = "PTB", due = 2020-03-02 }\n'
+WARN = '[policy]\nexpired_certificate = "warn"\n[environment]\ntemperature_c = 21.5\n'
+PLAN = {"positions": [[0, 90, 0, 1], [45, 0, -30, 1]], "delay_from": "rest", "settle_s": 0.0}
+
+
+@pytest.fixture(scope="module")
+def east(tmp_path_factory: pytest.TempPathFactory) -> Generator[tuple[Client, LineDevice]]:
+    """A service on a mixed bench whose table has an overdue certificate, under the policy that warns."""
+    folder = tmp_path_factory.mktemp("east")
+    table, supply, chamber = line_devices.table(), line_devices.supply(), line_devices.chamber()
+    with pytest.MonkeyPatch.context() as patch, served(table, supply, chamber):
+        patch.setattr(registry, "SHIPPED", line_devices.SHIPPED)
+        path = folder / "east.toml"
+        text = bench_text(table, supply, chamber, WARN)
+        path.write_text(text.replace("[turntable]\n", "[turntable]\n" + CERTIFICATE))
+        settings = Settings(database_url=f"sqlite:///{folder / 'bench.sqlite'}", bench_file=path)
+        with connect(settings, None, drive=True) as http:
+            yield Client(http), table
+
+
+@pytest.fixture(scope="module")
+def done(east: tuple[Client, LineDevice]) -> dict[str, Any]:
+    client, _ = east
+    return client.wait(client.submit("table_program", parameters=PLAN)["id"], seconds=60.0)
+
+
+def test_a_job_runs_over_real_wires(east: tuple[Client, LineDevice], done: dict[str, Any]) -> None:
+    client, table = east
+    assert done["state"] == "succeeded", done
+    assert table.demands().count("move") == 2
+    assert (done["bench"], done["simulated"]) == ("east", True)
+    found = client.http.get("/api/v1/benches/east").json()["description"]
+    assert {d["name"]: d["simulated"] for d in found["devices"]}["unit_link"] is True
+
+
+def test_a_recording_says_device_by_device_where_it_comes_from(
+    east: tuple[Client, LineDevice], done: dict[str, Any]
+) -> None:
+    client, _ = east
+    recording = client.recordings(done["id"])[0]
+    assert recording["source"]["origin"] == "mixed"
+    devices = recording["source"]["devices"]
+    assert {name: d["simulated"] for name, d in devices.items()} == {
+        "turntable": False,
+        "supply": False,
+        "unit_link": True,
+        "chamber": False,
+        "operator": True,
+        "environment": False,
+    }
+    assert devices["turntable"]["identity"]["serial"] == "T-7"
+    assert devices["turntable"]["certificate"] == {"number": "AT-117", "laboratory": "PTB", "due": "2020-03-02"}
+    measured, angles = recording["measured"], recording["station"]["angles"]
+    assert measured["angles"]["mean"] == angles
+    assert measured["supply"]["voltage_v"] == 28.0
+    assert measured["environment"] == {"temperature_c": 21.5, "humidity_percent": None, "pressure_hpa": None}
+
+
+def test_the_result_is_marked_and_says_which_angles_were_used(
+    east: tuple[Client, LineDevice], done: dict[str, Any]
+) -> None:
+    client, _ = east
+    result = client.http.get(f"/api/v1/jobs/{done['id']}/result").json()
+    warnings = result["document"]["warnings"]
+    assert warnings[0] == "the certificate AT-117 of the turntable expired after 2020-03-02"
+    assert warnings[1] == "the angles are those that the table's encoders measured, at all 2 stations"
+
+
+def test_an_encoder_that_disagrees_fails_the_job(east: tuple[Client, LineDevice]) -> None:
+    client, table = east
+    honest = table.answer
+
+    def lying(question: dict[str, Any]) -> dict[str, Any]:
+        answer = honest(question)
+        return {**answer, "angles": [a + 5.0 for a in answer["angles"]]} if question["verb"] == "read" else answer
+
+    table.answer = lying  # type: ignore[method-assign]
+    try:
+        job = client.wait(client.submit("table_program", parameters=PLAN)["id"])
+    finally:
+        table.answer = honest  # type: ignore[method-assign]
+    assert job["state"] == "failed"
+    assert "encoder shows" in job["error"]["message"]
+    assert "find out why before anything else moves" in job["error"]["message"]
+
+
+def test_thermal_jobs_are_refused_with_the_reason(east: tuple[Client, LineDevice]) -> None:
+    client, _ = east
+    answer = client.http.post("/api/v1/jobs", json={"procedure": "thermal_cycle", "unit": "SIM-0001", "parameters": {}})
+    assert answer.status_code == 422, answer.text
+    assert "does not feel the real chamber's air" in answer.text
+
+
+def test_an_overdue_certificate_refuses_a_job_where_the_policy_says_so(
+    tmp_path: Path, east: tuple[Client, LineDevice]
+) -> None:
+    """Planned by a service that drives nothing: the policy travels with the bench's description."""
+    from bench_service.bench.directory import BenchDirectory
+    from bench_service.drivers.bench_file.description import described
+    from bench_service.drivers.bench_file.document import read_bench_file
+    from bench_service.drivers.simulated import SimulatedDriver
+    from bench_service.evidence.catalogue import Catalogue
+    from bench_service.jobs.planning import Planner
+    from bench_service.model.errors import NotFound
+
+    simulated = SimulatedDriver("east")
+    devices = (line_devices.table(), line_devices.supply(), line_devices.chamber())
+    text = bench_text(*devices).replace(':0"', ':2049"').replace("[turntable]\n", "[turntable]\n" + CERTIFICATE)
+    path = tmp_path / "east.toml"
+    path.write_text(text)
+    description = described(read_bench_file(path), simulated.description)
+
+    class _Units:
+        def unit(self, serial: str) -> Any:
+            raise NotFound("unit", serial)
+
+    class _Driver:
+        def __init__(self) -> None:
+            self.description = description
+            self.mounted = simulated.mounted
+
+    directory = BenchDirectory(None, _Units(), _Driver(), "east", lambda _: None, lambda _: None)  # pyright: ignore[reportArgumentType]
+    planner = Planner(_Units(), directory, Catalogue())  # pyright: ignore[reportArgumentType]
+    plan = planner.plan("calibration_12_orientations", "SIM-0001", {})
+    assert plan.parameters.model_dump()["pointing_sd_arcsec"] == 0.5
+    assert plan.violations[0] == "the certificate AT-117 of the turntable expired after 2020-03-02"
