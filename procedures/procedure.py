@@ -129,6 +129,22 @@ class Evidence:
             found[calibration.triad] = calibration
         return found
 
+    def calibrations_of(self, unit: Unit | None, triads: Sequence[str]) -> tuple[dict[str, TriadCalibration], str]:
+        """The given calibrations by triad, else the unit's current ones, and the basis as a result names it.
+
+        Raises `BadParameter` where one of `triads` has none, and `NoCalibration` as `Unit.calibration`.
+        """
+        if self.calibrations:
+            by_name, basis = self.one_each(), self.calibrations_in_words
+        else:
+            known = {triad: unit.calibration(triad) for triad in triads} if unit else {}
+            by_name = {triad: c for triad, c in known.items() if c is not None}
+            basis = f"the unit's current {unit.calibration_in_words(*triads)}" if unit else ""
+        for triad in triads:
+            if triad not in by_name:
+                raise BadParameter("calibrations", len(self.calibrations), f"the {triad} triad has no calibration")
+        return by_name, basis
+
     @property
     def calibrations_in_words(self) -> str:
         """The given calibrations as a result's basis names them: id and time of each."""

@@ -7,6 +7,9 @@ those of the twelve that made the coefficients; what is shown here is out of sam
 The corrected magnitude of gravity and of the Earth's rate is compared with the site's; the table's angles need not be
 true for that. What should be seen follows from the calibration's covariance, the unit's stability and the noise of the
 dwell.
+
+The residual vectors say more than the magnitudes: which coefficient of which channel moved since the calibration, and
+by how many sigma after all others are fitted (`analysis.calibration.diagnosis`). These do depend on the table.
 """
 
 from collections.abc import AsyncIterator, Sequence
@@ -16,6 +19,7 @@ import numpy as np
 from pydantic import Field
 
 from procedures import steps
+from procedures.analysis.calibration.diagnosis import LIKELY_P_VALUE
 from procedures.analysis.calibration.plan import (
     TriadPlan,
     basis,
@@ -32,6 +36,7 @@ from procedures.analysis.calibration.triad_verification import (
     TriadVerification,
     calibration_of,
     planned_covariance,
+    planned_diagnosis,
     verify_at_reference,
     verify_triad,
 )
@@ -46,7 +51,8 @@ from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
 from procedures.reports import calibration as pictures
-from procedures.site_parameters import Arcsec, SiteParameters, declared_site
+from procedures.reports import diagnosis as diagnoses
+from procedures.site_parameters import TableParameters, declared_table
 
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 Lag = Annotated[float, Field(ge=0.0, le=600.0)]
@@ -69,15 +75,17 @@ class Limits(Parameters):
     prediction_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the errors' chi-square")
 
 
-class Params(SiteParameters):
-    """Orientations of the verification and limits of the unit. None takes the unit's or the bench's value."""
+class Params(TableParameters):
+    """Orientations of the verification and limits of the unit. None takes the unit's or the bench's value.
+
+    The accuracy of table and azimuth concerns the diagnosis alone; the magnitudes do not depend on it.
+    """
 
     orientations: tuple[tuple[Angle, Angle, Angle], ...] = Field(
         ORIENTATIONS, min_length=2, max_length=200, description="(inner, middle, outer) [deg], in order"
     )
     dwell_s: float | None = Field(None, ge=1.0, le=86_400.0, description="None: the unit's averaging time")
     settle_s: float = Field(2.0, ge=0.0, le=3600.0)
-    azimuth_sd_arcsec: Arcsec | None = Field(None, description="kept with the result; no effect on it")
     thermal_correction: Literal["none", "current"] = Field(
         "none", description="current: the unit's thermal correction brings the accelerometers to its reference"
     )
@@ -93,8 +101,8 @@ class Result(Outcome):
 
 
 def resolve(params: Params, context: Context) -> Params:
-    """Dwell from the unit; site from the bench. Refuses a correction that the unit does not have."""
-    full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_site(context)})
+    """Dwell from the unit; site and table from the bench. Refuses a correction that the unit does not have."""
+    full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
     require_correctable(full.thermal_correction, full.dwell_s, context.unit)
     return full
 
@@ -118,10 +126,13 @@ def schedule(params: Params) -> tuple[Station, ...]:
 
 
 def predict(params: Params, context: Context) -> Prediction:
-    """Duration and the standard deviation of the magnitudes to expect. Refuses a unit without a calibration."""
+    """Duration, the standard deviations of the magnitudes and of each coefficient's change since the calibration.
+
+    Raises `NoCalibration`.
+    """
     params = resolve(params, context)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
-    uncertainties = tuple(u for plan in plans for u in _predicted(plan))
+    uncertainties = tuple(u for plan in plans for u in (*_predicted(plan), *_predicted_changes(plan, params, context)))
     duration_s = float(windows(schedule(params), context.bench.axis_motion)[-1, 1])
     rests_on = basis(plans) if uncertainties else ""
     return Prediction(duration_s, uncertainties, _warnings(plans, params.limits), rests_on)
@@ -138,17 +149,18 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     params = resolve(params, context)
     site = params.site(context)
     used = context.unit.thermal_correction if params.thermal_correction == "current" else None
-    doubts, gyro = (), verify_triad(recordings, "gyro", site, context.unit)
+    table = params.table(site)
+    doubts, gyro = (), verify_triad(recordings, "gyro", site, context.unit, table)
     if used is None:
-        accelerometer = verify_triad(recordings, "accelerometer", site, context.unit)
+        accelerometer = verify_triad(recordings, "accelerometer", site, context.unit, table)
     else:
         accelerometer, doubts = verify_at_reference(
-            recordings, site, context.unit, used, (params.case_lag_s, params.converter_lag_s)
+            recordings, site, context.unit, used, (params.case_lag_s, params.converter_lag_s), table
         )
     triads = (gyro, accelerometer)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     checks = tuple(c for t, p in zip(triads, plans, strict=True) for c in _checks(t, params.limits, p))
-    warnings = _warnings(plans, params.limits) + launch_warnings(recordings) + doubts
+    warnings = _warnings(plans, params.limits) + launch_warnings(recordings) + doubts + _moved(triads)
     return Result(checks=checks, verdict=verdict(checks), warnings=warnings, triads=triads)
 
 
@@ -174,7 +186,15 @@ def report(result: Result) -> Report:
     magnitudes = [t.magnitudes for t in result.triads]
     figures = [figure for m in magnitudes for figure in pictures.magnitude_figures(m)]
     table = pictures.magnitude_table(magnitudes, "Verification, out of sample: other orientations and another launch")
-    return Report(sections=(table, *figures, *(pictures.station_table(m) for m in magnitudes)))
+    found = diagnoses.diagnosis_tables([t.diagnosis for t in result.triads if t.diagnosis is not None])
+    said = " ".join(t.diagnosis.sentence if t.diagnosis else t.not_diagnosed for t in result.triads)
+    return Report(said, (table, *found, *figures, *(pictures.station_table(m) for m in magnitudes)))
+
+
+def _moved(triads: Sequence[TriadVerification]) -> tuple[str, ...]:
+    """What the residual vectors show, where they show something; the magnitudes may pass all the same."""
+    found = [t.diagnosis for t in triads if t.diagnosis is not None]
+    return tuple(d.sentence for d in found if d.named or d.p_value_unchanged < LIKELY_P_VALUE)
 
 
 def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
@@ -195,6 +215,17 @@ def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
     return [
         PredictedUncertainty(f"{plan.triad}.sd after correction", unit, spread, spread),
         *(PredictedUncertainty(name, unit, error, error) for name, error in zip(names, errors, strict=True)),
+    ]
+
+
+def _predicted_changes(plan: TriadPlan, params: Params, context: Context) -> list[PredictedUncertainty]:
+    """Standard uncertainty of each change that the plan can tell from all others, from noise and table together."""
+    site = params.site(context)
+    found = planned_diagnosis(plan, site, params.table(site))
+    return [
+        PredictedUncertainty(f"{plan.triad}.change of {c.name}", c.unit, c.standard_uncertainty, c.standard_uncertainty)
+        for c in (() if found is None else found.changes)
+        if c.standard_uncertainty is not None
     ]
 
 
@@ -236,7 +267,7 @@ def _checks(t: TriadVerification, limits: Limits, plan: TriadPlan) -> list[Check
 
 
 PROCEDURE = Procedure(
-    *("verification_9_orientations", "Verification in nine orientations", "1.1.0"),
+    *("verification_9_orientations", "Verification in nine orientations", "1.2.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report),
     uses_calibration=TRIAD_NAMES,
     uses_corrections=lambda params: ("thermal",) if params.thermal_correction == "current" else (),

@@ -22,7 +22,7 @@ from procedures.analysis.navigation.instrument_errors import calibrated_triad
 from procedures.analysis.navigation.knock import AttitudeStep, attitude_step, step_degrees
 from procedures.core import units
 from procedures.core.arrays import Array
-from procedures.core.errors import BadParameter, Undetermined, UnfitRecording
+from procedures.core.errors import Undetermined, UnfitRecording
 from procedures.core.imu_model import TriadCalibration, correct
 from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import ACCELEROMETER, GYRO, RecordingInfo
@@ -92,7 +92,7 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     require_alignable(params.latitude_deg)
     if not evidence.recordings:
         raise UnfitRecording("there is no recording of a resting unit to align")
-    calibrations, basis = _calibrations(evidence, unit)
+    calibrations, basis = evidence.calibrations_of(unit, TRIADS)
     means = {triad: station_means(evidence.recordings, triad) for triad in TRIADS}
     found = [_aligned(i, r.info, means, calibrations, params, unit) for i, r in enumerate(evidence.recordings)]
     steps = [attitude_step(r, calibrations) for r in evidence.recordings]
@@ -117,19 +117,6 @@ def report(result: Result) -> Report:
         for a in result.attitudes
     )
     return Report(result.basis, (Table("Initial alignment", columns, rows, "± one standard uncertainty."),))
-
-
-def _calibrations(evidence: Evidence, unit: Unit | None) -> tuple[dict[str, TriadCalibration], str]:
-    if evidence.calibrations:
-        by_name, basis = evidence.one_each(), evidence.calibrations_in_words
-    else:
-        known = {triad: unit.calibration(triad) for triad in TRIADS} if unit else {}
-        by_name = {triad: c for triad, c in known.items() if c is not None}
-        basis = f"the unit's current {unit.calibration_in_words(*TRIADS)}" if unit else ""
-    for triad in TRIADS:
-        if triad not in by_name:
-            raise BadParameter("calibrations", len(evidence.calibrations), f"the {triad} triad has no calibration")
-    return by_name, basis
 
 
 def _aligned(

@@ -8,6 +8,7 @@ from procedures.analysis.launch.results import PROCESSES, ChannelNoise, Coeffici
 from procedures.analysis.launch.summary import ChannelSummary
 from procedures.core.report import Cell, Figure, Report, Series, Table
 from procedures.core.units import DEVIATION_DISPLAY, HOUR, NOISE_DISPLAY
+from procedures.reports.density import density_figure
 
 TITLES = {
     "quantization": "quantization Q",
@@ -154,7 +155,9 @@ def channel_figures(name: str, launches: Sequence[LaunchNoise]) -> tuple[Figure,
     """Figures of one channel: the Allan plot, its parts, and the signal before removal of trends."""
     channels = _channel_of(name, launches)
     first = channels[0]
-    figures = [allan_figure(channels, [launch.label for launch in launches])]
+    labels = [launch.label for launch in launches]
+    density = density_figure(channels, labels)
+    figures = [allan_figure(channels, labels), *(() if density is None else (density,))]
     split = [s for s in first.stages if "wavelet" in s.name]
     if split:
         title = f"{name}: quantization and the rest apart, {launches[0].label}"

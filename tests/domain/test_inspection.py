@@ -71,6 +71,7 @@ def test_everything_that_takes_recordings_says_how_they_are_inspected() -> None:
     assert recorded == {
         "allan_deviation",
         "field_calibration",
+        "free_inertial",
         "gyro_half_turns",
         "initial_alignment_of_recording",
         "kalman_calibration",

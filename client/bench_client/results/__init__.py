@@ -7,6 +7,7 @@ from bench_client.results.calibration_12_orientations import Calibration12Orient
 from bench_client.results.converter_bench import ConverterBenchResult
 from bench_client.results.error_growth import ErrorGrowthResult
 from bench_client.results.field_calibration import FieldCalibrationResult
+from bench_client.results.free_inertial import FreeInertialResult
 from bench_client.results.gyro_half_turns import GyroHalfTurnsResult
 from bench_client.results.initial_alignment import InitialAlignmentResult
 from bench_client.results.initial_alignment_of_recording import InitialAlignmentOfRecordingResult
@@ -17,6 +18,7 @@ from bench_client.results.no_operation import NoOperationResult
 from bench_client.results.noise_analysis import NoiseAnalysisResult
 from bench_client.results.part import OtherResult, ResultHead
 from bench_client.results.plan_orientations import PlanOrientationsResult
+from bench_client.results.polarity_check import PolarityCheckResult
 from bench_client.results.run_to_run import RunToRunResult
 from bench_client.results.scalar_calibration import ScalarCalibrationResult
 from bench_client.results.scale_factor_whole_turns import ScaleFactorWholeTurnsResult
@@ -31,6 +33,7 @@ Result = (
     | InitialAlignmentResult
     | MultiPositionCalibrationResult
     | NoOperationResult
+    | PolarityCheckResult
     | ScaleFactorWholeTurnsResult
     | StaticRunResult
     | TableProgramResult
@@ -39,6 +42,7 @@ Result = (
     | AllanDeviationResult
     | ErrorGrowthResult
     | FieldCalibrationResult
+    | FreeInertialResult
     | GyroHalfTurnsResult
     | InitialAlignmentOfRecordingResult
     | KalmanCalibrationResult
@@ -56,6 +60,7 @@ CLASSES: dict[str, type[ResultHead]] = {
     "initial_alignment": InitialAlignmentResult,
     "multi_position_calibration": MultiPositionCalibrationResult,
     "no_operation": NoOperationResult,
+    "polarity_check": PolarityCheckResult,
     "scale_factor_whole_turns": ScaleFactorWholeTurnsResult,
     "static_run": StaticRunResult,
     "table_program": TableProgramResult,
@@ -64,6 +69,7 @@ CLASSES: dict[str, type[ResultHead]] = {
     "allan_deviation": AllanDeviationResult,
     "error_growth": ErrorGrowthResult,
     "field_calibration": FieldCalibrationResult,
+    "free_inertial": FreeInertialResult,
     "gyro_half_turns": GyroHalfTurnsResult,
     "initial_alignment_of_recording": InitialAlignmentOfRecordingResult,
     "kalman_calibration": KalmanCalibrationResult,

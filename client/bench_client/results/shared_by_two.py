@@ -193,6 +193,20 @@ class LevelShift(Part):
     standard_uncertainty: float
 
 
+class Density(Part):
+    """One-sided power spectral density ``S(f) = 2·P(f)·Δt`` [rate²/Hz]; all lists run parallel to `frequency_hz`.
+
+    P is the mean power of a bin's modes and Δt the sampling period, so white noise of N [rate·√s] has 2N². Slow
+    bins come from the cells of the whole record, fast ones from its segments; lines that were taken out are not
+    in it.
+    """
+
+    frequency_hz: tuple[float, ...]
+    density: tuple[float, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+
 class ChannelNoise(Part):
     """All results of one channel in one launch."""
 
@@ -219,6 +233,7 @@ class ChannelNoise(Part):
     flicker_corner_s: float | None = None
     temperature: TemperatureSlope | None = None
     shift: LevelShift | None = None
+    density: Density | None = None
 
 
 class LaunchNoise(Part):

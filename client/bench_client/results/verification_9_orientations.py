@@ -6,6 +6,38 @@ from bench_client.results.part import Part, ResultHead
 from bench_client.results.shared import Check, Magnitudes, Verdict
 
 
+class Change(Part):
+    """Change of one coefficient, or of a group that the stations cannot tell apart, after all others are fitted."""
+
+    coefficients: tuple[str, ...]
+    unit: str
+    change: float | None
+    standard_uncertainty: float | None
+    sigmas: float
+    smallest_named: float | None
+    p_value_alone: float
+
+
+class Movement(Part):
+    """Explanation outside the triad: a turn between unit and table, or of the table's zero."""
+
+    what: str
+    arcsec: tuple[float, ...]
+    p_value: float
+
+
+class TriadDiagnosis(Part):
+    """Scored changes of a triad, the largest first, and what the residuals say as a whole; JSON-ready."""
+
+    triad: str
+    changes: tuple[Change, ...]
+    movements: tuple[Movement, ...]
+    threshold_sigmas: float
+    p_value_unchanged: float
+    p_value_refitted: float | None
+    sentence: str
+
+
 class TriadVerification(Part):
     """Verification result of one triad, JSON-ready."""
 
@@ -13,6 +45,8 @@ class TriadVerification(Part):
     chi_square: float | None
     p_value: float | None
     run_to_run_known: bool
+    diagnosis: TriadDiagnosis | None = None
+    not_diagnosed: str = ""
 
 
 class Verification9OrientationsDocument(Part):

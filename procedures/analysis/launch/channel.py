@@ -90,6 +90,7 @@ def channel_noise(
         flicker_corner_s=likelihood.flicker_corner_s,
         temperature=found.temperature,
         shift=found.shift,
+        density=found.density,
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from procedures.analysis.cells import Cells
 from procedures.analysis.launch.context import ChannelContext, most_followed
+from procedures.analysis.launch.density import Density, density_of
 from procedures.analysis.launch.results import CorrelatedProcess, LevelShift, TemperatureSlope
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.signal import CleanSignal
@@ -32,6 +33,7 @@ class FoundNoise:
     coarse: str
     temperature: TemperatureSlope | None
     shift: LevelShift | None
+    density: Density
 
     @property
     def correlated(self) -> CorrelatedProcess | None:
@@ -98,8 +100,9 @@ def found_noise(
     if at is not None:
         rows.append(np.where(np.arange(len(series)) >= at, 1.0, 0.0) - (len(series) - at) / len(series))
         candidates.append(Candidate(SHIFT_LEVEL / len(series), SHIFT_GAIN + log(len(series))))
+    slow = slow_powers(series, cell_s, regressors=np.array(rows) if rows else None)
     fit = fit_noise(
-        slow_powers(series, cell_s, regressors=np.array(rows) if rows else None),
+        slow,
         powers,
         level=settings.level,
         confidence=settings.confidence,
@@ -113,4 +116,4 @@ def found_noise(
         elif at is not None:
             begin = cells.since_launch_s + (signal.first_cell + at) * cell_s
             shift = LevelShift(begin, f.slope, f.standard_uncertainty)
-    return FoundNoise(fit, context.coarse, temperature, shift)
+    return FoundNoise(fit, context.coarse, temperature, shift, density_of(slow, powers, settings.confidence))

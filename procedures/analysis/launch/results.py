@@ -5,6 +5,8 @@
 
 from dataclasses import dataclass
 
+from procedures.analysis.launch.density import Density
+
 PROCESSES = ("quantization", "random_walk", "bias_instability", "rate_random_walk", "rate_ramp")
 """Q [rate·s], N [rate·√s], B [rate], K [rate/√s], R [rate/s]: the attributes of `NoiseCoefficients`."""
 
@@ -212,6 +214,8 @@ class ChannelNoise:
     """Shortest relaxation time of the flicker, where it is not the one of the noise model."""
     temperature: TemperatureSlope | None = None
     shift: LevelShift | None = None
+    density: Density | None = None
+    """Power spectral density of what the coefficients refer to; None in results of earlier versions."""
 
     def coefficient(self, process: str) -> Coefficient:
         """The coefficient of one of the five processes."""
