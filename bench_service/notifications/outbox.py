@@ -1,11 +1,11 @@
 """Messages that wait for one target: one file each, so that none is lost with the process, in the order they came."""
 
-import json
 import logging
 import os
-from dataclasses import asdict
 from datetime import datetime, timedelta
 from pathlib import Path
+
+from pydantic import TypeAdapter
 
 from bench_service.notifications.channels import Undelivered, deliver
 from bench_service.notifications.messages import Message, digest
@@ -22,6 +22,7 @@ REMEMBERED = 2000
 MOST_FILES = 1000
 """Maximum number of waiting messages; further ones are logged and left out."""
 
+_MESSAGE = TypeAdapter(Message)
 log = logging.getLogger(__name__)
 
 
@@ -50,7 +51,7 @@ class Outbox:
             log.error("%s has %d messages waiting: left out: %s", self.target.name, MOST_FILES, message.title)
             return
         part = file.with_suffix(".part")
-        part.write_text(json.dumps({**asdict(message), "at": message.at.isoformat()}), encoding="utf-8")
+        part.write_bytes(_MESSAGE.dump_json(message))
         os.replace(part, file)
         self._kept.append(message.key)
         with self._book.open("a", encoding="utf-8") as book:
@@ -77,9 +78,8 @@ class Outbox:
 
     def _read(self, file: Path) -> Message | None:
         try:
-            found = json.loads(file.read_text(encoding="utf-8"))
-            return Message(**{**found, "at": datetime.fromisoformat(found["at"])})
-        except (ValueError, TypeError, KeyError) as error:
+            return _MESSAGE.validate_json(file.read_bytes())
+        except ValueError as error:
             log.error("a waiting message cannot be read and is left out (%s): %s", file, error)
             return None
 

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from fastapi import Request
+from starlette.types import Receive, Scope, Send
 
 if TYPE_CHECKING:
     import httpx
@@ -10,6 +11,8 @@ if TYPE_CHECKING:
 KEPT = ("host", "origin", "referer", "sec-fetch-site", "sec-fetch-mode", "sec-fetch-dest", "cookie", "authorization")
 """Headers of the person's own request by which the API decides who asks, and from where."""
 PATIENCE_S = 20.0
+SENDER = "bench.access"
+"""Key of a request's scope under which the API keeps what it knows of the sender; no client can set it."""
 
 
 async def ask(request: Request, method: str, path: str, document: dict[str, Any] | None = None) -> "httpx.Response":
@@ -18,7 +21,13 @@ async def ask(request: Request, method: str, path: str, document: dict[str, Any]
 
     headers = {name: value for name in KEPT if (value := request.headers.get(name)) is not None}
     client = (request.client.host, request.client.port) if request.client else ("127.0.0.1", 0)
-    transport = httpx.ASGITransport(app=request.app, client=client)
+
+    async def as_the_same_sender(scope: Scope, receive: Receive, send: Send) -> None:
+        if SENDER in request.scope:  # what is known of the person already, also by a proxy's header
+            scope[SENDER] = request.scope[SENDER]
+        await request.app(scope, receive, send)
+
+    transport = httpx.ASGITransport(app=as_the_same_sender, client=client)
     base = f"{request.url.scheme}://{request.headers.get('host', 'localhost')}"
     async with httpx.AsyncClient(transport=transport, base_url=base, timeout=PATIENCE_S) as http:
         return await http.request(method, path, json=document, headers=headers)

@@ -40,6 +40,8 @@ def released(service: BenchProcess, stop: str) -> bool:
 
 
 def release_all(service: BenchProcess) -> None:
+    """Release what stands; a stop from a page is answered before the database has it, so it is waited for."""
+    until(lambda: bool(service.client.get("/api/v1/benches/sim").json()["stops"]))
     for stop in service.client.get("/api/v1/benches/sim").json()["stops"]:
         until(lambda stop_id=stop["id"]: released(service, stop_id))
 

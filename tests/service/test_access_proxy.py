@@ -46,6 +46,15 @@ def test_a_change_repeats_the_value_of_its_page(home: House) -> None:
     assert olga.post("/api/v1/jobs", json=JOB, headers={CSRF: csrf}).json()["type"] == "/problems/CsrfToken"
 
 
+def test_the_proxys_person_stops_from_a_page_without_scripts(home: House) -> None:
+    http = home.client(**{HEADER: "olga@lab.example", "X-Forwarded-For": "192.0.2.7"})
+    assert http.post("/benches/sim/stop", data={"reason": "by form"}).status_code == 200
+    newest = home.owner.get("/api/v1/benches/sim/stops").json()["items"][0]
+    assert (newest["reason"], newest["by"]) == ("by form", "olga@lab.example")
+    nobody = home.client(**{"X-Forwarded-For": "192.0.2.7"})
+    assert nobody.post("/benches/sim/stop", data={"reason": "by nobody"}).status_code == 401
+
+
 def test_from_any_other_address_the_header_is_refused(home: House) -> None:
     with from_elsewhere(home, **{HEADER: "ada"}) as http:
         answer = http.get("/api/v1/jobs")

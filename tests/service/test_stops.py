@@ -139,17 +139,14 @@ def test_a_bench_that_is_not_safe_is_not_released(client: Client, monkeypatch: p
     assert release(client, stop, by="Bo", remark="looked").status_code == 200
 
 
-def test_the_first_page_has_a_form_for_each_stop(client: Client) -> None:
+def test_the_first_page_says_who_stopped_it_and_why_also_without_scripts(client: Client) -> None:
     stops = [stopped(client, "<b>smoke</b>", "Ada & Co"), stopped(client, "I reach into it", "Bo")]
     home = page(client, "/")
-    actions = [value for name, value in home.attributes if name == "action"]
-    assert [f"{BENCH}/stops/{stop}/release" for stop in stops] == actions[:2]
-    assert f"{BENCH}/stop" in actions
-    names = [value for name, value in home.attributes if name == "name"]
-    assert names.count("remark") == 2
-    assert names.count("by") == 3
-    assert "by Ada & Co: <b>smoke</b>" in " ".join(home.words.split())
-    assert home.tags.count("output") == 3, "where a refusal is shown"
+    assert ("action", "/benches/sim/stop") in home.attributes
+    words = " ".join(home.words.split())
+    assert "by Ada & Co: <b>smoke</b>" in words
+    assert "by Bo: I reach into it" in words
+    assert all(stop in words for stop in stops)
     release(client, stops[0], by="Cy", remark="the <i>fan</i>")
     history = page(client, "/benches/sim/stops")
     assert "the <i>fan</i>" in history.words

@@ -184,7 +184,8 @@ class Identified:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":
-            scope[FOUND] = found = await self._found(scope)
+            found = scope.get(FOUND) or await self._found(scope)  # there already, where a page asks for its reader
+            scope[FOUND] = found
             scope.setdefault("state", {})["identity"] = found.identity  # for pages, as `request.state.identity`
         await self._app(scope, receive, send)
 
