@@ -9,7 +9,7 @@ BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
 
 .DEFAULT_GOAL := help
-.PHONY: help run test browser clients bench chaos soak format check validate rights lock audit images clean foreign
+.PHONY: newest-form help run test browser clients bench chaos soak format check validate rights lock audit images clean foreign
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -77,6 +77,9 @@ clients: $(VENV)/.ready  ## lint the OpenAPI document, generate clients from it,
 rights: $(VENV)/.ready  ## write docs/rights.md anew, from the routes and their rights
 	@$(BIN)/python -m tests.kit.rights_page
 
+
+newest-form: $(VENV)/.ready  ## write migrations/newest_form.sql anew, after a new migration
+	@$(BIN)/python -m tests.kit.newest_form
 
 foreign: $(addprefix .foreign/,$(addsuffix /.ready,$(FOREIGN)))  ## environments of the programs by others that the tests talk to
 

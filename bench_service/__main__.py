@@ -10,8 +10,11 @@ def main() -> None:
         from bench_service.cli.processes.stopping import stop_command
 
         sys.exit(stop_command(sys.argv[2:], os.environ))
-    from bench_service.cli.commands import run_command_line
-    from bench_service.settings import BadSettings, Settings
+    from bench_service.collector import no_collection
+
+    with no_collection():
+        from bench_service.cli.commands import run_command_line
+        from bench_service.settings import BadSettings, Settings
 
     try:
         settings = Settings.from_environ(os.environ)

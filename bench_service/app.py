@@ -46,6 +46,7 @@ from bench_service.bench.stop.elsewhere import StopAddresses
 from bench_service.bench.stop.road import StopRoads
 from bench_service.bench_files import BenchFiles
 from bench_service.campaigns.stores import Stores
+from bench_service.collector import no_collection
 from bench_service.drivers.composition import devices_of, driver_of, own_devices
 from bench_service.drivers.simulated import drawn_unit
 from bench_service.evidence.catalogue import Catalogue
@@ -214,7 +215,8 @@ def _devices(settings: Settings, bench_id: str) -> BenchDevices:
 
 def _engine(settings: Settings, runner: JobRunner) -> JobEngine:
     """Make the job engine, imported here because that takes as long as the rest of the service."""
-    from bench_service.jobs.engine import Engine
+    with no_collection():
+        from bench_service.jobs.engine import Engine
 
     books = engine_database(settings.database_url, settings.bench_id)
     return Engine(*books, settings.bench_id, runner, as_storage_error)

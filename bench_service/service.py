@@ -104,10 +104,10 @@ class BenchService:
     def begin(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
         """Begin to work while the service already answers. The bench's lease must be held.
 
-        `warm_up` is called once the engine runs and the numerics are loaded.
+        `warm_up` is called while no job runs, once the engine runs and the numerics are loaded.
         """
         if self._worker is not None:
-            self._worker.begin([lambda: (self.catalogue.procedures, self.catalogue.methods), *warm_up])
+            self._worker.begin([lambda: self.catalogue.procedures, lambda: self.catalogue.methods, *warm_up])
             self.campaigns.conductor.begin()
             self._nightly.begin()
 

@@ -23,13 +23,19 @@ class Discovered(Generic[E]):
         return self.entries
 
 
-def discovered(package: str, path: Sequence[str], attribute: str, kind: type[E]) -> Discovered[E]:
+def discovered(
+    package: str, path: Sequence[str], attribute: str, kind: type[E], only: str | None = None
+) -> Discovered[E]:
     """Import every module of a package for the entry that it holds under `attribute`, an instance of `kind`.
+
+    `only`: the name of the one module to import; None: all of them. Where there is no such module nothing is found.
 
     A file is broken where its import fails, where it holds no such entry, or where that has another name than the file.
     """
     found: Discovered[E] = Discovered()
     for module in iter_modules(path):
+        if only is not None and module.name != only:
+            continue
         place = f"{package}.{module.name}"
         try:
             entry = getattr(import_module(place), attribute, None)

@@ -2,12 +2,13 @@
 
 from functools import cache
 from threading import BoundedSemaphore
-
-from argon2 import PasswordHasher
-from argon2.exceptions import InvalidHashError, VerificationError
+from typing import TYPE_CHECKING
 
 from bench_service.model.errors import Overloaded
 from procedures.core.errors import BadParameter
+
+if TYPE_CHECKING:
+    from argon2 import PasswordHasher
 
 SHORTEST, LONGEST = 10, 200
 """Allowed lengths [characters]. No rule about kinds of characters: length is what keeps a guess out (NIST 800-63B)."""
@@ -35,6 +36,8 @@ def hashed(password: str) -> str:
 
 def matches(password: str, stored: str | None) -> bool:
     """Return whether a password is the one of a hash; without a hash it takes as long, and is none."""
+    from argon2.exceptions import InvalidHashError, VerificationError
+
     with _Turn():
         try:
             return _hasher().verify(stored or _nobody(), password) and stored is not None
@@ -54,7 +57,9 @@ class _Turn:
 
 
 @cache
-def _hasher() -> PasswordHasher:
+def _hasher() -> "PasswordHasher":
+    from argon2 import PasswordHasher  # loaded by the first log-in
+
     return PasswordHasher()
 
 

@@ -18,7 +18,7 @@ from bench_service.evidence.admission import Places
 from bench_service.evidence.recordings import require_undamaged
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.export import ExportFormat, Extract, export, export_bytes, extract
-from bench_service.formats.import_file import ImportFile
+from bench_service.formats.import_request import ImportFile
 from bench_service.formats.overview import overview
 from bench_service.formats.plain_json import shown
 from bench_service.formats.proposal.model import Proposal

@@ -1,9 +1,12 @@
-"""The catalogue of procedures and methods, read at its first use, because that imports all of the numerics."""
+"""The catalogue of procedures and methods. A file is imported when its entry is asked for, all of them for a list.
+
+All of them import the whole of the numerics, which takes most of a second; a single one has what it needs alone.
+"""
 
 import logging
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from bench_service.model.errors import NotFound
 from bench_service.model.records import StoredResult
@@ -24,28 +27,26 @@ class Catalogue:
 
     def __init__(self) -> None:
         self._left_out: dict[tuple[str, str], str] = {}
+        self._alone: dict[tuple[str, str], Any] = {}
+        """Entries that were read by their names, before or beside all the others."""
 
     @cached_property
     def procedures(self) -> Mapping[str, AnyProcedure]:
         """Every procedure by name, read when it is first wanted."""
-        return self._read("procedure", "procedures/catalog", catalog.find())
+        return self._read("procedure", catalog.find())
 
     @cached_property
     def methods(self) -> Mapping[str, AnyMethod]:
         """Every method by name, read when it is first wanted."""
-        return self._read("method", "procedures/methods", methods.find())
+        return self._read("method", methods.find())
 
     def procedure(self, name: str) -> AnyProcedure:
         """Return a procedure by name. Raises `NotFound`, with the reason where its file is broken."""
-        if name not in self.procedures:
-            raise NotFound("procedure", name, self._left_out.get(("procedure", name), ""))
-        return self.procedures[name]
+        return self._required("procedure", name)
 
     def method(self, name: str) -> AnyMethod:
         """Return a method by name. Raises `NotFound`, with the reason where its file is broken."""
-        if name not in self.methods:
-            raise NotFound("method", name, self._left_out.get(("method", name), ""))
-        return self.methods[name]
+        return self._required("method", name)
 
     def notes(self) -> tuple[str, ...]:
         """A sentence for each file that was left out so far."""
@@ -53,13 +54,27 @@ class Catalogue:
 
     def report(self, result: StoredResult) -> Report:
         """Lay out a stored result for a person: tables and figures."""
-        entry = (self.procedures if result.kind == "procedure" else self.methods).get(result.name)
-        if entry is None:
+        try:
+            entry = self._required(result.kind, result.name)
+        except NotFound:
             return Report(f"{result.name} is no longer in the catalogue; the document below is as it was stored.")
         return entry.report(entry.result.model_validate(result.document))
 
-    def _read(self, kind: str, folder: str, found: Discovered[E]) -> Mapping[str, E]:
+    def _required(self, kind: str, name: str) -> Any:
+        """Return the entry of a name, from its own file alone. Raises `NotFound`."""
+        if (kind, name) not in self._alone and (kind, name) not in self._left_out:
+            find = catalog.find if kind == "procedure" else methods.find
+            for found, entry in self._read(kind, find(name)).items():
+                self._alone[kind, found] = entry
+        if (kind, name) not in self._alone:
+            raise NotFound(kind, name, self._left_out.get((kind, name), ""))
+        return self._alone[kind, name]
+
+    def _read(self, kind: str, found: Discovered[E]) -> Mapping[str, E]:
+        folder = "procedures/catalog" if kind == "procedure" else "procedures/methods"
         for name, error in found.broken.items():
+            if (kind, name) in self._left_out:
+                continue
             sentence = f"{folder}/{name}.py is left out: {described(error)}"
             self._left_out[kind, name] = sentence
             log.error("%s", sentence)

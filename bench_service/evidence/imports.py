@@ -7,7 +7,7 @@ from datetime import timedelta
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.evidence.units import register
 from bench_service.formats.description import ImportDescription
-from bench_service.formats.import_file import Imported, ImportFile
+from bench_service.formats.import_request import Imported, ImportFile
 from bench_service.formats.proposal.model import Proposal
 from bench_service.formats.reader.client import FileReader, NoReader, NoRoom
 from bench_service.model.errors import NotReady, StorageFull

@@ -8,43 +8,21 @@ marked was asked for.
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, BinaryIO, Protocol
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from bench_service.formats.bounds import Bounds
 from bench_service.formats.clock.judgement import ClockFindings
 from bench_service.formats.description import ImportDescription
-from bench_service.formats.joined_files import ImportFile, Opened, in_order, joined, opened_files, surveyed
+from bench_service.formats.import_request import ImportFile
+from bench_service.formats.joined_files import Opened, in_order, joined, opened_files, surveyed
 from bench_service.formats.own_export import own_export
 from bench_service.formats.rebuild import Rebuild
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.recording import Channel, RawArray
 
 _NO_ROWS = np.empty(0, np.int64)
-
-
-class Imported(Protocol):
-    """Files that were checked and fit together, whichever process reads them."""
-
-    @property
-    def description(self) -> ImportDescription: ...
-    @property
-    def channels(self) -> tuple[Channel, ...]: ...
-    @property
-    def rate_hz(self) -> float: ...
-    @property
-    def count(self) -> int: ...
-    @property
-    def dtype(self) -> type[np.int32] | type[np.float64]: ...
-    @property
-    def source(self) -> dict[str, Any]:
-        """File names, their SHA-256, the description, the findings: to be kept with the recording."""
-        ...
-
-    def blocks(self) -> Iterator[RawArray]:
-        """The samples in order, each block (n, channels)."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
-from typing import BinaryIO
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,19 +12,12 @@ from bench_service.formats.columnar import columnar_columns, is_columnar
 from bench_service.formats.delimited import text_columns
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.errors import UnreadableFile
+from bench_service.formats.import_request import ImportFile
 from bench_service.formats.logs.columns import log_columns
 from bench_service.formats.logs.registry import opened_log
 from bench_service.formats.logs.table import Log
 from bench_service.formats.survey import Findings, Survey
 from procedures.core.arrays import Array
-
-
-@dataclass(frozen=True)
-class ImportFile:
-    """A file to import: its name for messages, and a stream that can be read repeatedly from the beginning."""
-
-    name: str
-    stream: BinaryIO = field(repr=False)
 
 
 @dataclass(frozen=True)

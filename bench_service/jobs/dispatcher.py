@@ -26,7 +26,7 @@ from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.stores import JobStores
 from bench_service.model.errors import NotFound, NotUnderstood, ServiceError
 from bench_service.model.job import Failure, Job
-from bench_service.wall_clock import now
+from bench_service.wall_clock import monotonic_s, now
 
 RETRY_S = 0.5
 """Time that the dispatcher waits after a failure of the database or the engine [s]."""
@@ -91,6 +91,8 @@ class Dispatcher:
         self._wake = Event()
         self._ending = Event()
         self._told: tuple[str, str] | None = None
+        self._running = False
+        self._worked_s = monotonic_s()
         self._thread = Thread(target=self._run, name=f"dispatcher {bench_id}", daemon=True)
 
     def begin(self) -> None:
@@ -100,6 +102,10 @@ class Dispatcher:
     def wake(self) -> None:
         """Look at the bench's queue now."""
         self._wake.set()
+
+    def resting_s(self) -> float:
+        """Time since a job ran here, or since this began [s]; 0 while one runs."""
+        return 0.0 if self._running else monotonic_s() - self._worked_s
 
     def lease_held(self) -> bool:
         """Return whether this process holds the bench's lease now."""
@@ -144,7 +150,12 @@ class Dispatcher:
             return True
         if job is None:
             return False
-        self._engine.run(job)
+        self._running = True
+        try:
+            self._engine.run(job)
+        finally:
+            self._worked_s = monotonic_s()
+            self._running = False
         return True
 
     def _settle(self) -> None:

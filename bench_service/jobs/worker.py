@@ -16,6 +16,10 @@ from bench_service.model.job import Job
 
 START_S = 60.0
 """Time that the engine may take to start [s]; loaded from a slow disk by a busy machine it takes ten."""
+REST_S = 1.0
+"""Time without a job after which work that can wait is done [s]: it would hold the interpreter against a job."""
+LOOK_S = 0.1
+"""Interval between checks whether a job runs, while such work waits [s]."""
 LEAVE_S = 10.0
 """Time that a service that ends waits for an engine that is still starting [s]."""
 
@@ -28,6 +32,8 @@ class JobDispatcher(Protocol):
     def begin(self) -> None: ...
 
     def wake(self) -> None: ...
+
+    def resting_s(self) -> float: ...
 
     def lease_held(self) -> bool: ...
 
@@ -50,6 +56,7 @@ class Worker:
         self._dispatcher: JobDispatcher | None = None
         self._failure: str | None = None
         self._begun = Event()
+        self._ending = Event()
         self._deciding = Lock()
         self._thread: Thread | None = None
         self._at_failure: Callable[[], object] = lambda: None
@@ -59,7 +66,10 @@ class Worker:
         self._at_failure = then
 
     def begin(self, then: Sequence[Callable[[], object]]) -> None:
-        """Load and launch the engine in a thread of its own, then run the work that can wait."""
+        """Load and launch the engine in a thread of its own, then run the work that can wait.
+
+        Each piece of that work begins when no job has run for `REST_S`.
+        """
         self._thread = Thread(target=self._begin, args=(then,), name="worker", daemon=True)
         self._thread.start()
         Thread(target=self._give_up, name="worker's patience", daemon=True).start()
@@ -98,6 +108,7 @@ class Worker:
         """Stop the bench's worker. The running job is left for the next start; the bench is made safe first."""
         if self._thread is None:
             return
+        self._ending.set()
         self._runner.shut_down()
         if not self._begun.wait(LEAVE_S):
             self._fail("the service ended before its job engine had started")
@@ -125,6 +136,9 @@ class Worker:
             engine.shut_down()
             return
         for work in then:
+            while dispatcher.resting_s() < REST_S:
+                if self._ending.wait(LOOK_S):
+                    return
             work()
 
     def _give_up(self) -> None:

@@ -8,8 +8,6 @@ import ssl
 from email.message import EmailMessage
 from email.utils import format_datetime, make_msgid
 
-import httpx
-
 from bench_service.notifications.messages import Message
 from bench_service.notifications.targets import Mail, Webhook, secret
 
@@ -62,6 +60,8 @@ def _permanent(error: smtplib.SMTPRecipientsRefused) -> bool:
 
 
 def _post(target: Webhook, message: Message, pages: str) -> None:
+    import httpx  # a server that starts needs no client
+
     document = {
         "key": message.key,
         "kind": message.kind,

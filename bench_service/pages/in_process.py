@@ -1,10 +1,12 @@
 """The pages' way to the public API where no script runs: the application asks itself, as the person who asked it."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import httpx
 from fastapi import Request
 from starlette.types import Receive, Scope, Send
+
+if TYPE_CHECKING:
+    import httpx
 
 KEPT = ("host", "origin", "referer", "sec-fetch-site", "sec-fetch-mode", "sec-fetch-dest", "cookie", "authorization")
 """Headers of the person's own request by which the API decides who asks, and from where."""
@@ -13,8 +15,10 @@ SENDER = "bench.access"
 """Key of a request's scope under which the API keeps what it knows of the sender; no client can set it."""
 
 
-async def ask(request: Request, method: str, path: str, document: dict[str, Any] | None = None) -> httpx.Response:
+async def ask(request: Request, method: str, path: str, document: dict[str, Any] | None = None) -> "httpx.Response":
     """Send a request to this service's own API with the person's own headers; the answer is the API's."""
+    import httpx  # at run time where it is used: a server that starts needs no client
+
     headers = {name: value for name in KEPT if (value := request.headers.get(name)) is not None}
     client = (request.client.host, request.client.port) if request.client else ("127.0.0.1", 0)
 

@@ -14,6 +14,7 @@ from sqlalchemy import Connection, inspect, text
 from bench_service.model.errors import StorageFailure
 from bench_service.persistence.database import Database, storage_errors
 from bench_service.persistence.upkeep.early_forms import mend
+from bench_service.persistence.upkeep.newest_form import put_newest_form
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "migrations"
 _LOCK = 0x62656E63  # "benc": the advisory lock of those who migrate
@@ -38,10 +39,17 @@ def upgrade_to_head(database: Database, keep: Callable[[str, str], object] = lam
         _check_known(revision)
         if revision is not None:
             keep(revision, newest_revision())
+        if revision is None and _is_empty(connection) and put_newest_form(connection, newest_revision()):
+            return
         mended = mend(connection, revision)
         if mended:
             log.warning("the database had an early form of revision %s; added: %s", revision, ", ".join(mended))
         upgrade(connection, "head")
+
+
+def _is_empty(connection: Connection) -> bool:
+    """Return whether this is an SQLite database without any table."""
+    return connection.dialect.name == "sqlite" and not inspect(connection).get_table_names()
 
 
 def newest_revision() -> str:

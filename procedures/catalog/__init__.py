@@ -6,9 +6,9 @@ from procedures.discovery import Discovered, discovered
 from procedures.procedure import Procedure
 
 
-def find() -> Discovered[Procedure[Any, Any]]:
-    """Every PROCEDURE of this folder by name, and the files that give none, with the reason."""
-    return discovered(__name__, __path__, "PROCEDURE", Procedure)
+def find(only: str | None = None) -> Discovered[Procedure[Any, Any]]:
+    """Every PROCEDURE of this folder by name, or one alone, and the files that give none, with the reason."""
+    return discovered(__name__, __path__, "PROCEDURE", Procedure, only)
 
 
 def discover() -> dict[str, Procedure[Any, Any]]:

@@ -6,9 +6,9 @@ from procedures.discovery import Discovered, discovered
 from procedures.procedure import Method
 
 
-def find() -> Discovered[Method[Any, Any]]:
-    """Every METHOD of this folder by name, and the files that give none, with the reason."""
-    return discovered(__name__, __path__, "METHOD", Method)
+def find(only: str | None = None) -> Discovered[Method[Any, Any]]:
+    """Every METHOD of this folder by name, or one alone, and the files that give none, with the reason."""
+    return discovered(__name__, __path__, "METHOD", Method, only)
 
 
 def discover() -> dict[str, Method[Any, Any]]:

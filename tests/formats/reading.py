@@ -7,7 +7,7 @@ import numpy as np
 
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.import_file import ImportedRecording, read_import
-from bench_service.formats.joined_files import ImportFile
+from bench_service.formats.import_request import ImportFile
 from bench_service.formats.proposal.model import Proposal
 from bench_service.formats.proposal.propose import propose
 from procedures.core.recording import ACCELEROMETER, GYRO

@@ -10,7 +10,7 @@ from rosbags.rosbag2 import StoragePlugin
 
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.joined_files import ImportFile
+from bench_service.formats.import_request import ImportFile
 from bench_service.formats.reader.client import FileReader
 from procedures.core.errors import BadParameter
 from tests.formats import frame_files

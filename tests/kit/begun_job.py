@@ -40,6 +40,9 @@ class IdleDispatcher:
 
     def wake(self) -> None: ...
 
+    def resting_s(self) -> float:
+        return 60.0
+
     def lease_held(self) -> bool:
         return True
 

@@ -134,8 +134,8 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Generator[Client]:
         (folder / f"{name}.py").write_text(text)
     find = catalog.find
 
-    def found():
-        every = find()
+    def found(only: str | None = None):
+        every = find(only)
         every.entries.update({name: replace(procedure, name=name) for name, procedure in DEFECTIVE.items()})
         every.broken.update(discovered("broken_catalogue", [str(folder)], "PROCEDURE", Procedure).broken)
         return every

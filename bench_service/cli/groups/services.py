@@ -7,6 +7,7 @@ import typer
 
 from bench_service.cli.asking.client import answer, connect
 from bench_service.cli.options import BenchFile, Server, announce, console, of_bench
+from bench_service.collector import no_collection
 from bench_service.settings import Settings
 
 
@@ -18,8 +19,9 @@ def serve(
     bench_file: BenchFile = None,
 ) -> None:
     """Serve the API and the pages, and run jobs on the bench, until interrupted."""
-    from bench_service.cli.processes.companion import accompanied
-    from bench_service.cli.processes.serving import check_port, ready
+    with no_collection():
+        from bench_service.cli.processes.companion import accompanied
+        from bench_service.cli.processes.serving import check_port, ready
 
     settings = of_bench(_with(context.obj, host=host, port=port), None, bench_file)
     check_port(settings)

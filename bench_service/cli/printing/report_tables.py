@@ -7,7 +7,7 @@ from pydantic import ValidationError
 from rich.markup import escape
 from rich.table import Table as ScreenTable
 
-from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.catalogue import AnyMethod, AnyProcedure, Catalogue
 from bench_service.model.errors import NotFound
 from procedures.core.report import Cell, Table
 
@@ -22,13 +22,21 @@ def report_tables(name: str, document: dict[str, Any]) -> Iterator[ScreenTable]:
     """
     catalogue = Catalogue()
     try:
-        entry = catalogue.procedures.get(name) or catalogue.method(name)
+        entry = _entry(catalogue, name)
         report = entry.report(entry.result.model_validate(document))
     except (NotFound, ValidationError):
         return
     for section in report.sections:
         if isinstance(section, Table):
             yield _shown(section)
+
+
+def _entry(catalogue: Catalogue, name: str) -> AnyProcedure | AnyMethod:
+    """Look a name up among the procedures, then among the methods. Raises `NotFound`."""
+    try:
+        return catalogue.procedure(name)
+    except NotFound:
+        return catalogue.method(name)
 
 
 def _shown(table: Table) -> ScreenTable:

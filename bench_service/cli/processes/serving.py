@@ -18,6 +18,7 @@ from bench_service.cli.processes.connections import AT_ONCE, BoundedConnections,
 from bench_service.cli.processes.logs import set_up
 from bench_service.cli.processes.private_files import protect
 from bench_service.cli.refusal import Refused
+from bench_service.collector import no_collection
 from bench_service.persistence.access.peek import has_credentials
 from bench_service.service import BenchService
 from bench_service.settings import Settings
@@ -71,28 +72,35 @@ def _opened(
         check_address(settings)
     rules = Door.of(settings) if socket_file is None else Door.of(settings, EMBEDDED)
     with ExitStack() as closing:
-        service = open_service(settings, closing, drive, apart=socket_file is None)
-        proxies = Proxies.of(settings)
-        config = uvicorn.Config(
-            create_app(service, int(settings.max_import_mb * 1e6), closing.close, rules, proxies),
-            settings.host,
-            settings.port,
-            uds=None if socket_file is None else str(socket_file),
-            log_config=None,
-            access_log=settings.log_access,
-            timeout_graceful_shutdown=GRACE_S,
-            http=BoundedConnections,
-            backlog=AT_ONCE,
-            proxy_headers=False,  # ours are outside the application, and keep the socket's own address
-        )
-        config.app = behind_proxies(config.app, [config.forwarded_allow_ips, *settings.proxy_addresses])
-        server = _Server(config)
+        with no_collection():
+            service = open_service(settings, closing, drive, apart=socket_file is None)
+            server = _server(settings, socket_file, service, closing, rules)
 
         def end() -> None:
             server.should_exit = True
 
         service.at_failed_start(end)
         yield server, service
+
+
+def _server(
+    settings: Settings, socket_file: Path | None, service: BenchService, closing: ExitStack, rules: Door
+) -> _Server:
+    """Set up the server of an open service; `closing` is closed when it shuts down."""
+    config = uvicorn.Config(
+        create_app(service, int(settings.max_import_mb * 1e6), closing.close, rules, Proxies.of(settings)),
+        settings.host,
+        settings.port,
+        uds=None if socket_file is None else str(socket_file),
+        log_config=None,
+        access_log=settings.log_access,
+        timeout_graceful_shutdown=GRACE_S,
+        http=BoundedConnections,
+        backlog=AT_ONCE,
+        proxy_headers=False,  # ours are outside the application, and keep the socket's own address
+    )
+    config.app = behind_proxies(config.app, [config.forwarded_allow_ips, *settings.proxy_addresses])
+    return _Server(config)
 
 
 def _check_start(service: BenchService) -> None:

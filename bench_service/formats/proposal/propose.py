@@ -7,7 +7,8 @@ import numpy as np
 
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.joined_files import ImportFile, Opened
+from bench_service.formats.import_request import ImportFile
+from bench_service.formats.joined_files import Opened
 from bench_service.formats.logs.registry import format_of
 from bench_service.formats.logs.table import LogColumn, LogTable, find_table
 from bench_service.formats.own_export import OwnExport, own_export

@@ -14,7 +14,8 @@ import numpy as np
 from bench_service.formats.bounds import MEGABYTE, Bounds
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.import_file import ImportedRecording, ImportFile, read_import
+from bench_service.formats.import_file import ImportedRecording, read_import
+from bench_service.formats.import_request import MOST_FILES, ImportFile
 from bench_service.formats.proposal.propose import propose
 from bench_service.formats.reader.frames import (
     CHILD,
@@ -32,7 +33,6 @@ from procedures.core.errors import BadParameter, DomainError, UnfitRecording
 
 SENT_BYTES = 1024 * 1024
 """Largest number of sample bytes in a frame."""
-MOST_FILES = 64
 SPOOLED_BYTES = 2_000 * MEGABYTE
 """Largest file that a reader may write: stamps that do not fit into its memory."""
 

@@ -19,9 +19,8 @@ import numpy as np
 from bench_service.formats.bounds import Bounds
 from bench_service.formats.description import ImportDescription
 from bench_service.formats.errors import UnreadableFile
-from bench_service.formats.import_file import ImportFile
+from bench_service.formats.import_request import MOST_FILES, ImportFile
 from bench_service.formats.proposal.model import Proposal
-from bench_service.formats.reader.child import MOST_FILES
 from bench_service.formats.reader.frames import (
     CHILD,
     END,

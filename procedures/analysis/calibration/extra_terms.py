@@ -11,8 +11,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg import block_diag, null_space
-from scipy.stats import norm
-from scipy.stats import t as student
+from scipy.special import ndtr, stdtr
 
 from procedures.analysis.calibration.noise_scale import noise_factor
 from procedures.analysis.calibration.table_errors import TableErrors
@@ -177,7 +176,7 @@ def _estimates(
     found: list[TermEstimate] = []
     for term, value, sd in zip(terms, values.tolist(), sds.tolist(), strict=True):
         ratio = abs(value) / sd
-        p = float(2.0 * (norm.sf(ratio) if degrees is None else student.sf(ratio, max(degrees, 1))))
+        p = float(2.0 * (ndtr(-ratio) if degrees is None else stdtr(max(degrees, 1), -ratio)))
         found.append(TermEstimate(term.kind, term.name, of_kind[term.kind], value, sd, p, p < CLAIMED))
     return tuple(found)
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binom
 
 from procedures.analysis.fitness.pieces import Mask, Samples
 from procedures.core.arrays import Array
@@ -89,8 +88,8 @@ class Edge:
         inside = count - outermost - other.count
         if repeats - self.pairs - other.pairs > BUSY * inside or next_one > CLIFF * max(behind):
             return False
-        steep = binom.sf(outermost - 1, outermost + self.near, STEEPEST / (1.0 + STEEPEST))
-        alone = binom.sf(outermost - 1, sum(self.levels.values()), ALONE)
+        steep = _at_least(outermost, outermost + self.near, STEEPEST / (1.0 + STEEPEST))
+        alone = _at_least(outermost, sum(self.levels.values()), ALONE)
         return bool(min(steep, alone) < CHANCE)
 
     def _merge(self, found: Levels) -> None:
@@ -103,6 +102,13 @@ class Edge:
         if new:
             order = sorted(self.levels, reverse=self.sign > 0)
             self.levels = {level: self.levels[level] for level in order[: NEIGHBOURS + 1]}
+
+
+def _at_least(k: int, n: int, p: float) -> float:
+    """Probability of k ≥ 1 or more of n at probability p each: I_p(k, n − k + 1) (Abramowitz & Stegun 26.5.24)."""
+    from scipy.special import betainc  # a service that starts does not wait for it
+
+    return float(betainc(k, n - k + 1, p))
 
 
 def counted(x: Samples, low: int, high: int) -> Levels | None:

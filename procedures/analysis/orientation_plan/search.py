@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.stats import qmc
 
 from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.orientation_plan.information import Objective, information, prior
@@ -48,6 +47,8 @@ def grid(settings: SearchSettings) -> Array:
 
 def best_orientations(count: int, objective: Objective, table: TableUncertainty, settings: SearchSettings) -> Array:
     """Table angles (count, 3) [deg]: outer, middle, inner."""
+    from scipy.stats import qmc  # all of scipy's statistics for one sequence: only where it is used
+
     candidates = grid(settings)
     known = [information(candidates, d, objective.model, table) for d in objective.designs]
     begin = qmc.Halton(count, scramble=False).random(settings.starts + 1)[1:]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from procedures.analysis.least_squares.determination import require_full_rank
 from procedures.analysis.thermal.correlated import LinearFit, fit_linear, whiten
@@ -293,4 +293,4 @@ def _f_test(fewer: float, more: float, k_fewer: int, k_more: int, count: float) 
     if count <= k_more:
         return 1.0
     statistic = (fewer - more) / (k_more - k_fewer) / (more / (count - k_more))
-    return float(f_distribution.sf(max(statistic, 0.0), k_more - k_fewer, count - k_more))
+    return float(fdtrc(k_more - k_fewer, count - k_more, max(statistic, 0.0)))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
@@ -37,7 +37,7 @@ class HalfTurns:
 
     def coverage_factor(self, confidence: float) -> float:
         """Student's factor of an interval of that confidence (two-sided)."""
-        return float(student.ppf(0.5 + 0.5 * confidence, self.pairs - 1))
+        return float(stdtrit(self.pairs - 1, 0.5 + 0.5 * confidence))
 
 
 def half_turns(means: Array, mean_sd: Array, turned: NDArray[np.bool_]) -> HalfTurns:

@@ -11,7 +11,7 @@ from math import pi
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from procedures.analysis.coloured_noise import CosineSeries, FittedNoise, cosines, fit_noise
 from procedures.analysis.warm_up.shapes import Shape, cell_means, exponential, value
@@ -120,7 +120,7 @@ def pair(series: CosineSeries, none: Fit, family: Family, significance: float) -
     """
     start, noise = _from_grid(series, family, 2, none.noise)
     pairs = len(family.grid) * (len(family.grid) - 1) / 2.0
-    p_value = min(1.0, pairs * float(chi2.sf(max(none.noise.deviance - noise.deviance, 0.0), 2)))
+    p_value = min(1.0, pairs * float(chdtrc(2, max(none.noise.deviance - noise.deviance, 0.0))))
     if p_value > significance:
         return None
     fit = refine(series, noise, (family.shape,) * 2, start)
@@ -153,7 +153,7 @@ def candidates(series: CosineSeries, fit: Fit, families: tuple[Family, ...], sig
 
 def _tube(ratio: float, arcs: float) -> float:
     ratio = max(ratio, 0.0)
-    return min(1.0, arcs / pi * float(np.exp(-0.5 * ratio)) + float(chi2.sf(ratio, 1)))
+    return min(1.0, arcs / pi * float(np.exp(-0.5 * ratio)) + float(chdtrc(1, ratio)))
 
 
 def _from_grid(series: CosineSeries, family: Family, number: int, noise: FittedNoise) -> tuple[Array, FittedNoise]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import log, sqrt
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from procedures.analysis.noise_fit.estimate import NoiseFit
 from procedures.analysis.noise_fit.likelihood import fit_noise
@@ -59,7 +59,7 @@ def gyro_temperatures(
             GyroTemperature(
                 name,
                 tuple(per_run),
-                float(chi2.sf(statistic, 2 * len(per_run))),
+                float(chdtrc(2 * len(per_run), statistic)),
                 float(weights @ [c.slope for c in per_run] / weights.sum()),
                 1.0 / sqrt(float(weights.sum())),
             )
