@@ -10,7 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = (ROOT / "README.md", ROOT / "client" / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 PACKAGES = ("procedures", "simulators", "bench_service")
-_MARK = re.compile(r"<!-- (run|checked|not run): (.+?) -->\s*\Z", re.DOTALL)
+_MARK = re.compile(r"<!-- (run|checked|not run): ((?:(?!-->).)+) -->\s*\Z")
 _FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _INDENTED = re.compile(r"(?:(?<=\n\n)|(?<=-->\n))(?: {4}.*\n)(?:(?: {4}.*)?\n)*")
 
@@ -69,6 +69,10 @@ def docstrings(path: Path) -> Iterator[tuple[str, str]]:
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         for part in body if isinstance(body, list) else []:
-            if isinstance(part, ast.Expr) and isinstance(part.value, ast.Constant) and isinstance(part.value.value, str):
+            if (
+                isinstance(part, ast.Expr)
+                and isinstance(part.value, ast.Constant)
+                and isinstance(part.value.value, str)
+            ):
                 name = f"{path.relative_to(ROOT)}:{part.lineno}"
                 yield name, " ".join(part.value.value.split())

@@ -1,4 +1,4 @@
-"""Pictures of the layers in docs/architecture.md, made from the import contracts: `python -m tests.kit.layer_picture`."""
+"""Pictures of the layers in docs/architecture.md, made from the import contracts by `make pictures`."""
 
 import re
 import tomllib
