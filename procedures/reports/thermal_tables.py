@@ -61,8 +61,8 @@ def forms_table(cycle: ThermalCycle) -> Table:
     columns = ("form", "3σ x", "3σ y", "3σ z", "|ĝ| static", "|ĝ| dynamic", "single over this")
     note = (
         "m/s². 3σ of the worst soak; |ĝ| root mean square about each run's mean, in either regime; last: how many "
-        "times as large |ĝ| of the single polynomial (thesis 3.15) is on ramps. All but a current correction were fitted "
-        "to this very cycle. Both: thesis 4.1; switched: thesis 3.19."
+        "times as large |ĝ| of the single polynomial (thesis 3.15) is on ramps. All but a current correction were "
+        "fitted to this very cycle. Both: thesis 4.1; switched: thesis 3.19."
     )
     return Table("Ways to correct", columns, tuple(rows), note)
 

@@ -14,7 +14,7 @@ MOST_SHORT = 10
 POETIC = re.compile(r"^(Told\w*|\w*Beside\w*|\w*Whoever\w*|\w*Eye|\w*Nobody\w*|in_our_words|\w+Desk)$")
 KNOWN_POETIC = {"bench_service/api/feed/news.py: NewsDesk"}
 """Names that stand until their room is changed anyway."""
-PRIVATE = re.compile(r"in our words|nobody's|whoever|Whoever|\bthe told\b|\bpatience\b", re.IGNORECASE)
+PRIVATE = re.compile(r"in our words|nobody's|\bthe told\b|\bpatience\b", re.IGNORECASE)
 
 
 def _summaries() -> list[tuple[str, str]]:

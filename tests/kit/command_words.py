@@ -1,24 +1,34 @@
-"""Lines of the command `bench` as documents show them, parsed as the program parses them."""
+"""Lines of the command `bench` as documents show them, held against the names and options that the program has."""
 
-import click
+from typing import Any
+
 import typer
 
 from bench_service.cli.commands import app
 
 
-def parsed(words: list[str]) -> None:
-    """Parse a line of `bench` as the program does, and run nothing. Raises `click.UsageError`."""
-    command: click.Command = typer.main.get_command(app)
-    context = click.Context(command, info_name="bench")
-    while isinstance(command, click.Group):
+def refused(words: list[str]) -> str:
+    """The reason why `bench` would not take these words, or "". Nothing is run, and no value is looked at."""
+    command: Any = typer.main.get_command(app)
+    while hasattr(command, "commands"):
         if not words or words[0] == "--help":
-            return
-        found = command.get_command(context, words[0])
-        if found is None:
-            raise click.UsageError(f"no command {words[0]!r}")
-        context, command, words = click.Context(found, parent=context, info_name=words[0]), found, words[1:]
-    for parameter in command.params:
-        if isinstance(parameter.type, click.Path):
-            parameter.type.exists = False
-    if "--help" not in words:
-        command.make_context(context.info_name or "", words, parent=context.parent)
+            return ""
+        if words[0] not in command.commands:
+            return f"no command {words[0]!r}"
+        command, words = command.commands[words[0]], words[1:]
+    options = {o: p for p in command.params for o in (*p.opts, *p.secondary_opts) if o.startswith("-")}
+    arguments = [p for p in command.params if not p.opts[0].startswith("-")]
+    given, place = 0, 0
+    while place < len(words):
+        name, has_value, _ = words[place].partition("=")
+        if name == "--help":
+            return ""
+        if not name.startswith("--") and name != "-o":
+            given += 1
+        elif name not in options:
+            return f"no option {name!r}"
+        elif not has_value and not getattr(options[name], "is_flag", False):
+            place += 1
+        place += 1
+    least = sum(p.required for p in arguments)
+    return "" if least <= given and (given <= len(arguments) or any(p.nargs == -1 for p in arguments)) else "arguments"
