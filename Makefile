@@ -9,7 +9,7 @@ BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
 
 .DEFAULT_GOAL := help
-.PHONY: newest-form help run test browser clients bench chaos soak format check validate rights lock audit images clean foreign
+.PHONY: help run test browser clients bench chaos soak format check validate rights pictures newest-form lock audit images clean foreign
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -76,6 +76,9 @@ clients: $(VENV)/.ready  ## lint the OpenAPI document, generate clients from it,
 
 rights: $(VENV)/.ready  ## write docs/rights.md anew, from the routes and their rights
 	@$(BIN)/python -m tests.kit.rights_page
+
+pictures: $(VENV)/.ready  ## draw the layers of docs/architecture.md anew, from the import contracts
+	@$(BIN)/python -m tests.kit.layer_picture
 
 
 newest-form: $(VENV)/.ready  ## write migrations/newest_form.sql anew, after a new migration

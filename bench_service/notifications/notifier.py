@@ -52,7 +52,7 @@ class Notifier:
         stores.jobs.on_event(self._hear)
 
     def begin(self) -> None:
-        """Start the thread."""
+        """Start the thread that delivers messages."""
         self._thread.start()
 
     def end(self) -> None:

@@ -3,7 +3,7 @@
 The unit is set to each orientation and rests there for the averaging time; least squares over the station means
 gives bias, scale factors and cross-couplings of gyros (from the Earth's rate) and accelerometers (from gravity). The
 weights allow for the unit's noise and the table's declared accuracy; weighting="noise" is the thesis's own. With
-thermal_correction="current" the accelerometers' means are first brought to the reference temperatures (T 4.1).
+thermal_correction="current" the accelerometers' means are first brought to the reference temperatures (thesis 4.1).
 """
 
 from collections.abc import AsyncIterator, Sequence

@@ -1,7 +1,7 @@
-"""Signal converter alone, before final assembly: zero and scale of its channels over temperature (T 3.2.2; C).
+"""Zero and scale of the signal converter alone over temperature, before assembly (thesis 3.2.2; paper C).
 
 A precision source gives equal and opposite currents to all three channels at every soak of a chamber; mean codes give
-zero and scale (T 3.10–3.13), and these the normalised functions Fs and Fc that are the first stage of a thermal
+zero and scale (thesis 3.10–3.13), and these the normalised functions Fs and Fc that are the first stage of a thermal
 compensation. A soak is over by the converter's own sensor. Currents, temperatures and times are this program's own.
 """
 
@@ -70,7 +70,7 @@ class ChannelResult:
     scale_code_per_ma: tuple[float, ...]
     zero_code: tuple[float, ...]
     zero_ma: tuple[float, ...]
-    """Zero at the input of T 3.13."""
+    """Zero at the input of thesis 3.13."""
     scale_bic: tuple[float, ...]
     zero_bic: tuple[float, ...]
 
@@ -217,7 +217,7 @@ def report(result: Result) -> Report:
             for k, (a, of_a) in enumerate(zip(part.coefficients, sd[1:], strict=True), start=1):
                 rows.append((None, None, None, None, None, f"a_{k} = {a:.6g}", f"± {of_a:.2g}"))
     columns = ("channel", "function", "order", "at the reference", "± standard uncertainty", "coefficient", "±")
-    models = Table("Normalised functions", columns, tuple(rows), "N = K0·Fc(t)·I + N0 + Fs(t) (T 3.17 and after).")
+    models = Table("Normalised functions", columns, tuple(rows), "N = K0·Fc(t)·I + N0 + Fs(t) (thesis 3.17 and after).")
     return Report(sections=(models, *(_soak_table(c) for c in result.channels), *_figures(result)))
 
 

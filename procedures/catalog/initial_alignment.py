@@ -1,4 +1,4 @@
-"""Initial alignment on the bench: heading, pitch and roll over and over, found and predicted (T 1.1; S 3.163-3.166).
+"""Initial alignment on the bench, repeated and predicted (thesis 1.1; textbook S 3.163-3.166).
 
 The unit rests at known attitudes, aligns itself from its corrected means, is switched off and does it again. The
 errors against the table and its azimuth are judged by what calibration, launches, noise and table let expect; the

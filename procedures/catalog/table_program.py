@@ -1,4 +1,4 @@
-"""A position program of the table's controller, run as it is written, with a recording at every dwell (thesis, app. Д).
+"""Position program of the table's controller, with a recording at every dwell (thesis appendix Д).
 
 The program is text in the controller's language, or a list of positions that is written as one. Nothing is judged but
 that every dwell was recorded whole: the meaning of the means is left to an analysis or a person.

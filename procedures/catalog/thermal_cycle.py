@@ -71,7 +71,7 @@ class Soak(Parameters):
 
 
 class Regime(Parameters):
-    """Settings of the regime indicator of T 3.18."""
+    """Settings of the regime indicator of thesis 3.18."""
 
     memory_s: float = Field(120.0, ge=3.0, le=86_400.0)
     enter_c_s2: float = Field(4.0e-6, gt=0.0, le=1.0)
@@ -111,7 +111,7 @@ class Params(Parameters):
     )
     reference_converter_c: float = Field(20.0, ge=-100.0, le=200.0)
     regime: Regime = Field(default_factory=lambda: Regime.model_validate({}))
-    form: Form = Field(Form.BOTH, description="which terms of T 4.1 act in which regime")
+    form: Form = Field(Form.BOTH, description="which terms of thesis 4.1 act in which regime")
     correction: Literal["fit", "current"] = Field(
         "fit",
         description="fit: find a correction and judge it on the same cycle; current: judge the unit's current "

@@ -4,14 +4,14 @@
 Δt the case (or gyro) sensor and Δb the converter's, both from the temperatures of the standard calibration. Which of
 the terms act, and when, is the *form*:
 
-* ``both``: all of them always, T 4.1 as it is printed. In a soak both sensors go together and only their sum matters;
-  on a ramp the converter lags behind the case, and the difference carries the dynamic error.
-* ``switched``: T 3.19: those of Δt in the static regime, those of Δb in the dynamic one, which is a function of its
-  own and so has constants of its own in addition to K0 and B0.
-* ``single``: T 3.15: those of Δb alone, in either regime.
+* ``both``: all of them always, thesis 4.1 as it is printed. In a soak both sensors go together and only their sum
+  matters; on a ramp the converter lags behind the case, and the difference carries the dynamic error.
+* ``switched``: thesis 3.19: those of Δt in the static regime, those of Δb in the dynamic one, which is a function of
+  its own and so has constants of its own in addition to K0 and B0.
+* ``single``: thesis 3.15: those of Δb alone, in either regime.
 
-T Table 4.4 prints α3 four thousand times larger than α4, though T 4.1 gives α3 to Δb²: there the two names are
-swapped. This module names them as T 4.1 does.
+Thesis table 4.4 prints α3 four thousand times larger than α4, though thesis 4.1 gives α3 to Δb²: there the two names
+are swapped. This module names them as thesis 4.1 does.
 """
 
 from dataclasses import dataclass
@@ -28,12 +28,12 @@ ALPHAS = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
 BETAS = ("beta_1", "beta_2", "beta_3", "beta_4")
 COEFFICIENTS = (*ALPHAS, *BETAS)
 POWERS_OF_ALPHA = ((0, 2), (0, 1), (1, 2), (1, 1))
-"""Sensor (0 case, 1 converter) and power of each α, in T 4.1's order; β is not printed in the same order."""
+"""Sensor (0 case, 1 converter) and power of each α, in thesis 4.1's order; β is not printed in the same order."""
 POWERS_OF_BETA = ((0, 1), (0, 2), (1, 1), (1, 2))
 
 
 class Form(StrEnum):
-    """Form of the correction: the terms of T 4.1 that act in each regime."""
+    """Form of the correction: the terms of thesis 4.1 that act in each regime."""
 
     BOTH = "both"
     SWITCHED = "switched"
@@ -58,7 +58,7 @@ def terms(form: Form, powers: tuple[tuple[int, int], ...], dt: Array, db: Array,
 
 @dataclass(frozen=True)
 class AxisCorrection:
-    """T 4.1 of one accelerometer. α in 1/°C (α2, α4) and 1/°C², β in m/s² a °C (β1, β3) and a °C²."""
+    """Thesis 4.1 of one accelerometer. α in 1/°C (α2, α4) and 1/°C², β in m/s² a °C (β1, β3) and a °C²."""
 
     scale: float
     """K0, m/s² a m/s² of nominal output."""
@@ -135,7 +135,7 @@ class TemperatureRange:
 
 @dataclass(frozen=True)
 class ThermalCorrection:
-    """T 4.1 of a triad, x, y, z."""
+    """Thesis 4.1 of a triad, x, y, z."""
 
     triad: str
     axes: tuple[AxisCorrection, AxisCorrection, AxisCorrection]

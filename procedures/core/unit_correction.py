@@ -18,7 +18,7 @@ class UnitCorrection:
     """Temperature correction of a unit, found by one job. Raises `BadParameter` where kind and value disagree."""
 
     kind: CorrectionKind
-    """Kind "thermal" for the accelerometer triad as a whole (T 4.1), "converter" for the converter (T 3.8-3.13)."""
+    """Kind "thermal" for the accelerometer triad (thesis 4.1), "converter" for the converter (thesis 3.8-3.13)."""
     value: ThermalCorrection | ConverterTriad
     """A `ThermalCorrection`, or three `ConverterModel`s, x, y, z."""
 

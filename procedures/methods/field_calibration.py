@@ -1,8 +1,9 @@
 """Field calibration, without a bench: bias and scale of a unit turned by hand through a few positions (F).
 
-Accelerometers from two positions, zero and (α, β), or from more with the tilt of the base found along (F 11-34); gyros'
-bias alone where they cannot feel the Earth's rate, bias and scale where they can (F 36, 45-48). Cross-couplings are
-neglected, and their effect is in the uncertainty. Errata of F: `procedures.analysis.field.positions`.
+Accelerometers from two positions, zero and (α, β), or from more with the tilt of the base found along (paper F
+11-34); gyros' bias alone where they cannot feel the Earth's rate, bias and scale where they can (paper F 36, 45-48).
+Cross-couplings are neglected, and their effect is in the uncertainty. Errata of paper F:
+`procedures.analysis.field.positions`.
 """
 
 from collections.abc import Sequence

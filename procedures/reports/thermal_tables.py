@@ -8,7 +8,7 @@ from procedures.core.report import Cell, Table
 from procedures.core.thermal_correction import COEFFICIENTS, Form
 
 OF_COEFFICIENT = ("1/°C²", "1/°C", "1/°C²", "1/°C", "m/s²/°C", "m/s²/°C²", "m/s²/°C", "m/s²/°C²")
-"""Units in the order of `COEFFICIENTS`; T 4.1 does not print β in the order of α."""
+"""Units in the order of `COEFFICIENTS`; thesis 4.1 does not print β in the order of α."""
 
 
 def summary(cycle: ThermalCycle) -> str:
@@ -61,8 +61,8 @@ def forms_table(cycle: ThermalCycle) -> Table:
     columns = ("form", "3σ x", "3σ y", "3σ z", "|ĝ| static", "|ĝ| dynamic", "single over this")
     note = (
         "m/s². 3σ of the worst soak; |ĝ| root mean square about each run's mean, in either regime; last: how many "
-        "times as large |ĝ| of the single polynomial (T 3.15) is on ramps. All but a current correction were fitted to "
-        "this very cycle. Both: T 4.1; switched: T 3.19."
+        "times as large |ĝ| of the single polynomial (thesis 3.15) is on ramps. All but a current correction were "
+        "fitted to this very cycle. Both: thesis 4.1; switched: thesis 3.19."
     )
     return Table("Ways to correct", columns, tuple(rows), note)
 
@@ -79,9 +79,9 @@ def coefficient_table(cycle: ThermalCycle) -> Table:
             rows.append((axis, name.replace("_", " "), unit, value if used else None, sd if used else None))
     columns = ("axis", "coefficient", "unit", "estimate", "± standard uncertainty")
     note = (
-        f"T 4.1 about readings of {cycle.reference_c[0]:g} °C (case) and {cycle.reference_c[1]:g} °C (converter). "
+        f"thesis 4.1 about readings of {cycle.reference_c[0]:g} °C (case) and {cycle.reference_c[1]:g} °C (converter). "
         "α1, α2, β1, β2 go with the case sensor, the others with the converter's. Thesis table 4.4 has α3 and α4 the "
-        "other way round than T 4.1."
+        "other way round than thesis 4.1."
     )
     return Table("Temperature coefficients of the accelerometers", columns, tuple(rows), note)
 

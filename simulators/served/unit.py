@@ -75,7 +75,7 @@ class FramePort:
             line.close()
 
     def cut(self) -> None:
-        """Cut all lines."""
+        """Cut all lines of the unit."""
         for line in tuple(self._lines):
             line.transport.abort()
 
@@ -113,7 +113,7 @@ class DatagramPort:
         return port
 
     async def close(self) -> None:
-        """End sending."""
+        """End sending and close the lines."""
         if self._transport is not None:
             self._transport.close()
 
@@ -155,7 +155,7 @@ class IxcomPort:
             line.close()
 
     def cut(self) -> None:
-        """Cut all lines."""
+        """Cut all lines of the unit."""
         for line in tuple(self._lines):
             line.transport.abort()
 

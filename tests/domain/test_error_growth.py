@@ -1,4 +1,4 @@
-"""Error growth against the closed forms of S 4.1, a nonlinear navigator, and integrals of white noise."""
+"""Error growth against the closed forms of textbook S 4.1, a nonlinear navigator, and integrals of white noise."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def within_a_thousandth(found: np.ndarray, expected: np.ndarray) -> None:
 
 
 def test_the_schuler_period_is_84_minutes():
-    assert 2 * np.pi / KYIV.schuler_rad_s / 60 == pytest.approx(84.4, abs=0.05)  # S 4.1
+    assert 2 * np.pi / KYIV.schuler_rad_s / 60 == pytest.approx(84.4, abs=0.05)  # textbook S 4.1
 
 
 def test_a_wrong_vertical_swings_as_s_4_11_to_4_15():
@@ -164,7 +164,7 @@ def test_a_navigator_that_aligned_itself_with_a_biased_east_accelerometer_stays_
 
 
 def test_white_noise_grows_as_its_integral():
-    """Angle random walk through S 4.39: the position's answer to a pulse is ``R·(cos ω₀t − 1)``."""
+    """Angle random walk through textbook S 4.39: the position's answer to a pulse is ``R·(cos ω₀t − 1)``."""
     n, w = 0.002 * units.DEG_PER_SQRT_HOUR, STILL_EARTH.schuler_rad_s
     noise = TriadErrors({}, (NoiseCoefficients(random_walk=n),) * 3)
     growth = error_growth(STILL_EARTH, np.eye(3), noise, NONE, Alignment(), HOURS_3)

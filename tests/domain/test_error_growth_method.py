@@ -31,7 +31,7 @@ def dated(gyro_bias_sd: float, triads: tuple[str, ...] = ("gyro", "accelerometer
 
 
 def test_an_hour_of_gyro_drift_is_s_4_39():
-    """A drift of 0.01 deg/h swings and creeps to 0.77 km in an hour, by hand from S 4.39."""
+    """A drift of 0.01 deg/h swings and creeps to 0.77 km in an hour, by hand from textbook S 4.39."""
     drift = 0.01 * units.DEG_PER_HOUR
     params = METHOD.params(
         latitude_deg=0.0,
@@ -44,7 +44,7 @@ def test_an_hour_of_gyro_drift_is_s_4_39():
     by_hand = drift * 6_371_000.0 / W0 * (W0 * 3600 - np.sin(W0 * 3600))
     north = next(c for c in result.curves if c.name == "north")
     at_hour = np.interp(3600.0, result.time_s, north.sd)
-    # On the equator of a turning Earth the heading that drifts couples in a little (S 4.124): (Ωt)² = 7 %.
+    # On the equator of a turning Earth the heading that drifts couples in a little (textbook S 4.124): (Ωt)² = 7 %.
     assert at_hour == pytest.approx(by_hand, rel=0.07)
     assert result.schuler_period_s / 60 == pytest.approx(84.4, abs=0.1)
     assert result.verdict is Verdict.PASS

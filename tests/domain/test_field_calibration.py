@@ -175,7 +175,7 @@ def test_truths_lie_within_the_uncertainty(positions: np.ndarray, tilt: str, est
 
 def recordings(channels: tuple[Channel, ...], positions: np.ndarray, off: tuple[float, float] = (0.0, 0.0)):
     latitude = np.radians(SITE.latitude_deg)
-    # x to the west, y up, z to the north: F 39 with the vector [0, Ω sin φ, Ω cos φ].
+    # x to the west, y up, z to the north: paper F 39 with the vector [0, Ω sin φ, Ω cos φ].
     rate = SITE.earth_rate_rad_s * np.array([0.0, np.sin(latitude), np.cos(latitude)])
     rates, forces = (
         seen(positions, rate, "base", off),
@@ -199,7 +199,7 @@ SITED = {"latitude_deg": SITE.latitude_deg, "gravity_m_s2": SITE.gravity_m_s2, "
 
 
 def test_both_triads_from_the_same_positions(channels: tuple[Channel, ...], unit: Unit):
-    """Gyros of navigation grade see the Earth turn in F 40: ω_z1 = Ω cos φ."""
+    """Gyros of navigation grade see the Earth turn in paper F 40: ω_z1 = Ω cos φ."""
     params = METHOD.params(**SITED, gyro="bias_and_scale", tilt="base", scale_sd_max=0.5, azimuth_sd_arcsec=60.0)
     result = METHOD.analyse(Evidence(recordings(channels, WIDE, (0.5, -0.4))), params, unit)
     accelerometer, gyro = result.triads

@@ -167,7 +167,7 @@ def test_the_converters_first_stage_belongs_to_the_correction():
 
 
 def test_the_switched_form_is_static_and_says_so():
-    """Truth with terms of the case alone is what the static regime of T 3.19 describes."""
+    """Truth with terms of the case alone is what the static regime of thesis 3.19 describes."""
     still = [AccelerometerThermalTruth(a.scale_static, (0.0, 0.0), a.bias_static) for a in STILL.accelerometers]
     truth = replace(STILL, accelerometers=(still[0], still[1], still[2]))
     data = recordings(truth, np.random.Generator(np.random.PCG64(6)), B_ACCELEROMETER)

@@ -1,4 +1,4 @@
-"""Stage one: T 3.10–3.13 by hand, and the model against the simulated converter, which shares no code with it."""
+"""Stage one: thesis 3.10–3.13 by hand, and the model against the simulated converter, which shares no code with it."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""T 4.1: worked by hand, recovered from data made by its inverse, uncertainties against Monte Carlo."""
+"""Thesis 4.1: worked by hand, recovered from data made by its inverse, uncertainties against Monte Carlo."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ def temperatures(cells: int = 720) -> tuple[np.ndarray, np.ndarray]:
 
 
 def made_run(up: int, noise: np.ndarray | None = None, cube: float = 0.0, force_x: float | None = None) -> ThermalRun:
-    """A run whose every axis obeys the inverse of T 4.1 written out anew."""
+    """A run whose every axis obeys the inverse of thesis 4.1 written out anew."""
     case, board = temperatures()
     dt, db = case - REFERENCE[0], board - REFERENCE[1]
     scale = K0 + ALPHA[0] * dt**2 + ALPHA[1] * dt + ALPHA[2] * db**2 + ALPHA[3] * db

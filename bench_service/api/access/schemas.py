@@ -102,7 +102,7 @@ class NewToken(Request):
 
     @property
     def lasting(self) -> timedelta:
-        """Its life."""
+        """Lifetime of the new token."""
         return timedelta(days=self.days)
 
 

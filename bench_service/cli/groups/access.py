@@ -49,7 +49,7 @@ def add_user(
 
 @users.command("list")
 def list_users(context: typer.Context, server: Server = None, as_json: AsJson = False) -> None:
-    """List the accounts."""
+    """List the accounts of people."""
     with connect(context.obj, server, drive=False) as client:
         found = answer(client, "GET", "/api/v1/accounts").json()
     _show(found, ("name", "role", "team", "has_password", "created_at", "created_by"), as_json)

@@ -40,7 +40,7 @@ REQUIRED: tuple[Kind, ...] = ("turntable", "supply", "unit_link")
 
 
 class Identity(Section):
-    """Table ``[bench]``."""
+    """Table ``[bench]`` of a bench file."""
 
     id: str = Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")
     title: str = ""
@@ -58,7 +58,7 @@ class SiteSection(Section):
 
 
 class Policy(Section):
-    """Table ``[policy]``."""
+    """Table ``[policy]`` of a bench file."""
 
     expired_certificate: Literal["refuse", "warn"] = "refuse"
 

@@ -97,7 +97,7 @@ class CoefficientsTable(Section):
 
 
 class UnitFile(Section):
-    """A unit's file."""
+    """File of one declared unit."""
 
     serial: str = Field(pattern=SERIAL)
     model: str = ""

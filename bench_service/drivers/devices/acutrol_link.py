@@ -138,7 +138,7 @@ class AcutrolLink:
         return await self._word(acutrol.mode_query(self.axes[index]))
 
     def close(self) -> None:
-        """Drop the line."""
+        """Drop the line to the table."""
         self._line.close()
 
     async def _set(self, statement: str) -> None:

@@ -14,7 +14,7 @@ SERIAL_FORMAT = re.compile(r"^[5-8][NEO][12]$")
 
 @dataclass(frozen=True)
 class Address:
-    """One device's address."""
+    """Address of one device's line."""
 
     scheme: Literal["tcp", "udp", "serial"]
     host: str = ""

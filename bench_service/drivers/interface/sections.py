@@ -84,7 +84,7 @@ class Accuracy(Section):
 
 
 class TurntableSection(DeviceSection):
-    """Section ``[turntable]``."""
+    """Section ``[turntable]`` of a bench file."""
 
     outer: Axis | None = None
     middle: Axis | None = None
@@ -121,7 +121,7 @@ class ChamberBounds(Section):
 
 
 class ChamberSection(DeviceSection):
-    """Section ``[chamber]``."""
+    """Section ``[chamber]`` of a bench file."""
 
     limits: ChamberBounds | None = None
     limiter_c: Finite | None = None
@@ -155,7 +155,7 @@ class SupplyBounds(Section):
 
 
 class SupplySection(DeviceSection):
-    """Section ``[supply]``."""
+    """Section ``[supply]`` of a bench file."""
 
     limits: SupplyBounds | None = None
     on_safe: Literal["off"] = "off"
@@ -168,7 +168,7 @@ class WireSupply(SupplySection, Wire):
 
 
 class UnitLinkSection(DeviceSection):
-    """Section ``[unit_link]``."""
+    """Section ``[unit_link]`` of a bench file."""
 
 
 class WireUnitLink(UnitLinkSection, Wire):
@@ -184,7 +184,7 @@ class CurrentBounds(Section):
 
 
 class CurrentSourceSection(DeviceSection):
-    """Section ``[current_source]``."""
+    """Section ``[current_source]`` of a bench file."""
 
     limits: CurrentBounds | None = None
     on_safe: Literal["off"] = "off"

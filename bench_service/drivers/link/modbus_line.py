@@ -154,4 +154,4 @@ class ModbusLine:
 
 
 class _Lost(Exception):
-    """No answer came."""
+    """Raised where no answer came."""

@@ -40,7 +40,7 @@ def opened(stream: BinaryIO, name: str) -> "Imr":
 
 
 class Imr:
-    """An IMR file."""
+    """Reader of an IMR file."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._stream, self._name = stream, name
@@ -88,7 +88,7 @@ class Imr:
             )
 
     def tables(self) -> list[LogTable]:
-        """Describe the records."""
+        """Describe the records as one table."""
         if not self._rows:
             raise UnreadableFile(self._name, "has a header and no records")
         gyro, acc, asks = self._gyro, self._acc, list[str]()

@@ -64,7 +64,7 @@ class RunFound(Part):
 
 
 class AxisCorrection(Part):
-    """T 4.1 of one accelerometer. α in 1/°C (α2, α4) and 1/°C², β in m/s² a °C (β1, β3) and a °C²."""
+    """Thesis 4.1 of one accelerometer. α in 1/°C (α2, α4) and 1/°C², β in m/s² a °C (β1, β3) and a °C²."""
 
     scale: float
     bias_m_s2: float
@@ -98,7 +98,7 @@ class TemperatureRange(Part):
 
 
 class ThermalCorrection(Part):
-    """T 4.1 of a triad, x, y, z."""
+    """Thesis 4.1 of a triad, x, y, z."""
 
     triad: str
     axes: tuple[AxisCorrection, ...]

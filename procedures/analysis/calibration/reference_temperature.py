@@ -1,7 +1,7 @@
-"""Station means of an accelerometer triad brought to the reference temperatures with the unit's correction (T 4.1).
+"""Station means of an accelerometer triad at reference temperatures, by the unit's correction (thesis 4.1).
 
-T 4.1 corrects to a force, ``f = [K0 + A]·(V + B0 + B)`` with A and B the polynomials in the temperatures' departures;
-at the reference A = B = 0 and ``f = K0·(V₀ + B0)``. So what the channel would have shown there is
+Thesis 4.1 corrects to a force, ``f = [K0 + A]·(V + B0 + B)`` with A and B the polynomials in the temperatures'
+departures; at the reference A = B = 0 and ``f = K0·(V₀ + B0)``. So what the channel would have shown there is
 
 ``V₀ = [1 + A/K0]·(V + B0 + B) − B0 = Ṽ/K0 − B0``,
 

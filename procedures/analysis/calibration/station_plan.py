@@ -13,7 +13,7 @@ THESIS_ORIENTATIONS = (
     *((0.0, -90.0), (0.0, 90.0), (90.0, 0.0), (-90.0, 0.0), (0.0, 0.0), (180.0, 0.0)),
     *((-90.0, -45.0), (90.0, 45.0), (180.0, -45.0), (0.0, 45.0), (135.0, 0.0), (-45.0, 0.0)),
 )
-"""(β, γ) [deg] of thesis figure 5.4: the twelve of the calibration, and the plan that a better one has to beat."""
+"""(β, γ) [deg] of thesis fig. 5.4: the twelve of the calibration, and the plan that a better one has to beat."""
 
 LONGEST_DWELL_S = 10.0 * 365.25 * 86_400.0
 """Ten years at one station: a dwell that would have to be longer counts as none at all."""

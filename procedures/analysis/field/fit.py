@@ -1,8 +1,9 @@
 """Bias and scale of a triad from a few positions: least squares with all uncertainties of the positions.
 
-The model is ``U_i = b_i + k_i·v_i`` per channel (F 8, 42): cross-couplings are neglected, so their declared spread is a
-part of the uncertainty, as are the angles set by hand, the level, the heading and gravity. Weights are those of noise
-and flaws together, ``S = C + F·Fᵀ``; two positions without tilt are F 11-14 and F 45-48 exactly, which have no weights.
+The model is ``U_i = b_i + k_i·v_i`` per channel (paper F 8, 42): cross-couplings are neglected, so their declared
+spread is a part of the uncertainty, as are the angles set by hand, the level, the heading and gravity. Weights are
+those of noise and flaws together, ``S = C + F·Fᵀ``; two positions without tilt are paper F 11-14 and 45-48 exactly,
+which have no weights.
 """
 
 from collections.abc import Sequence
@@ -108,8 +109,8 @@ class FieldFit:
 def require_levers(what: str, model: FieldModel) -> None:
     """Refuse positions between which a channel's input hardly changes, naming the channels: `Undetermined`.
 
-    Without tilt the two unknowns of a channel see nothing but that change (F 12, 13: ``sin α``, ``cos α·cos β − 1``,
-    ``cos α·sin β``), and every error of angles and noise is divided by it.
+    Without tilt the two unknowns of a channel see nothing but that change (paper F 12, 13: ``sin α``,
+    ``cos α·cos β − 1``, ``cos α·sin β``), and every error of angles and noise is divided by it.
     """
     vectors = field_vectors(model.positions_rad, model.vector_r, model.tilt, np.array(model.tilt_rad))
     levers = np.ptp(vectors, axis=0) / np.linalg.norm(model.vector_r)
@@ -204,7 +205,7 @@ def _vectors(theta: Array, model: FieldModel) -> Array:
 
 
 def _start(outputs: Array, model: FieldModel) -> Array:
-    """Channel by channel with the tilt as given: F 11-14 for two positions."""
+    """Channel by channel with the tilt as given: paper F 11-14 for two positions."""
     theta = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, *model.tilt_rad])
     vectors = _vectors(theta, model)
     for c in range(3):

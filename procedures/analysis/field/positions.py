@@ -1,13 +1,13 @@
-"""Inputs of a unit in positions (α, β) set by hand: α about z, then β about the turned x (F 1-3).
+"""Inputs of a unit in positions (α, β) set by hand: α about z, then β about the turned x (paper F 1-3).
 
 ``v_b = R_x(β)ᵀ·R_z(α)ᵀ·v_r``, in table angles middle = α and inner = β. The base may lie wrong in two ways, both by two
 small angles. "base": it is tilted under both turns, ``v_r = R_x(β₀)ᵀ·R_z(α₀)ᵀ·v``. "turn_zeros": the zeros of the two
-turns are off, ``α + α₀`` and ``β + β₀``. F 15 is the second, contrary to its wording, and so are the figures of its
-Table 2 (the tests recompute them).
+turns are off, ``α + α₀`` and ``β + β₀``. Paper F 15 is the second, contrary to its wording, and so are the figures of
+its Table 2 (the tests recompute them).
 
-Further errata of F: its axes (east, up, north) are left-handed; this module turns x to the west for its
-[0, Ω sin φ, Ω cos φ]. In F 5, 8, 10, 12, 15 the third component lacks the minus of F 4's product: with specific force
-+g on y it is ``−g·cos α·sin β``.
+Further errata of paper F: its axes (east, up, north) are left-handed; this module turns x to the west for its
+[0, Ω sin φ, Ω cos φ]. In paper F 5, 8, 10, 12, 15 the third component lacks the minus of the product in equation 4:
+with specific force +g on y it is ``−g·cos α·sin β``.
 """
 
 from typing import Literal

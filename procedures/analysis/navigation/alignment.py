@@ -1,7 +1,7 @@
 """Initial alignment of a parked unit: heading, pitch and roll from its mean specific force and angular rate.
 
-The attitude is ``rot_nb = R_y(−heading)·R_z(pitch)·R_x(roll)`` from north, up, east to forward, up, right (S 3.163,
-3.165): heading clockwise from north, pitch up and roll right side down positive.
+The attitude is ``rot_nb = R_y(−heading)·R_z(pitch)·R_x(roll)`` from north, up, east to forward, up, right (textbook S
+3.163, 3.165): heading clockwise from north, pitch up and roll right side down positive.
 """
 
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ from procedures.core.site import Site
 from procedures.core.unit import Unit
 
 LATITUDE_MAX_DEG = 89.0
-"""At the poles the Earth turns about the vertical: no direction is north (S 3.5). At 89° its horizontal part is 1.7 %,
-so that a heading has sixty times the equator's uncertainty.
+"""At the poles the Earth turns about the vertical: no direction is north (textbook S 3.5). At 89° its horizontal part
+is 1.7 %, so that a heading has sixty times the equator's uncertainty.
 """
 PITCH_MAX_DEG = 85.0
 """Near the vertical heading and roll turn about one axis: their sum alone is determined."""
@@ -62,9 +62,9 @@ def initial_attitude(
     """Attitude of a unit at rest from f (3,) [m/s²] and ω (3,) [rad/s]; `covariance` (6, 6) of f, then ω.
 
     ``pitch = atan2(f_x, √(f_y² + f_z²))``, ``roll = atan2(−f_z, f_y)``, and with the rate turned level,
-    ``ω_l = R_z(pitch)·R_x(roll)·ω``, ``heading = atan2(−ω_lz, ω_lx)``. S 3.164 takes the arcsine of f_x/g and 3.166 the
-    arccosine of one gyro's rate; those need the very magnitudes, lose the heading's sign and, near north and south, its
-    precision. Raises `BadParameter` near a pole and `Undetermined` near the vertical.
+    ``ω_l = R_z(pitch)·R_x(roll)·ω``, ``heading = atan2(−ω_lz, ω_lx)``. Textbook S 3.164 takes the arcsine of f_x/g
+    and 3.166 the arccosine of one gyro's rate; those need the very magnitudes, lose the heading's sign and, near
+    north and south, its precision. Raises `BadParameter` near a pole and `Undetermined` near the vertical.
     """
     require_alignable(latitude_deg)
     angles = _angles(force_b, rate_b)

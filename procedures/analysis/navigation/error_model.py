@@ -1,9 +1,9 @@
 """Linear error equations of a strapdown navigator that does not move (textbook S 4.119 with zero velocity).
 
 Frame: north, up, east, a spherical Earth as in S. The attitude error ε = (χ, α, β) is the turn by which the vectors
-that the navigator computes differ from the true ones, ``ñ = n − ε × n`` (S 4.100-4.102): χ about north, α about up, β
-about east. With the heading clockwise, ``heading computed − true = α`` (S 4.140, whose yaw is counterclockwise, has
-−α); a level unit heading north has a pitch error of −β and a roll error of −χ.
+that the navigator computes differ from the true ones, ``ñ = n − ε × n`` (textbook S 4.100-4.102): χ about north, α
+about up, β about east. With the heading clockwise, ``heading computed − true = α`` (textbook S 4.140, whose yaw is
+counterclockwise, has −α); a level unit heading north has a pitch error of −β and a roll error of −χ.
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ and longitude [rad] and height [m]."""
 TILT_NORTH, HEADING, TILT_EAST, V_NORTH, V_UP, V_EAST, LATITUDE, LONGITUDE, HEIGHT = range(9)
 
 EARTH_RADIUS_M = 6_371_000.0
-"""Sphere's radius (S 4.1): with g = 9.81 m/s² the Schuler period is 84.4 min. The ellipsoid's radii of curvature differ
-from it by up to 0.6 %, and the result as much."""
+"""Sphere's radius (textbook S 4.1): with g = 9.81 m/s² the Schuler period is 84.4 min. The ellipsoid's radii of
+curvature differ from it by up to 0.6 %, and the result as much."""
 
 LATITUDE_MAX_DEG = 89.0
 """Greatest latitude: nearer to a pole longitude and heading degenerate, as the equations divide by cos L."""
@@ -47,7 +47,7 @@ class Place:
 
     @property
     def schuler_rad_s(self) -> float:
-        """Schuler frequency ``ω₀ = √(g/R)`` (S 4.10)."""
+        """Schuler frequency ``ω₀ = √(g/R)`` (textbook S 4.10)."""
         return float(np.sqrt(self.gravity_m_s2 / self.radius_m))
 
     @property
@@ -67,7 +67,7 @@ class Place:
 def dynamics(place: Place) -> tuple[Array, Array]:
     """``ẋ = F·x + B·u``: F (9, 9) over `STATES`, B (9, 6) over gyro errors [rad/s] and accelerometer errors [m/s²].
 
-    u has measured − true along north, up, east: three gyros, then three accelerometers. S 4.119 with V = 0:
+    u has measured − true along north, up, east: three gyros, then three accelerometers. Textbook S 4.119 with V = 0:
     ``χ̇ = −β·Ω sin φ + ΔV_E/R − Ω sin φ·Δφ − e_N``, ``α̇ = β·Ω cos φ + Ω cos φ·Δφ + ΔV_E·tan φ/R − e_U``,
     ``β̇ = χ·Ω sin φ − α·Ω cos φ − ΔV_N/R − e_E``, ``ΔV̇_N = g·β − 2Ω sin φ·ΔV_E + a_N``,
     ``ΔV̇_E = −g·χ + 2Ω sin φ·ΔV_N − 2Ω cos φ·ΔV_U + a_E``, ``ΔV̇_U = 2Ω cos φ·ΔV_E + 2g/R·Δh + a_U``,
@@ -124,10 +124,10 @@ def responses(place: Place, duration_s: float, steps: int) -> Responses:
 def self_alignment(place: Place) -> Array:
     """Initial errors per sensor error where the navigator aligned itself at this very place, shape (9, 6).
 
-    Levelling puts the measured specific force upright, gyrocompassing the measured rate to the north (S 3.163-3.166):
-    ``β₀ = −a_N/g``, ``χ₀ = a_E/g``, ``α₀ = (χ₀·Ω sin φ − e_E)/(Ω cos φ)``: the error of thesis 1.1. Accelerometers
-    with constant errors leave such a navigator almost at rest: an east one entirely, a north one except for a drift of
-    ``a_N/g·Ω``, since its tilt acts as an error of latitude.
+    Levelling puts the measured specific force upright, gyrocompassing the measured rate to the north (textbook S
+    3.163-3.166): ``β₀ = −a_N/g``, ``χ₀ = a_E/g``, ``α₀ = (χ₀·Ω sin φ − e_E)/(Ω cos φ)``: the error of thesis 1.1.
+    Accelerometers with constant errors leave such a navigator almost at rest: an east one entirely, a north one
+    except for a drift of ``a_N/g·Ω``, since its tilt acts as an error of latitude.
     """
     initial = np.zeros((9, 6))
     initial[TILT_EAST, 3] = -1.0 / place.gravity_m_s2

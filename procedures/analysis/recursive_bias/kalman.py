@@ -1,10 +1,10 @@
 """The Kalman filter of a constant bias (textbook S 5.4.3, example 5.4.3, and 6.2), and the same under coloured noise.
 
 The state is the bias, ``x(k+1) = x(k)``; a measurement is ``z(k) = x + v(k)``. Under white noise of variance R this is
-S 5.180-5.183 with Φ = H = 1, Q = 0: ``K = P/(P + R)``, ``P ← (1 − K)·P``, ``x̂ ← x̂ + K·(z − x̂)``. Under noise of any
-covariance C = L·Lᵀ the innovations of the noise are white: ``y = L⁻¹z = L⁻¹1·x + ν`` with unit variance, and since L is
-triangular, y(k) needs the measurements up to k alone. Filtering y thus accounts for the whole of C, without additional
-states.
+Textbook S 5.180-5.183 with Φ = H = 1, Q = 0: ``K = P/(P + R)``, ``P ← (1 − K)·P``, ``x̂ ← x̂ + K·(z − x̂)``. Under
+noise of any covariance C = L·Lᵀ the innovations of the noise are white: ``y = L⁻¹z = L⁻¹1·x + ν`` with unit variance,
+and since L is triangular, y(k) needs the measurements up to k alone. Filtering y thus accounts for the whole of C,
+without additional states.
 """
 
 import numpy as np
@@ -38,12 +38,12 @@ class RecursiveBias:
 
     @property
     def variances(self) -> Array:
-        """P(k|k) after each of the n measurements, known before the first: S 5.183, shape (n,)."""
+        """P(k|k) after each of the n measurements, known before the first: textbook S 5.183, shape (n,)."""
         return 1.0 / self._information
 
     @property
     def gains(self) -> Array:
-        """Gains K(k) on the innovation of each measurement, shape (n,): S 5.181 where the noise is white.
+        """Gains K(k) on the innovation of each measurement, shape (n,): textbook S 5.181 where the noise is white.
 
         ``x̂(k) = x̂(k−1) + K(k)·(z(k) − ẑ(k))``, with ẑ(k) the measurement expected from all before it.
         """

@@ -75,7 +75,7 @@ def recorded_alignments(recordings: Sequence[Recording], unit: Unit, site: Site,
 
 
 def found_attitudes(recordings: Sequence[Recording], plan: Alignments) -> Array:
-    """(heading, pitch, roll) of each recording's corrected means, shape (n, 3) [rad] (S 3.163-3.166).
+    """(heading, pitch, roll) of each recording's corrected means, shape (n, 3) [rad] (textbook S 3.163-3.166).
 
     Raises `UnfitRecording` where the recordings are not in the calibration's unit, or stood on end.
     """

@@ -1,4 +1,4 @@
-"""Stage one, the signal converter alone: currents of a precision source on its inputs over temperature (T 3.8–3.17; C).
+"""Stage one: the signal converter with a precision current source over temperature (thesis 3.8–3.17; paper C).
 
 ``N± `` are the mean codes at ``±I``: zero ``ΔN = (N⁺ + N⁻)/2`` (3.10), centred code ``N_c = (N⁺ − N⁻)/2`` (3.11), scale
 ``K = N_c/I`` (3.12), zero at the input ``ΔI = ΔN/K`` (3.13).
@@ -14,7 +14,7 @@ from procedures.core.errors import BadParameter, UnfitRecording
 
 @dataclass(frozen=True)
 class ZeroAndScale:
-    """Zero and scale of T 3.10–3.13 at each soak, (n,) each."""
+    """Zero and scale of thesis 3.10–3.13 at each soak, (n,) each."""
 
     zero_code: Array
     """Zero code ΔN, (n,)."""

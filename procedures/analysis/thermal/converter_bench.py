@@ -1,4 +1,4 @@
-"""Models of a converter alone from its recordings: currents of both signs at each soak (T 3.8–3.17; C).
+"""Models of a converter alone from its recordings: currents of both signs at each soak (thesis 3.8–3.17; paper C).
 
 The two stations of a soak are minutes apart, so the sensor does not read quite the same at both. Codes are brought to
 the mean of the two readings with the model itself, which is fitted again; the drift within a soak being small, it has

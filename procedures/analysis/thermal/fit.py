@@ -1,9 +1,9 @@
-"""The coefficients of T 4.1 from runs with each axis up in turn: one fit an axis, with their whole covariance.
+"""The coefficients of thesis 4.1 from runs with each axis up in turn: one fit an axis, with their whole covariance.
 
-At rest the corrected output is the known force f, so ``V = f/(K0 + A) − B0 − B`` with A and B the polynomials of T 4.1.
-A run with the axis horizontal (f ≈ 0) gives B, the vertical one (f = g) gives A (thesis 4.2.1). All runs are
-solved at once, because B acts in the vertical one too and a horizontal axis is never quite horizontal. Every launch has
-a bias of its own: an intercept for each horizontal run, and in the vertical one what it adds to K0.
+At rest the corrected output is the known force f, so ``V = f/(K0 + A) − B0 − B`` with A and B the polynomials of
+thesis 4.1. A run with the axis horizontal (f ≈ 0) gives B, the vertical one (f = g) gives A (thesis 4.2.1). All runs
+are solved at once, because B acts in the vertical one too and a horizontal axis is never quite horizontal. Every
+launch has a bias of its own: an intercept for each horizontal run, and in the vertical one what it adds to K0.
 """
 
 from collections.abc import Sequence
@@ -113,7 +113,7 @@ def _with_lags(
 
 
 def fit_axis(runs: Sequence[ThermalRun], axis: int, reference_c: tuple[float, float], form: Form) -> AxisFit:
-    """Fit T 4.1 to one accelerometer; see `fit_correction`.
+    """Fit thesis 4.1 to one accelerometer; see `fit_correction`.
 
     The cells of each regime are weighted by the inverse spread of its own residuals: sensors that lag make the dynamic
     ones worse. The form ``both`` is fitted by generalised least squares with the residuals' noise (`correlated`); the

@@ -1,6 +1,6 @@
 """Performance of a correction: 3σ at each soak before and after, and |ĝ| over the whole cycle (thesis table 4.5).
 
-T 4.5 leaves open the reference of its 3σ. It is taken as the whole departure from the same launch's output in its
+Thesis 4.5 leaves open the reference of its 3σ. It is taken as the whole departure from the same launch's output in its
 reference soak, ``3·√(mean((v − v_ref)²))`` over the steady part of the soak: that is what an uncorrected unit is wrong
 by, and it is of the printed size. The spread about the soak's own mean is reported as well.
 """
@@ -95,7 +95,7 @@ def three_sigma(run: ThermalRun, correction: Corrects, reference: Soak, at: Soak
 
 @dataclass(frozen=True)
 class Magnitude:
-    """``|ĝ| = √(ĝ_x² + ĝ_y² + ĝ_z²)`` over a run, less gravity [m/s²] (T 3.2.3, the end)."""
+    """``|ĝ| = √(ĝ_x² + ĝ_y² + ĝ_z²)`` over a run, less gravity [m/s²] (thesis 3.2.3, the end)."""
 
     errors_m_s2: Array
     """Errors of the magnitude, shape (n,)."""

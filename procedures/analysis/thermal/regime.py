@@ -3,7 +3,7 @@
 The thesis compares |d²T/dt²| of the case with a threshold, which its text calls one of the *rate*. The second
 derivative alone marks where a ramp begins and ends: on a ramp longer than the case's time constant it dies away while
 the temperature still runs. So it opens the dynamic regime, and both must be quiet before the static one returns; with
-`release_rate_c_s` infinite it is T 3.18 to the letter.
+`release_rate_c_s` infinite it is thesis 3.18 to the letter.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ class RegimeSettings:
     memory_s: float = 120.0
     """Time constant of each of the filter's three poles; the indicator's delay is three of them."""
     enter_c_s2: float = 4.0e-6
-    """ΔT of T 3.18: |second derivative| above it is dynamic [°C/s²]."""
+    """ΔT of thesis 3.18: |second derivative| above it is dynamic [°C/s²]."""
     release_c_s2: float = 2.5e-6
     """Hysteresis limit: |second derivative| must fall below it [°C/s²] …"""
     release_rate_c_s: float = 2.5e-3
@@ -80,7 +80,7 @@ class RegimeSample:
 
 
 class RegimeIndicator:
-    """Regime indicator of T 3.18 in real time, with a fixed state of five numbers.
+    """Regime indicator of thesis 3.18 in real time, with a fixed state of five numbers.
 
     The derivatives are those of the discounted least-squares parabola (fading-memory filter of second degree;
     N. Morrison, Introduction to Sequential Smoothing and Prediction, 1969, ch. 13): with θ = exp(−Δ/memory), the state

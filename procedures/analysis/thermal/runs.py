@@ -45,7 +45,7 @@ class ThermalRun:
     output_m_s2: Array
     """Nominal outputs of the accelerometers, (n, 3), the converter's own model already taken out (stage one)."""
     case_c: Array
-    """Case temperature, (n,); or (n, 3), a sensor for each axis, such as the gyros' (T 4.1)."""
+    """Case temperature, (n,); or (n, 3), a sensor for each axis, such as the gyros' (thesis 4.1)."""
     converter_c: Array
     """Sensor on the converter's board, (n,)."""
     dynamic: NDArray[np.bool_]

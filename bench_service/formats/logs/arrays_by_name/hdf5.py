@@ -57,7 +57,7 @@ class _Place:
 
 
 class Hdf5:
-    """An HDF5 file."""
+    """Reader of an HDF5 file."""
 
     def __init__(self, stream: BinaryIO, name: str) -> None:
         self._name = name

@@ -210,7 +210,7 @@ class Mcap:
         return found
 
     def tables(self) -> list[LogTable]:
-        """List the topics."""
+        """List the topics as tables."""
         return [topic.table() for topic in self._channels.values() if topic.rows != 0]
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:

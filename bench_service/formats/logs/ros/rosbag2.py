@@ -76,7 +76,7 @@ class Database:
         return found
 
     def tables(self) -> list[LogTable]:
-        """List the topics."""
+        """List the topics as tables."""
         return [topic.table() for topic in self._topics.values() if topic.rows]
 
     def rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:

@@ -1,4 +1,4 @@
-"""Performance of each correction form on a cycle, and C's normalised polynomial to compare with (thesis 4.5, 3.2.3).
+"""Performance of each correction form on a cycle, beside the polynomial of paper C (thesis table 4.5, 3.2.3).
 
 A correction is worth what it leaves: 3σ at each soak about the run's own reference soak, and |ĝ| over the whole run.
 """

@@ -1,4 +1,4 @@
-"""Gyros in a thermal cycle: is their rate independent of temperature, and is their noise that of rest (T 4.2.3)?"""
+"""Gyros in a thermal cycle: tests of their rate against temperature and of their noise at rest (thesis 4.2.3)."""
 
 from collections.abc import Sequence
 from math import log, sqrt

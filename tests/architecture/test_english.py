@@ -1,0 +1,63 @@
+"""Plain English, as far as a machine can tell: summaries, names and private words (docs/english.md)."""
+
+import ast
+import re
+
+from tests.kit.documents import PACKAGES, PAGES, ROOT
+from tests.kit.page_texts import of_scripts, of_templates
+
+SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+HEADLESS = ("What ", "Who ", "Whoever ", "Whose ", "Of ")
+LEAST_WORDS = 4
+MOST_SHORT = 10
+"""Summaries that may have fewer words; each is one more than none, and a new one pushes an old one out."""
+POETIC = re.compile(r"^(Told\w*|\w*Beside\w*|\w*Whoever\w*|\w*Eye|\w*Nobody\w*|in_our_words|\w+Desk)$")
+KNOWN_POETIC = {"bench_service/api/feed/news.py: NewsDesk"}
+"""Names that stand until their room is changed anyway."""
+PRIVATE = re.compile(r"in our words|nobody's|\bthe told\b|\bpatience\b", re.IGNORECASE)
+
+
+def _summaries() -> list[tuple[str, str]]:
+    found = []
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+                text = ast.get_docstring(node)
+                if text:
+                    name = f"{path.relative_to(ROOT)}: {getattr(node, 'name', '')}"
+                    found.append((name, " ".join(text.split("\n\n")[0].split())))
+    return found
+
+
+def test_summaries_begin_with_a_noun_or_a_verb_and_have_four_words() -> None:
+    summaries = _summaries()
+    assert len(summaries) > 2000
+    headless = [f"{place}: {text}" for place, text in summaries if text.startswith(HEADLESS)]
+    assert headless == []
+    short = [f"{place}: {text}" for place, text in summaries if len(text.split()) < LEAST_WORDS]
+    assert len(short) <= MOST_SHORT, f"name the thing or the verb in four words at least: {short}"
+
+
+def test_no_class_or_function_has_a_poetic_name() -> None:
+    poetic = {
+        f"{path.relative_to(ROOT)}: {node.name}"
+        for path in SOURCES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and POETIC.match(node.name)
+    }
+    assert poetic <= KNOWN_POETIC, f"name it after its pattern or its thing, see docs/english.md: {poetic}"
+
+
+def test_pages_and_documents_have_no_private_words() -> None:
+    texts = of_templates() | of_scripts()
+    assert len(texts) > 100
+    assert {text for text in texts if PRIVATE.search(text)} == set()
+    quoting = {"english.md", "changelog.md"}  # they show the words that are not to be used, or keep old entries
+    lines = [
+        f"{page.name}: {line.strip()}"
+        for page in PAGES
+        if page.name not in quoting
+        for line in page.read_text(encoding="utf-8").splitlines()
+        if PRIVATE.search(line)
+    ]
+    assert lines == []
