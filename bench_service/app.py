@@ -17,6 +17,7 @@ from bench_service.api import (
     database,
     health,
     metrics,
+    mountings,
     procedures,
     recordings,
     reservations,
@@ -96,6 +97,7 @@ ROUTERS = (
     trends,
     benches,
     reservations,
+    mountings,
     campaigns,
     schedules,
     access,
@@ -127,6 +129,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         stores.units,
         BenchDirectory(stores.benches, stores.units, driver, settings.bench_id, drawn_unit, holder),
         Catalogue(),
+        stores.mountings,
     )
     code = code_version()
     traces = traces_to(settings.traces_url, settings.bench_id, code)
@@ -157,22 +160,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     )
     roads = _roads(settings, opened, closing)
     processes = _work_apart(settings, code, closing) if apart else None
-    whole = DatabaseContents(opened), settings.scrub_at
-    service = BenchService(
-        stores,
-        driver,
-        planner,
-        worker,
-        code,
-        safety,
-        board,
-        opened.free_bytes,
-        traces,
-        roads,
-        rescued,
-        processes,
-        *whole,
-    )
+    given = stores, driver, planner, worker, code, safety, board, opened.free_bytes, traces, roads, rescued, processes
+    service = BenchService(*given, DatabaseContents(opened), settings.scrub_at)
     if settings.audit_days is not None:
         retention = AuditRetention(stores.audit, timedelta(days=settings.audit_days))
         retention.begin()

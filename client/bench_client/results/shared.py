@@ -118,3 +118,4 @@ class TriadSummary(Part):
     weighting: Literal["noise_and_table", "noise"] = "noise"
     misfit: float | None = None
     worst: str = ""
+    left_out: Magnitudes | None = None
