@@ -5,7 +5,7 @@ new mounting ends the ones before it of the same unit and of the same plate.
 """
 
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import Protocol
 
 from bench_service.mapping import copied
@@ -14,6 +14,8 @@ from bench_service.model.records import Idempotency, Page
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter
 
+EARLIEST = datetime(1970, 1, 1, tzinfo=UTC)
+"""No mounting is older."""
 AHEAD = timedelta(minutes=1)
 """How far the client's clock may be ahead."""
 
@@ -71,8 +73,8 @@ class MountingEntry:
 
 
 def new_mounting(entry: MountingEntry) -> StoredMounting:
-    """The mounting of an entry. Raises `BadParameter` for one that lies ahead."""
+    """The mounting of an entry. Raises `BadParameter` for one that lies ahead, or before 1970."""
     at = now()
-    if entry.mounted_at is not None and entry.mounted_at > at + AHEAD:
-        raise BadParameter("mounted_at", entry.mounted_at.isoformat(), f"not after now, {at.isoformat()}")
+    if entry.mounted_at is not None and not EARLIEST <= entry.mounted_at <= at + AHEAD:
+        raise BadParameter("mounted_at", entry.mounted_at.isoformat(), f"from 1970 to now, {at.isoformat()}")
     return copied(StoredMounting, entry, id=new_id(), entered_at=at, mounted_at=entry.mounted_at or at)

@@ -103,6 +103,7 @@ def test_nobody_mounts_a_unit_on_a_bench_that_moves(bare: Client) -> None:
         ({"unit": "nobody-1"}, "nobody-1"),
         ({"mounted_at": "2100-01-01T00:00:00Z"}, "mounted_at"),
         ({"mounted_at": "2026-01-01T00:00:00"}, "mounted_at"),
+        ({"mounted_at": "0001-01-01T00:00:00+23:59"}, "mounted_at"),
     ],
 )
 def test_what_cannot_be_is_refused_by_its_field(bare: Client, wrong: dict, said: str) -> None:
