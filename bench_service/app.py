@@ -56,7 +56,7 @@ from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.worker import Worker
-from bench_service.notifications.opening import open_notifier
+from bench_service.notifications.opening import begin_notifier
 from bench_service.pages import (
     access_pages,
     campaign_pages,
@@ -153,24 +153,28 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         guard.begin()
         closing.callback(guard.end)
         closing.callback(files.keep_books(stores).end)
-        if settings.notify is not None:
-            closing.callback(open_notifier(settings, stores, opened.free_bytes, LEAST_FREE_BYTES).end)
+        begin_notifier(settings, stores, opened.free_bytes, LEAST_FREE_BYTES, closing)
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
     roads = _roads(settings, opened, closing)
     processes = _work_apart(settings, code, closing) if apart else None
-    given = stores, driver, planner, worker, code, safety, board, opened.free_bytes, traces, roads, rescued, processes
-    service = BenchService(*given, DatabaseContents(opened), settings.scrub_at)
+    made_of = stores, driver, planner, worker, code, safety, board, opened.free_bytes, traces, roads, rescued, processes
+    service = BenchService(*made_of, DatabaseContents(opened), settings.scrub_at)
+    _keep_access(service, settings, closing)
+    closing.callback(service.stop)
+    service.register()
+    return service
+
+
+def _keep_access(service: BenchService, settings: Settings, closing: ExitStack) -> None:
+    """Follow accounts and tokens that other processes change, and end stretches of the audit trail that are old."""
     if settings.audit_days is not None:
-        retention = AuditRetention(stores.audit, timedelta(days=settings.audit_days))
+        retention = AuditRetention(service.stores.audit, timedelta(days=settings.audit_days))
         retention.begin()
         closing.callback(retention.end)
     service.access.book.begin()
     closing.callback(service.access.book.end)
-    closing.callback(service.stop)
-    service.register()
-    return service
 
 
 def _roads(settings: Settings, opened: Database, closing: ExitStack) -> StopRoads:

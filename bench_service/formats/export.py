@@ -41,7 +41,7 @@ class ExportFormat(StrEnum):
         }[self.value]
 
 
-HELD = {ExportFormat.ARROW: 4, ExportFormat.PARQUET: 5, ExportFormat.CSV: 8}
+HELD = {ExportFormat.ARROW: 4, ExportFormat.PARQUET: 5, ExportFormat.CSV: 8, ExportFormat.NPY: 4}
 """Times a chunk's raw bytes that an export of it holds: as read, as columns, and as text or as a page of the file."""
 
 

@@ -51,8 +51,8 @@ def read_value(where: str, value: Any, key: Key) -> Any:
 
 
 def read_record(kind: type[Any], where: str, table: Any, needed: set[str]) -> Any:
-    """Read a flat record of numbers from a table of the same names."""
-    numbers = _numbers(where, table, {f.name for f in fields(kind)}, needed)
+    """Read a flat record of numbers and flags from a table of the same names."""
+    numbers = _numbers(where, table, kind, needed)
     try:
         return kind(**numbers)
     except ValueError as refusal:
@@ -62,7 +62,7 @@ def read_record(kind: type[Any], where: str, table: Any, needed: set[str]) -> An
 def read_changes(default: T, where: str, table: Any, keys: Mapping[str, Key] | None = None) -> T:
     """Replace the values of a record that a table gives; `keys`: None: flat numbers by the same names."""
     if keys is None:
-        changes = _numbers(where, table, {f.name for f in fields(cast(Any, default))}, set())
+        changes = _numbers(where, table, cast(Any, default), set())
     else:
         check_keys(where, _table(where, table), set(keys), set())
         changes = {keys[k].attribute: read_value(f"{where}.{k}", v, keys[k]) for k, v in table.items()}
@@ -72,9 +72,18 @@ def read_changes(default: T, where: str, table: Any, keys: Mapping[str, Key] | N
         raise TruthError(f"{where}: {refusal}") from refusal
 
 
-def _numbers(where: str, table: Any, known: set[str], needed: set[str]) -> dict[str, float]:
-    check_keys(where, _table(where, table), known, needed)
-    return {k: within(f"{where}.{k}", v, -1e6, 1e6) for k, v in table.items()}
+def _numbers(where: str, table: Any, record: Any, needed: set[str]) -> dict[str, float | bool]:
+    types = {f.name: f.type for f in fields(record)}
+    check_keys(where, _table(where, table), set(types), needed)
+    return {k: _flag_or_number(f"{where}.{k}", v, types[k] in (bool, "bool")) for k, v in table.items()}
+
+
+def _flag_or_number(where: str, value: Any, is_flag: bool) -> float | bool:
+    if not is_flag:
+        return within(where, value, -1e6, 1e6)
+    if not isinstance(value, bool):
+        raise TruthError(f"{where} = {value!r} must be true or false")
+    return value
 
 
 def _table(where: str, table: Any) -> Table:

@@ -94,7 +94,7 @@ def charts(browser: Browser, service: BenchProcess, minutes: float) -> bool:
     page.goto(address(service) + "/units")
     page.wait_for_selector("html[data-ready]")
     page.evaluate(CHARTS)
-    pause(min(150.0, 60.0 * minutes / 4))  # until the first merge of old points: then the page is at its size
+    pause(150.0)  # until old points are merged for the first time: then the page is at its size
     before, sent = heap(page), page.evaluate("sent")
     begun = monotonic_s()
     pause(60.0 * minutes)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from bench_service.bench.devices import DeviceState
 from bench_service.bench.directory import BenchDirectory
 from bench_service.bench.safety import SafetyService
 from bench_service.campaigns.stores import Stores
@@ -58,8 +59,20 @@ def planner_of(stores: Stores, driver: SimulatedDriver) -> Planner:
     return Planner(stores.units, benches, Catalogue())
 
 
+class FoundSafe:
+    """The devices of a driver without a register, as a start finds them that has nothing to make safe."""
+
+    def __init__(self, driver: SimulatedDriver) -> None:
+        self.driver = driver
+        self.make_safe, self.compare = driver.make_safe, driver.compare
+
+    def device_state(self) -> DeviceState:
+        return self.driver.device_state() or DeviceState()
+
+
 def safety_of(stores: Stores, driver: SimulatedDriver) -> SafetyService:
-    return SafetyService(stores.benches, lambda _: driver, lambda _: NoWatch(), stores.jobs.note)
+    devices = FoundSafe(driver) if driver._register is None else driver
+    return SafetyService(stores.benches, lambda _: devices, lambda _: NoWatch(), stores.jobs.note)
 
 
 def prepared(stores: Stores, driver: SimulatedDriver, lease_held: Callable[[], bool]) -> tuple[JobRunner, Job]:

@@ -178,3 +178,31 @@ def test_the_shell_completes_commands_and_procedures(
     asked = {"_BENCH_COMPLETE": "complete_bash", "COMP_WORDS": "bench run stat", "COMP_CWORD": "2"}
     monkeypatch.setattr(os, "environ", {**os.environ, **asked})
     assert answered().split() == ["static_run"]
+
+
+def test_known_coefficients_are_entered_chosen_approved_and_rejected(bench: Bench, tmp_path: Path) -> None:
+    file = tmp_path / "passport.json"
+    names = [f"{name}" for i in (1, 2, 3) for name in (f"b_{'xyz'[i - 1]}", f"K{i}1", f"K{i}2", f"K{i}3")]
+    ones = ("K11", "K22", "K33")
+    coefficients = [
+        {
+            "name": name,
+            "value": 1.0 if name in ones else 0.0,
+            "unit": "m/s^2" if name.startswith("b") else "1",
+            "standard_uncertainty": 1e-4,
+        }
+        for name in names
+    ]
+    body = {"triad": "accelerometer", "origin": "passport 12/7", "coefficients": coefficients}
+    file.write_text(json.dumps(body))
+    entered = bench("calibration", "enter", "SIM-0001", file, "--choose", "--by", "Olena", "--json")
+    assert entered.code == 0, entered.err
+    one = json.loads(entered.out)
+    assert (one["triad"], one["current"]) == ("accelerometer", True)
+    assert "passport 12/7" in bench("calibrations", "SIM-0001").out
+    assert bench("calibration", "approve", "SIM-0001", one["id"], "--valid-until", "2099-01-01T00:00:00Z").code == 0
+    refused = bench("calibration", "reject", "SIM-0001", one["id"], "--remark", "wrong unit", "--json")
+    assert json.loads(refused.out)["approval"] == "rejected"
+    one_line(bench("calibration", "choose", "SIM-0001"), "exactly one of")
+    file.write_text("{")
+    one_line(bench("calibration", "enter", "SIM-0001", file), "no JSON")

@@ -12,7 +12,7 @@ import uvicorn
 from fastapi import FastAPI
 from starlette.responses import StreamingResponse
 
-from bench_service.api.http import errors
+from bench_service.api.http import endings, errors
 from bench_service.wall_clock import pause
 
 
@@ -21,6 +21,7 @@ def server() -> Iterator[tuple[uvicorn.Server, str, threading.Event]]:
     """A real server with one route that takes longer than the server's patience at its end."""
     app, reached, free = FastAPI(), threading.Event(), threading.Event()
     errors.install(app)
+    endings.install(app)
 
     @app.post("/slow")
     def slow() -> None:

@@ -40,7 +40,7 @@ def test_of_each_kind_one_is_current(stores: Stores, new_result: NewResult) -> N
         stores.results.add(new_result(), corrections=[thermal(seed)])
     stores.results.add(new_result(unit="U-2"), corrections=[thermal(3)])
     stores.results.add(new_result(), corrections=[converter(4)])
-    stores.results.add(new_result(), make_current=False, corrections=[thermal(5), converter(6)])
+    stores.results.add(new_result(), by_rule=False, corrections=[thermal(5), converter(6)])
     shown = [c for c in stores.corrections.list("U-1").items if c.current]
     assert {repr(c.correction) for c in shown} == {repr(thermal(2)), repr(converter(4))}
     page = stores.corrections.list("U-1", kind="thermal", limit=2)

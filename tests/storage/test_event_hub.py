@@ -79,7 +79,7 @@ def test_a_newcomer_hears_all_that_came_after_and_then_what_comes(
         heard = [await anext(late) for _ in range(max(0, RECENT + 101 - after))]
         stores.jobs.request_cancel(job.id, now())
         heard += [frame async for frame in late]
-        assert ids(heard) == list(range(after + 1, RECENT + 103))
+        assert ids(heard) == list(range(after + 1, RECENT + 104))
         await first.aclose()
 
     asyncio.run(scene())
@@ -145,8 +145,8 @@ def test_a_stream_ends_with_the_job_and_goes_on_after_a_resume(stores: Stores, n
         rest = asyncio.create_task(all_of(hub, 0))
         await note(stores, job)
         await asyncio.to_thread(stores.jobs.request_cancel, job.id, now())
-        assert await rest == [1, 2, 3, 4, 5]
-        assert await all_of(hub, 4) == [5]
+        assert await rest == [1, 2, 3, 4, 5, 6]
+        assert await all_of(hub, 5) == [6]
         assert hub.listeners == 0
 
     asyncio.run(scene())

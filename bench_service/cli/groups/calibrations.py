@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from bench_service.cli.asking.client import call, connect, segment
-from bench_service.cli.files import whole_file
+from bench_service.cli.files import text_of
 from bench_service.cli.options import AsJson, Server, console, wide
 from bench_service.cli.refusal import Refused
 
@@ -106,7 +106,7 @@ def enter(
 ) -> None:
     """Enter known coefficients of a triad with their standard uncertainties and their origin, from a JSON file."""
     try:
-        body = json.loads(whole_file(file))
+        body = json.loads(text_of(file))
     except ValueError as error:
         raise Refused(f"{file}: no JSON: {error}") from error
     if not isinstance(body, dict):

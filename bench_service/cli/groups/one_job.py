@@ -77,11 +77,14 @@ def answer_job(
     job_id: Job,
     done: Annotated[bool, typer.Option("--done/--declined", help="What was asked is done, or will not be")],
     remark: Annotated[str, typer.Option(help="Remark on it")] = "",
+    prompt: Annotated[str | None, typer.Option(help="Id of the prompt; without it, the one that is asked now")] = None,
     by: By = None,
     server: Server = None,
 ) -> None:
     """Answer what a job asks of the person at the bench; a job that is declined ends cancelled."""
-    _ask(context, job_id, "answer", by, server, {"done": done, "remark": remark})
+    with connect(context.obj, server, drive=False) as client:
+        asked = prompt or (_read(client, job_id).get("prompt") or {}).get("id", "none")
+        _say(_post(client, job_id, "answer", by, {"prompt": asked, "done": done, "remark": remark}))
 
 
 @job.command("priority")

@@ -11,10 +11,11 @@ const answered = new Set();
 let sounded = "";
 
 function away() {
-  const box = document.getElementById("away"), gone = feed.state.alive === false;
+  const box = document.getElementById("away"), logsIn = document.getElementById("log-in") && feed.state.why === "log-in";
+  const gone = feed.state.alive === false && !logsIn;
   document.body.classList.toggle("away", gone);
   document.getElementById("main").setAttribute("aria-busy", String(gone));
-  box.hidden = !gone && !feed.state.why;
+  box.hidden = logsIn || (!gone && !feed.state.why);
   box.replaceChildren();
   if (gone && feed.state.why === "log-in") {
     box.append(h("strong", {}, t("Your log-in has ended; the stop works without one.")), " ", h("a", { href: `/log-in?next=${part(location.pathname)}` }, t("Log in")));

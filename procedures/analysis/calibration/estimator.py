@@ -129,5 +129,5 @@ def _times_each(gain: Array, matrices: Array) -> Array:
 
 def table_share(plan: Estimator, of_table: Array, table: TableErrors) -> TableShare:
     """The table's flaws carried through the outputs `of_table` F (n, 3, P) and the estimator into the coefficients."""
-    flaws = of_table.transpose(1, 0, 2).reshape(-1, of_table.shape[2])
+    flaws = of_table.transpose(1, 0, 2).reshape(3 * of_table.shape[0], of_table.shape[2])
     return TableShare(plan.gain.reshape(12, -1) @ flaws, table.source)
