@@ -17,6 +17,7 @@ from bench_service.api import (
     database,
     health,
     metrics,
+    mountings,
     procedures,
     recordings,
     reservations,
@@ -99,6 +100,7 @@ ROUTERS = (
     trends,
     benches,
     reservations,
+    mountings,
     campaigns,
     schedules,
     access,
@@ -130,6 +132,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         stores.units,
         BenchDirectory(stores.benches, stores.units, driver, settings.bench_id, drawn_unit, holder),
         Catalogue(),
+        stores.mountings,
     )
     code = code_version()
     traces = traces_to(settings.traces_url, settings.bench_id, code)
@@ -159,20 +162,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     )
     roads = _roads(settings, opened, closing)
     processes = _work_apart(settings, code, closing) if apart else None
-    made_of = (
-        stores,
-        driver,
-        planner,
-        worker,
-        code,
-        safety,
-        board,
-        opened.free_bytes,
-        traces,
-        roads,
-        rescued,
-        processes,
-    )
+    made_of = stores, driver, planner, worker, code, safety, board, opened.free_bytes, traces, roads, rescued, processes
     service = BenchService(*made_of, DatabaseContents(opened), settings.scrub_at)
     _keep_access(service, settings, closing)
     closing.callback(service.stop)

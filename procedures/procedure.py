@@ -1,7 +1,7 @@
 """Interface of a catalogue file: a procedure is three functions and a little around them."""
 
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Generic, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -13,6 +13,7 @@ from procedures.bench.imu import Stream
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Check, PlannedCheck, Verdict
+from procedures.core.mounting import Mounting
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.unit import Unit
@@ -73,6 +74,14 @@ class Context:
 
     unit: Unit
     bench: BenchDescription
+    """The bench; the azimuth of its site is the mounting's where there is one."""
+    mounting: Mounting | None = None
+    """The mounting of the unit on the bench; None: nobody has entered one, the bench's declared azimuth counts."""
+
+    def on(self, mounting: Mounting) -> "Context":
+        """This context with a mounting, whose azimuth and its uncertainty replace those that the bench declares."""
+        azimuth = {"azimuth_deg": mounting.azimuth_deg, "azimuth_sd_arcsec": mounting.azimuth_sd_arcsec}
+        return replace(self, bench=replace(self.bench, site=replace(self.bench.site, **azimuth)), mounting=mounting)
 
 
 @dataclass(frozen=True)
@@ -110,6 +119,8 @@ class DatedCalibration:
     id: str
     made_at: str
     triads: tuple[TriadCalibration, ...]
+    mounting: str = ""
+    """Id of the unit's mounting under which it was made; empty: none is known."""
 
 
 @dataclass(frozen=True)

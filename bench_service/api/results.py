@@ -14,6 +14,7 @@ from bench_service.evidence.analyses import AnalysisRequest
 from bench_service.mapping import copied
 from bench_service.model.records import StoredResult
 from procedures.core.limits import Verdict
+from procedures.core.mounting import Mounting
 from procedures.core.report import Figure, Table
 
 router = APIRouter(prefix="/api/v1", tags=["analyses"])
@@ -39,12 +40,13 @@ class Lineage(BaseModel):
     simulated: bool
     seed: int | None
     job: str | None
+    mounting: Mounting | None = Field(description="Mounting of the unit whose azimuth counts; null: the bench's own")
 
     @classmethod
     def of(cls, result: StoredResult) -> "Lineage":
         """Take the lineage from a stored result."""
         recordings = [{"id": i, "content_hash": h} for i, h in result.recordings]
-        return copied(cls, result, recordings=recordings, job=result.job_id)
+        return copied(cls, result, recordings=recordings, job=result.job_id, mounting=result.context.get("mounting"))
 
 
 class ResultView(BaseModel):

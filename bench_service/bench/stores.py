@@ -1,8 +1,9 @@
-"""Stores of the bench room: the registry of benches, their live state, and prompts to the person at the bench."""
+"""Stores of the bench room: the registry of benches, their live state, mountings of units, and prompts to people."""
 
 from dataclasses import dataclass
 
 from bench_service.bench.live.values import LiveStore
+from bench_service.bench.mountings import MountingStore
 from bench_service.bench.prompts import PromptStore
 from bench_service.bench.registry import BenchRegistry
 from bench_service.evidence.stores import EvidenceStores
@@ -15,3 +16,4 @@ class BenchStores(EvidenceStores):
     benches: BenchRegistry
     live: LiveStore
     prompts: PromptStore
+    mountings: MountingStore

@@ -12,6 +12,7 @@ from bench_service.evidence.documents import document_of, require_storable
 from bench_service.evidence.job_analysis import analysed, recordings_of
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.evidence.work_processes import WorkProcesses
+from bench_service.model.calibrations import StoredCalibration
 from bench_service.model.context import context_of
 from bench_service.model.job import Job
 from bench_service.model.records import Idempotency, RecordingState, StoredResult
@@ -84,7 +85,7 @@ class AnalysisService:
         if self._processes is not None:
             return self._stores.results.get(self._processes.result("method", request, key))
         used = self._stores.calibrations.several(request.calibrations)
-        dated = tuple(DatedCalibration(c.id, c.made_at.isoformat(), (c.value,)) for c in used)
+        dated = tuple(DatedCalibration(c.id, c.made_at.isoformat(), (c.value,), self._mounting_of(c)) for c in used)
         evidence = Evidence(self._complete(request.recordings), dated)
         units = {r.info.unit for r in evidence.recordings} | {c.unit for c in used}
         if len(units) > 1:
@@ -109,6 +110,13 @@ class AnalysisService:
         gives = method.calibrations(outcome), method.corrections(outcome)
         require_storable(*gives)
         return self._stores.results.add(stored, gives[0], False, idempotency, gives[1])
+
+    def _mounting_of(self, calibration: StoredCalibration) -> str:
+        """Id of the mounting that the calibration's job rested on; empty where it rested on none."""
+        if calibration.result_id is None:
+            return ""
+        mounting = self._stores.results.get(calibration.result_id).context.get("mounting")
+        return mounting["id"] if mounting else ""
 
     def _complete(self, ids: Sequence[str]) -> tuple[Recording, ...]:
         """Recordings by their ids. Raises `NotFound`, and `UnfitRecording` for one that was interrupted."""

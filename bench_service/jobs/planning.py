@@ -4,12 +4,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from bench_service.bench.directory import BenchDirectory
+from bench_service.bench.mountings import MountingStore
 from bench_service.evidence.catalogue import AnyProcedure, Catalogue
 from bench_service.evidence.units import UnitStore
 from bench_service.model.errors import NotFound, NotMounted
+from bench_service.model.mountings import StoredMounting
 from bench_service.wall_clock import now
 from procedures.bench import BenchDescription
-from procedures.core.errors import ProcedureDefect
+from procedures.core.errors import BadParameter, ProcedureDefect
 from procedures.core.recording import Station
 from procedures.core.unit import Unit
 from procedures.procedure import Context, Parameters, Prediction
@@ -37,15 +39,34 @@ class Plan:
 class Planner:
     """Plans jobs from the catalogue of procedures on the known benches."""
 
-    def __init__(self, units: UnitStore, benches: BenchDirectory, catalogue: Catalogue) -> None:
+    def __init__(
+        self, units: UnitStore, benches: BenchDirectory, catalogue: Catalogue, mountings: MountingStore | None = None
+    ) -> None:
+        """Set up with `mountings` of units; None: none is known."""
         self.benches = benches
         self.catalogue = catalogue
         self._units = units
+        self._mountings = mountings
 
-    def context(self, unit: str, bench: str | None = None) -> Context:
-        """The current unit and bench. Raises `NotFound` for an unknown bench, `NotMounted` for a unit not on it."""
+    def context(self, unit: str, bench: str | None = None, mounting: str | None = None) -> Context:
+        """The current unit, bench and mounting. Raises `NotFound` for an unknown bench, `NotMounted` for its unit.
+
+        `mounting`: the id of the unit's mounting; None: the one that stands on that bench, if any. Raises
+        `BadParameter` for one that does not stand there.
+        """
         description = self.benches.description(self.benches.default() if bench is None else bench)
-        return Context(self.unit(unit, description.id), description)
+        context = Context(self.unit(unit, description.id), description)
+        stands = self.mounting(unit, description.id)
+        if mounting is not None and (stands is None or stands.id != mounting):
+            there = "none stands there" if stands is None else f"there stands {stands.id}"
+            raise BadParameter(
+                "mounting", mounting, f"one of unit {unit} that stands on bench {description.id}: {there}"
+            )
+        return context if stands is None else context.on(stands.for_context())
+
+    def mounting(self, unit: str, bench: str) -> StoredMounting | None:
+        """The mounting of a unit that stands on a bench now."""
+        return None if self._mountings is None else self._mountings.standing(unit, bench)
 
     def unit(self, serial: str, bench: str) -> Unit:
         """A unit that is mounted on a bench, with its current calibration. Raises `NotMounted`, `NotFound`."""
@@ -57,10 +78,17 @@ class Planner:
         except NotFound:
             return mounted[serial]
 
-    def plan(self, name: str, unit: str, requested: dict[str, Any], bench: str | None = None) -> Plan:
+    def plan(
+        self,
+        name: str,
+        unit: str,
+        requested: dict[str, Any],
+        bench: str | None = None,
+        mounting: str | None = None,
+    ) -> Plan:
         """Plan a job; nothing moves. Raises pydantic's `ValidationError`, `DomainError`, `NotFound`, `NotMounted`."""
         self.catalogue.procedure(name)  # an unknown procedure is said before an unknown unit
-        return self.plan_in(self.context(unit, bench), name, requested)
+        return self.plan_in(self.context(unit, bench, mounting), name, requested)
 
     def plan_in(self, context: Context, name: str, requested: dict[str, Any]) -> Plan:
         """Plan a job in a context that is known; raises as `plan`, but for the context."""
@@ -79,7 +107,7 @@ class Planner:
         return Plan(procedure, parameters, context, stations, prediction, data_bytes, violations)
 
     def refreshed(self, context: Context) -> Context:
-        """Refresh a context's unit: its noise, and the calibration that is current; the bench stays the same."""
+        """Refresh a context's unit: its noise, and the current calibration; bench and mounting stay the same."""
         return replace(context, unit=self._units.unit(context.unit.serial))
 
 

@@ -14,18 +14,19 @@ from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.session import BenchSession, ShuttingDown
 from bench_service.evidence.catalogue import AnyProcedure
 from bench_service.evidence.job_analysis import analysed, recordings_of
+from bench_service.jobs.as_planned import require_as_planned
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.retries import try_again
 from bench_service.jobs.stores import JobStores
-from bench_service.model.context import context_document, context_of, withheld_calibration
+from bench_service.model.context import context_document, context_of
 from bench_service.model.errors import DatabaseMoved, ServiceError, StorageFailure
 from bench_service.model.job import Failure, Job, JobState
 from bench_service.model.records import BenchStop, Idempotency, StoredResult
 from bench_service.wall_clock import now
 from procedures.bench import BenchNeeds
 from procedures.bench.errors import BenchError, Stopped
-from procedures.core.errors import DomainError, NoCalibration
+from procedures.core.errors import DomainError
 from procedures.core.limits import Verdict
 from procedures.procedure import Outcome
 
@@ -115,7 +116,7 @@ class JobRunner:
         if not self._lease_held():
             return StepOutcome(Failure("LeaseLost", "another process may drive this bench now", index))
         try:
-            self._require_usable_calibrations(job)
+            require_as_planned(job, self._planner)
             session = self._session_of(job)
             if self._ending.is_set():  # set while the bench was being opened, when there was no session to end
                 raise ShuttingDown
@@ -267,12 +268,6 @@ class JobRunner:
         except StorageFailure:
             return None
         return None
-
-    def _require_usable_calibrations(self, job: Job) -> None:
-        """Refuse a job whose unit's calibration was rejected or expired while it waited. Raises `NoCalibration`."""
-        triads = self._planner.catalogue.procedure(job.procedure).uses_calibration
-        if refusal := withheld_calibration(job, triads):
-            raise NoCalibration(refusal)
 
     def _session_of(self, job: Job) -> BenchSession:
         if self._session is not None and self._session.job.id == job.id:

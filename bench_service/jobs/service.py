@@ -53,7 +53,7 @@ class JobService:
         known = self._stores.keys.made(key, "job")
         if known is not None:
             return self._stores.jobs.get(known)
-        plan = self._planner.plan(request.procedure, request.unit, request.parameters, request.bench)
+        plan = self._planner.plan(request.procedure, request.unit, request.parameters, request.bench, request.mounting)
         if plan.violations:
             raise BadParameter("stations", plan.violations[0], "beyond a limit of the bench")
         if request.seed is not None and not plan.context.bench.simulated:
@@ -128,6 +128,7 @@ class JobService:
             requested_parameters=request.parameters,
             parameters=plan.parameters.model_dump(mode="json"),
             context=context_document(plan.context),
+            mounting=None if plan.context.mounting is None else plan.context.mounting.id,
             stations=plan.stations,
             duration_s=plan.prediction.duration_s,
             code_version=self._code_version,

@@ -20,6 +20,7 @@ ServiceError
 ├── Overloaded           too much is requested at one time
 ├── NotUnderstood        a job was stored by a version whose format this one does not know
 ├── NotMounted           this bench does not have that unit
+├── MountingChanged      the unit was mounted anew, or taken off, since the job was planned
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
     ├── DamagedDatabase   the database's file is damaged
@@ -135,6 +136,10 @@ class AlreadyReserved(ServiceError):
 
 class NotMounted(ServiceError):
     """Raised where this bench does not have that unit."""
+
+
+class MountingChanged(ServiceError):
+    """Raised where a job was planned for another mounting of its unit than the one that stands."""
 
 
 class NotUnderstood(ServiceError):

@@ -27,6 +27,8 @@ class JobTerms:
     """Maximum number of retries after faults of the bench, each from the station that failed."""
     reservation: str | None = None
     """The reservation under which it runs; None: it waits while its bench or unit is reserved."""
+    mounting: str | None = None
+    """The mounting of its unit that it rests on; of a request, None: the bench's current one of that unit, if any."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,6 +8,7 @@ from bench_service import wall_clock
 from bench_service.campaigns.stores import Stores
 from bench_service.persistence.access.access_store import SqlAccessStore
 from bench_service.persistence.bench.live_store import SqlLiveStore
+from bench_service.persistence.bench.mounting_store import SqlMountingStore
 from bench_service.persistence.bench.prompt_store import SqlPromptStore
 from bench_service.persistence.bench.registry_store import SqlBenchRegistry
 from bench_service.persistence.campaign_store import SqlCampaignStore
@@ -59,6 +60,7 @@ def stores_of(database: Database) -> Stores:
         corrections=SqlCorrectionStore(database),
         live=SqlLiveStore(database),
         prompts=SqlPromptStore(database),
+        mountings=SqlMountingStore(database),
         audit=SqlAuditTrail(database),
         tallies=SqlTallyStore(database),
         upkeep=SqlUpkeepStore(database),

@@ -85,11 +85,13 @@ class Client:
         seed: int | None = None,
         retries: int | None = None,
         reservation: str | None = None,
+        mounting: str | None = None,
         deadline_at: datetime | None = None,
         key: str | None = None,
     ) -> Job:
         """Submit a job to the queue. Repeated with the same `key` and the same request it gives the same job."""
-        terms = {"bench": bench, "priority": priority, "seed": seed, "retries": retries, "reservation": reservation}
+        terms = {"bench": bench, "priority": priority, "seed": seed, "retries": retries}
+        terms |= {"reservation": reservation, "mounting": mounting}
         body = {
             "procedure": procedure,
             "unit": unit,

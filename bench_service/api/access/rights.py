@@ -36,6 +36,8 @@ RIGHTS: dict[str, Right] = {
     "release": Right.OPERATE,
     "release_stop": Right.OPERATE,
     "reserve": Right.OPERATE,
+    "enter_mounting": Right.OPERATE,
+    "end_mounting": Right.OPERATE,
     "end_reservation": Right.OPERATE,
     "cancel_campaign_run": Right.OPERATE,
     "analyse_again": Right.ENGINEER,

@@ -27,6 +27,9 @@ class JobSubmission(PreviewRequest):
     seed: int | None = Field(None, ge=0, lt=2**48, description="Of a simulated bench: same seed, same bytes")
     retries: int = Field(0, ge=0, le=5, description="How often a fault of the bench is answered by trying again")
     reservation: str | None = Field(None, max_length=100, description="The reservation under which it runs")
+    mounting: str | None = Field(
+        None, max_length=100, description="Id of the unit's mounting; null: the one that stands on its bench, if any"
+    )
     not_before: AwareDatetime | None = Field(None, description="Earliest start; until then it waits in the queue")
     deadline_at: AwareDatetime | None = Field(None, description="No station begins later; the job then fails")
 
@@ -127,6 +130,7 @@ class JobView(BaseModel):
     retries_left: int
     not_before: datetime | None = Field(description="It is not tried before this moment")
     reservation: str | None = Field(description="The reservation under which it runs")
+    mounting: str | None = Field(description="The unit's mounting whose azimuth counts; null: the bench's declared one")
     queued_at: datetime | None = Field(description="When it came into its bench's queue")
     deadline_at: datetime | None = Field(description="No station begins later")
     labels: Labels

@@ -20,6 +20,7 @@ TAGS = {
     "units": "Units under test: their records, calibrations and corrections.",
     "benches": "Benches: state, queue, software stops.",
     "reservations": "Benches and units that are kept free for a client until a moment.",
+    "mountings": "Units on plates of benches, and the azimuth that was read for each.",
     "campaigns": "Sequences of jobs with limits, their runs, schedules and trends.",
     "access": "The session of a request, accounts of people, tokens of programs, approvals of procedures.",
     "audit": "The audit trail: every request that may have changed something.",

@@ -44,6 +44,7 @@ def run(
     label: Label = NO_ITEMS,
     retries: Annotated[int, typer.Option(min=0, max=5, help="After faults of the bench")] = 0,
     reservation: Annotated[str | None, typer.Option(help="The reservation under which it runs")] = None,
+    mounting: Annotated[str | None, typer.Option(help="The unit's mounting; without it, the one that stands")] = None,
     key: Key = None,
     by: By = None,
     no_wait: Annotated[bool, typer.Option("--no-wait", help="Queue it and end; a service or worker runs it")] = False,
@@ -63,6 +64,7 @@ def run(
         "labels": labels(label),
         "retries": retries,
         "reservation": reservation,
+        "mounting": mounting,
     }
     headers = {"Idempotency-Key": key_or_new(key), **named(by)}
     settings = of_bench(context.obj, bench) if server is None else context.obj

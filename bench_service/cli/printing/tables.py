@@ -138,6 +138,17 @@ def reservation_table(reservations: list[dict[str, Any]]) -> Table:
     return table
 
 
+def mounting_table(mountings: list[dict[str, Any]]) -> Table:
+    """Table of mountings, newest first."""
+    table = _table("mounting", "unit", "bench", "plate", "azimuth, deg", "± arcsec", "by", "mounted", "until")
+    for one in mountings:
+        until = "it stands" if one["ended_at"] is None else moment(one["ended_at"])
+        where = Text(one["unit"]), Text(one["bench"]), Text(one["plate"])
+        azimuth = f"{one['azimuth_deg']:.5f}", f"{one['azimuth_sd_arcsec']:g}"
+        table.add_row(one["id"], *where, *azimuth, Text(one["by"]), moment(one["mounted_at"]), until)
+    return table
+
+
 def queue_table(entries: list[dict[str, Any]]) -> Table:
     """Table of the jobs that wait for a bench, in the order in which they start."""
     table = _table("place", "job", "unit", "priority", "queued", "waiting")

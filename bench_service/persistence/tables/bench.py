@@ -1,9 +1,9 @@
-"""SQL tables of benches: as registered, their stops, their live state."""
+"""SQL tables of benches: as registered, their stops, their live state, mountings of units."""
 
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Index, text
+from sqlalchemy import Float, Index, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from bench_service.persistence.tables.columns import Id, Table
@@ -54,3 +54,25 @@ class BenchLiveRow(Table):
     process: Mapped[int]
     job_id: Mapped[str | None] = mapped_column(Id)
     document: Mapped[dict[str, Any]]
+
+
+class MountingRow(Table):
+    """A unit on a plate of a bench; it stands while `ended_at` is empty."""
+
+    __tablename__ = "mountings"
+    __table_args__ = (Index(None, "bench", "id"), Index(None, "unit", "id"))
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    unit: Mapped[str] = mapped_column(Id)
+    bench: Mapped[str] = mapped_column(Id)
+    plate: Mapped[str]
+    by: Mapped[str]
+    proven: Mapped[bool]
+    mounted_at: Mapped[datetime]
+    entered_at: Mapped[datetime]
+    azimuth_deg: Mapped[float] = mapped_column(Float(53))
+    azimuth_sd_arcsec: Mapped[float] = mapped_column(Float(53))
+    instrument: Mapped[str]
+    remark: Mapped[str]
+    ended_at: Mapped[datetime | None]
+    ended_by: Mapped[str]

@@ -48,6 +48,7 @@ class JobRow(Table):
     retries: Mapped[int]
     retries_left: Mapped[int]
     reservation: Mapped[str | None] = mapped_column(Id)
+    mounting: Mapped[str | None] = mapped_column(Id)
     requested_by: Mapped[str]
     prompt: Mapped[dict[str, Any] | None] = mapped_column(Document)
     started_at: Mapped[datetime | None]

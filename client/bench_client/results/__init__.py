@@ -12,6 +12,7 @@ from bench_client.results.gyro_half_turns import GyroHalfTurnsResult
 from bench_client.results.initial_alignment import InitialAlignmentResult
 from bench_client.results.initial_alignment_of_recording import InitialAlignmentOfRecordingResult
 from bench_client.results.kalman_calibration import KalmanCalibrationResult
+from bench_client.results.mounting_repeatability import MountingRepeatabilityResult
 from bench_client.results.multi_position_calibration import MultiPositionCalibrationResult
 from bench_client.results.multi_position_calibration_of_recordings import MultiPositionCalibrationOfRecordingsResult
 from bench_client.results.no_operation import NoOperationResult
@@ -46,6 +47,7 @@ Result = (
     | GyroHalfTurnsResult
     | InitialAlignmentOfRecordingResult
     | KalmanCalibrationResult
+    | MountingRepeatabilityResult
     | MultiPositionCalibrationOfRecordingsResult
     | NoiseAnalysisResult
     | PlanOrientationsResult
@@ -73,6 +75,7 @@ CLASSES: dict[str, type[ResultHead]] = {
     "gyro_half_turns": GyroHalfTurnsResult,
     "initial_alignment_of_recording": InitialAlignmentOfRecordingResult,
     "kalman_calibration": KalmanCalibrationResult,
+    "mounting_repeatability": MountingRepeatabilityResult,
     "multi_position_calibration_of_recordings": MultiPositionCalibrationOfRecordingsResult,
     "noise_analysis": NoiseAnalysisResult,
     "plan_orientations": PlanOrientationsResult,
