@@ -26,9 +26,7 @@ def density_figure(channels: Sequence[ChannelNoise], labels: Sequence[str]) -> F
     d = first.density
     interval = Series("interval", d.frequency_hz, _in(d.lower, size), style="band", upper=_in(d.upper, size))
     curves = tuple(Series(label, c.frequency_hz, _in(c.density, size), style="line") for c, label in found)
-    note = (
-        "One-sided. Dashed: each process that was observed, at its efficient estimate. Lines taken out are left out."
-    )
+    note = "One-sided. Dashed: each process that was observed, at its efficient estimate. Lines taken out are left out."
     return Figure(
         f"Power spectral density of {first.channel}",
         "f, Hz",
