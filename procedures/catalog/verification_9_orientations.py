@@ -192,7 +192,7 @@ def report(result: Result) -> Report:
 
 
 def _moved(triads: Sequence[TriadVerification]) -> tuple[str, ...]:
-    """What the residual vectors show, where they show something; the magnitudes may pass all the same."""
+    """Sentences on residual vectors that show a change; the magnitudes may pass all the same."""
     found = [t.diagnosis for t in triads if t.diagnosis is not None]
     return tuple(d.sentence for d in found if d.named or d.p_value_unchanged < LIKELY_P_VALUE)
 

@@ -247,7 +247,7 @@ def _sentence(
     unchanged: float,
     refitted: float | None,
 ) -> str:
-    """What moved, in one or two sentences."""
+    """Sentence or two on the coefficients that moved."""
     triad = calibration.triad
     named = [c for c in changes if abs(c.sigmas) >= threshold]
     if not named and unchanged >= LIKELY_P_VALUE:

@@ -82,7 +82,7 @@ def _axis(row: Array) -> str:
 
 
 def sentences(both: Sequence[Answers]) -> tuple[str, ...]:
-    """What is wrong with each triad, and whether a turned mounting would explain it; empty for a good unit."""
+    """Faults of each triad, and whether a turned mounting would explain it; empty for a good unit."""
     wrong = [a for a in both if a.axes != ("+x", "+y", "+z")]
     said = [_of_triad(a) for a in wrong]
     made = [a.permutation for a in wrong]
