@@ -1,4 +1,4 @@
--- revision 0011
+-- revision 0012
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -224,8 +224,26 @@ CREATE TABLE jobs (
 	started_at DATETIME, 
 	finished_at DATETIME, 
 	result_id VARCHAR, 
-	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, 
+	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, mounting VARCHAR, 
 	CONSTRAINT pk_jobs PRIMARY KEY (id)
+);
+
+CREATE TABLE mountings (
+	id VARCHAR NOT NULL, 
+	unit VARCHAR NOT NULL, 
+	bench VARCHAR NOT NULL, 
+	plate VARCHAR NOT NULL, 
+	"by" VARCHAR NOT NULL, 
+	proven BOOLEAN NOT NULL, 
+	mounted_at DATETIME NOT NULL, 
+	entered_at DATETIME NOT NULL, 
+	azimuth_deg FLOAT NOT NULL, 
+	azimuth_sd_arcsec FLOAT NOT NULL, 
+	instrument VARCHAR NOT NULL, 
+	remark VARCHAR NOT NULL, 
+	ended_at DATETIME, 
+	ended_by VARCHAR NOT NULL, 
+	CONSTRAINT pk_mountings PRIMARY KEY (id)
 );
 
 CREATE TABLE recordings (
@@ -399,6 +417,10 @@ CREATE INDEX ix_jobs_state_id ON jobs (state, id);
 
 CREATE INDEX ix_jobs_unit_id ON jobs (unit, id);
 
+CREATE INDEX ix_mountings_bench_id ON mountings (bench, id);
+
+CREATE INDEX ix_mountings_unit_id ON mountings (unit, id);
+
 CREATE INDEX ix_recordings_job_id_id ON recordings (job_id, id);
 
 CREATE INDEX ix_recordings_state_stored_bytes ON recordings (state, stored_bytes);
@@ -435,5 +457,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0011');
+INSERT INTO "alembic_version" VALUES ('0012');
 

@@ -181,7 +181,10 @@ class Examiner:
             progress.planned[step.name] = prediction.uncertainties
         if procedure.corrections is not NO_CORRECTIONS:
             progress.correcting.add(step.name)
-        checks = [preview(one, DecisionRule()) for one in procedure.planned_checks(plan.parameters, plan.context)]
+        checks = [
+            preview(one, DecisionRule.model_validate({}))
+            for one in procedure.planned_checks(plan.parameters, plan.context)
+        ]
         checks += [preview(_of_campaign(limit, prediction.uncertainties), rule) for limit in step.limits]
         told = (len(plan.stations), prediction.duration_s, plan.data_bytes, tuple(warnings))
         return StepPlan(step.name, step.does, "", *told, limits=tuple(checks))

@@ -63,8 +63,8 @@ class Catalogue:
     def _required(self, kind: str, name: str) -> Any:
         """Return the entry of a name, from its own file alone. Raises `NotFound`."""
         if (kind, name) not in self._alone and (kind, name) not in self._left_out:
-            find = catalog.find if kind == "procedure" else methods.find
-            for found, entry in self._read(kind, find(name)).items():
+            found_alone: Discovered[Any] = catalog.find(name) if kind == "procedure" else methods.find(name)
+            for found, entry in self._read(kind, found_alone).items():
                 self._alone[kind, found] = entry
         if (kind, name) not in self._alone:
             raise NotFound(kind, name, self._left_out.get((kind, name), ""))

@@ -123,6 +123,7 @@ def check(
         print(json.dumps(facts, indent=2))
         return
     console.print(f"{file}: valid, unchanged, signed by {signer}", soft_wrap=True)
-    console.print(f"unit {facts['unit']}, calibrations {', '.join(facts['calibrations'])}", soft_wrap=True)
+    calibrations = ", ".join(triad["calibration"] for triad in document["triads"])
+    console.print(f"unit {facts['unit']}, calibrations {calibrations}", soft_wrap=True)
     console.print("schema: " + ("valid" if schema else "not checked, see --schema"), soft_wrap=True)
     console.print("raw data: not analysed again; their hashes are in the certificate", soft_wrap=True)
