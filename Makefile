@@ -86,7 +86,7 @@ newest-form: $(VENV)/.ready  ## write migrations/newest_form.sql anew, after a n
 
 foreign: $(addprefix .foreign/,$(addsuffix /.ready,$(FOREIGN)))  ## environments of the programs by others that the tests talk to
 
-.foreign/%/.ready: tests/foreign/%.lock
+.foreign/%/.ready: tests/foreign/%.lock | $(VENV)/.ready
 	@test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet --disable-pip-version-check uv
 	@test -x .foreign/$*/bin/python || $(PYTHON) -m venv --without-pip .foreign/$*
 	@VIRTUAL_ENV=$(CURDIR)/.foreign/$* $(BIN)/uv pip install --quiet --require-hashes -r $<
