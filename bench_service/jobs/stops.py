@@ -72,9 +72,9 @@ class StopService:
         """Stop all activity of the bench, on any host, until this stop is released. Jobs in the queue wait.
 
         `by`: the person; `via`: the way over which it came. It waits for bench and database, for a second each at the
-        most, and neither waits for the other; where it is not `patient`, for neither. `key`: a request that comes again
-        with the key that it had is the same stop (`StopKeys`). Raises `NotFound` for an unknown
-        bench, and `StorageFailure` where the stop has reached neither bench nor database.
+        most, and neither waits for the other; where it is not `patient`, for neither, but for the database where no
+        bench has heard it. `key`: a request that comes again with the key that it had is the same stop (`StopKeys`).
+        Raises `NotFound` for an unknown bench, and `StorageFailure` where the stop reached neither bench nor database.
         """
         books_by_s = monotonic_s() + (BOOKS_S if patient else 0.0)
         keyed = self._keys.of(bench_id, key, StopWord(reason, by, via))
@@ -94,7 +94,9 @@ class StopService:
             job, books = self._entered(entering, books_by_s - monotonic_s())
             job = job or (safety.devices.job if safety.devices is not None and safety.worker is not None else None)
         else:
-            job, books = self._entered(entering, books_by_s - monotonic_s())
+            # A stop that no bench has heard is in the database or nowhere: whoever asked waits for that.
+            within_s = books_by_s - monotonic_s() if found is not None else BOOKS_S
+            job, books = self._entered(entering, within_s)
             if found is None and books:
                 raise StorageFailure(f"{self._roads.unreached(bench_id)} ({books}; it is tried again)")
             safety = found or self._safety.stopping_elsewhere(bench_id)

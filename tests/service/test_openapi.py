@@ -145,7 +145,8 @@ def test_the_service_keeps_to_its_document_whatever_it_is_sent(address: str, tmp
     pytest.importorskip("schemathesis")
     command = Path(sys.executable).with_name("schemathesis")
     arguments = ["run", f"{address}/openapi.json", "--checks", ",".join(CHECKS)]
-    arguments += ["--exclude-path", "/api/v1/feed"]  # a stream without an end
+    # The feed has no end, and the first account closes every other route: `make validate` asks those with a token.
+    arguments += ["--exclude-path-regex", "^/api/v1/(feed|accounts|tokens)"]
     arguments += ["--phases", "coverage,fuzzing,stateful", "--max-examples", "15", "--seed", "1"]
     done = subprocess.run([command, *arguments], capture_output=True, text=True, timeout=220, cwd=tmp_path, check=False)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]

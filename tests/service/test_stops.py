@@ -192,3 +192,10 @@ def test_sixteen_stops_stand_at_the_most_and_one_more_is_told_that_it_waits(clie
     assert len(client.http.get(BENCH).json()["stops"]) == 16
     assert release(client, first, by="Cy", remark="looked at").is_success
     assert client.http.get(BENCH).json()["state"] == "stopped"
+
+
+def test_a_stop_of_a_bench_that_is_not_there_is_refused_also_where_nobody_waits(client: Client) -> None:
+    """Seen once: with `wait` false the database was not waited for, and the answer was that it does not answer."""
+    for wait in (True, False):
+        answer = client.http.post("/api/v1/benches/nowhere/stop", json={"reason": "x", "wait": wait})
+        assert answer.status_code == 404, answer.text
