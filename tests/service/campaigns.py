@@ -3,16 +3,21 @@
 from typing import Any
 
 from bench_service.wall_clock import monotonic_s, pause
-from tests.kit.thermal_plan import SHORT as THERMAL
 from tests.service.client import Client
 
 SHORT = {"dwell_s": 2.0, "settle_s": 0.5}
-DWELL = {"dwell_s": 10.0, "settle_s": 0.5}
-"""The shortest dwell whose temperatures can be read beside it."""
+WIDE = {"gyro_bias_in_run_deg_h": 1.0, "accelerometer_bias_in_run_m_s2": 0.01}
+DWELL = {"dwell_s": 10.0, "settle_s": 0.5, "limits": WIDE}
+"""The shortest dwell whose temperatures can be read beside it, with limits that its noise does not reach."""
 SCALED_DOWN: dict[str, dict[str, Any]] = {
-    "static": {"launches": 1, "duration_s": 600.0, "off_time_s": 10.0, "wavelet_levels": 4},
-    "converter": {"temperatures_c": [-20.0, 0.0, 20.0, 40.0, 60.0], "record_s": 10.0},
-    "thermal": THERMAL,
+    "static": {
+        "launches": 1,
+        "duration_s": 600.0,
+        "off_time_s": 10.0,
+        "wavelet_levels": 4,
+        "noise_limits": {"gyro_random_walk_deg_sqrt_h": 0.03, **WIDE},
+    },
+    "thermal": {"sample_rate_hz": 1.0},
     **{f"{name}_{number}": DWELL for name in ("calibration", "verification") for number in (1, 2, 3)},
 }
 """The thesis's campaign in minutes of bench time: its course is tested with it, not the numbers."""

@@ -1,0 +1,119 @@
+"""Faults for the campaign `acceptance`, each of the smallest size that the plan finds out by its own preview.
+
+Of a step between launches (from the third on) and of noise the size follows from the planned checks with the power
+below; exchanged, dead and stuck channels have no size.
+"""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from bench_service.campaigns.campaign import Campaign
+from bench_service.campaigns.power import beyond, smallest_step
+from procedures import catalog, methods
+from procedures.core import units
+from procedures.core.limits import PlannedCheck
+from procedures.procedure import PredictedUncertainty
+from simulators.truth import Array, BenchTruth, TriadTruth, UnitTruth
+from tests.kit.procedures import simulated_context
+from tests.validation.acceptance_rig import Fault
+
+POWER = 0.99
+"""Probability with which a fault of the smallest size is to be found."""
+LATE = ("scale_3", "calibration_3", "verification_3")
+
+
+@cache
+def _planned(campaign: Campaign) -> dict[str, PlannedCheck]:
+    """The checks of noise and of the scatter between launches, by name."""
+    context = simulated_context()
+    found: dict[str, PlannedCheck] = {}
+    for name, steps in (("scale_run_to_run", "scale_1"), ("run_to_run", "calibration_1")):
+        of, before = campaign.step(name), campaign.step(steps)
+        parameters = {k: v for k, v in before.parameters.items() if k != "thermal_correction"}
+        procedure = catalog.discover()[before.does]
+        params = procedure.resolve(procedure.params.model_validate(parameters), context)
+        predicted: tuple[PredictedUncertainty, ...] = procedure.predict(params, context).uncertainties
+        method = methods.discover()[of.does]
+        checks = method.planned_checks(method.params.model_validate(of.parameters), context.unit, [predicted] * 3)
+        found |= {c.check: c for c in checks}
+    static = catalog.discover()["static_run"]
+    params = static.params.model_validate(campaign.step("static").parameters)
+    return found | {c.check: c for c in static.planned_checks(params, context)}
+
+
+def faults(campaign: Campaign) -> list[Fault]:
+    """All faults with their sizes."""
+    planned = _planned(campaign)
+    gyro, force = "gyro scale factor x run to run", "accelerometer scale factor y run to run"
+    bias, walk = "accelerometer bias z run to run", "gyro_y random walk"
+    ppm_gyro, ppm_force, step = (smallest_step(planned[name], POWER, 3) for name in (gyro, force, bias))
+    noise = _noise(planned[walk])
+    return [
+        _late("gyro scale step", gyro, f"{ppm_gyro:.3g} ppm from the third launch", "gyro", 0, 1e-6 * ppm_gyro, 0.0),
+        _late("accelerometer scale step", force, f"{ppm_force:.3g} ppm", "accelerometer", 1, 1e-6 * ppm_force, 0.0),
+        _late("accelerometer bias step", bias, f"{step:.3g} m/s^2", "accelerometer", 2, 0.0, step),
+        Fault("noisy gyro", (walk,), truth=_noisy(noise), size=f"{noise:.3g} deg/√h"),
+        Fault("axes exchanged", ("gyro_x", "gyro_y"), samples=_exchanged, size="gyro x and y"),
+        Fault("dead channel", ("gyro_z",), samples=_dead, size="gyro z, from the first launch"),
+        Fault("stuck thermometer", ("temperature_case",), samples=_stuck, size="case"),
+    ]
+
+
+def _noise(planned: PlannedCheck) -> float:
+    """Smallest random walk that is found, by bisection."""
+    limit = planned.limit.maximum or 0.0
+    low, high = limit, 4.0 * limit
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if beyond(planned, middle, limit) < POWER else (low, middle)
+    return high
+
+
+def _late(name: str, check: str, size: str, triad: str, axis: int, scale: float, bias: float) -> Fault:
+    def truth(step: str, unit: UnitTruth, bench: BenchTruth) -> tuple[UnitTruth, BenchTruth]:
+        if step not in LATE:
+            return unit, bench
+        old: TriadTruth = unit.triad(triad)
+        rows = tuple(tuple((1.0 + scale * (i == axis)) * k for k in row) for i, row in enumerate(old.matrix))
+        biases = tuple(b + bias * (i == axis) for i, b in enumerate(old.bias))
+        changed = replace(old, matrix=rows, bias=biases)
+        return replace(unit, **{triad: changed}), bench
+
+    return Fault(name, (check,), truth=truth, size=size)
+
+
+def _noisy(deg_sqrt_h: float):
+    def truth(_step: str, unit: UnitTruth, bench: BenchTruth) -> tuple[UnitTruth, BenchTruth]:
+        x, _, z = unit.gyro.random_walk
+        walk = (x, deg_sqrt_h * units.DEG_PER_SQRT_HOUR, z)
+        return replace(unit, gyro=replace(unit.gyro, random_walk=walk)), bench
+
+    return truth
+
+
+def _exchanged(_step: str, channels: tuple[str, ...], raw: Array) -> Array:
+    if "gyro_x" not in channels:
+        return raw
+    x, y = channels.index("gyro_x"), channels.index("gyro_y")
+    changed = raw.copy()
+    changed[:, [x, y]] = raw[:, [y, x]]
+    return changed
+
+
+def _dead(_step: str, channels: tuple[str, ...], raw: Array) -> Array:
+    if "gyro_z" not in channels:
+        return raw
+    changed = raw.copy()
+    changed[:, channels.index("gyro_z")] = 0
+    return changed
+
+
+def _stuck(_step: str, channels: tuple[str, ...], raw: Array) -> Array:
+    if "temperature_case" not in channels:
+        return raw
+    column = channels.index("temperature_case")
+    changed = np.array(raw)
+    changed[:, column] = raw[0, column]
+    return changed

@@ -1,0 +1,144 @@
+"""The campaign `acceptance` step by step on a simulated bench, without the service: gates, judgement and transitions
+are the product's own. Faults are in the truth of the unit or of the table, or in the samples.
+"""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+
+from bench_service.campaigns import gates, transitions
+from bench_service.campaigns.campaign import Campaign
+from bench_service.campaigns.judgement import Judgement
+from bench_service.campaigns.run import CampaignRun, StepRun, StepState
+from bench_service.campaigns.shipped import shipped
+from bench_service.drivers.simulated import SimulatedDriver
+from bench_service.model.job import JobState
+from procedures import catalog, methods
+from procedures.bench import BenchNeeds
+from procedures.core.errors import DomainError
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.limits import Verdict
+from procedures.core.recording import MemoryRecording, RecordingInfo
+from procedures.core.unit import Unit
+from procedures.inspection import analyse_method, analyse_procedure
+from procedures.procedure import Context, DatedCalibration, Evidence, Outcome
+from simulators.truth import Array, BenchTruth, UnitTruth, default_bench, default_unit
+from simulators.world import WorldConfig, build
+
+AT = datetime(2026, 1, 1, tzinfo=UTC)
+SCALED: dict[str, dict[str, Any]] = {
+    "static": {"launches": 2, "duration_s": 3600.0, "sample_rate_hz": 20.0},
+    "converter": {"temperatures_c": [-40.0, -20.0, 0.0, 20.0, 40.0, 60.0], "record_s": 20.0},
+    "thermal": {"sample_rate_hz": 1.0},
+}
+"""Two launches of an hour at 20 Hz, six soaks of the converter, thermal legs whole at 1 Hz; the rest as it ships."""
+Truth = Callable[[str, UnitTruth, BenchTruth], tuple[UnitTruth, BenchTruth]]
+Samples = Callable[[str, tuple[str, ...], Array], Array]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault: its effect on the truth of a step, or on a step's samples (n, channels) by channel names."""
+
+    name: str
+    names: tuple[str, ...] = ()
+    """Words of which one must be in what the run says, for the fault to be named; empty for no fault."""
+    truth: Truth = lambda _step, unit, bench: (unit, bench)
+    samples: Samples = lambda _step, _channels, raw: raw
+    size: str = ""
+
+
+def scaled() -> Campaign:
+    """The shipped campaign with scaled launches and thermal legs."""
+    campaign = shipped()["acceptance"]
+    steps = [s.model_copy(update={"parameters": {**s.parameters, **SCALED.get(s.name, {})}}) for s in campaign.steps]
+    return campaign.model_copy(update={"steps": tuple(steps)})
+
+
+def course(campaign: Campaign, seed: int, fault: Fault) -> CampaignRun:
+    """One run from its first step to its verdict; the seed of a step is the run's and the step's number."""
+    driver = SimulatedDriver("sim")
+    unit = driver.mounted()[0]
+    made: dict[str, list[TriadCalibration]] = {}
+    steps = tuple(StepRun(s.name, s.does) for s in campaign.steps)
+    run = CampaignRun("run", campaign, unit.serial, "sim", JobState.RUNNING, AT, steps, simulated=True, seed=seed)
+    while (index := run.current) is not None:
+        step = campaign.steps[index]
+        if why := gates.closed(run, index):
+            run = transitions.left_out(run, index, why, AT)
+            continue
+        try:
+            if step.method is not None:
+                outcome = _compared(
+                    step.does, step.parameters, [c for n in step.calibrations_of for c in made[n]], unit
+                )
+            else:
+                context = Context(unit, driver.description)
+                outcome, unit, made[step.name] = _measured(
+                    step.name, step.does, step.parameters, seed + index, fault, context
+                )
+        except DomainError as error:
+            run = transitions.failed(run, index, StepState.FAILED, f"{type(error).__name__}: {error}", AT, final=True)
+            continue
+        judgement = Judgement(outcome.verdict, outcome.checks, outcome.warnings)
+        run = transitions.judged(run, index, judgement, step.name, AT)
+    return run if run.verdict is not None else transitions.ended(run, AT)
+
+
+def _compared(name: str, parameters: dict[str, Any], calibrations: list[TriadCalibration], unit: Unit) -> Outcome:
+    method = methods.discover()[name]
+    dated = tuple(DatedCalibration(str(k), "", (c,)) for k, c in enumerate(calibrations))
+    return analyse_method(method, Evidence(calibrations=dated), method.params.model_validate(parameters), unit)
+
+
+def _measured(
+    step: str, name: str, parameters: dict[str, Any], seed: int, fault: Fault, context: Context
+) -> tuple[Outcome, Unit, list[TriadCalibration]]:
+    """A procedure's outcome, and the unit as its result leaves it where it passes."""
+    procedure = catalog.discover()[name]
+    params = procedure.resolve(procedure.params.model_validate(parameters), context)
+    recordings = asyncio.run(_recorded(procedure, procedure.schedule(params), step, seed, fault))
+    outcome = analyse_procedure(procedure, recordings, params, context)
+    unit, calibrations = context.unit, list(procedure.calibrations(outcome))
+    if outcome.verdict is Verdict.PASS:
+        known = {c.triad: c for c in (*unit.calibrations, *calibrations)}
+        unit = replace(unit, calibrations=tuple(known.values()))
+        for correction in procedure.corrections(outcome):
+            field = {"thermal": "thermal_correction", "converter": "converter"}[correction.kind]
+            unit = replace(unit, **{field: correction.value})
+    return outcome, procedure.learns(outcome, unit, step), calibrations
+
+
+async def _recorded(procedure: Any, stations: Any, step: str, seed: int, fault: Fault) -> list[MemoryRecording]:
+    needs = BenchNeeds.of(stations)
+    unit, bench = fault.truth(step, default_unit(), default_bench())
+    world = WorldConfig(unit, bench, seed, needs.sample_rate_hz, thermal=needs.temperatures, currents=needs.currents)
+    devices = build(world)
+    found: list[MemoryRecording] = []
+    async for stream in procedure.acquire(devices, stations):
+        raw = np.concatenate([block async for block in stream.blocks])
+        raw = fault.samples(step, tuple(c.name for c in stream.channels), raw)
+        info = RecordingInfo(
+            f"station {len(found)}",
+            unit.serial,
+            stream.channels,
+            stream.rate_hz,
+            len(raw),
+            stream.start_s,
+            stream.station,
+            simulated=True,
+            launched_s=stream.launched_s,
+        )
+        found.append(MemoryRecording(info, raw))
+    await devices.make_safe()
+    return found
+
+
+def told(run: CampaignRun) -> list[str]:
+    """All failed checks, and reasons of steps in error, of a run."""
+    failed = [f"{s.name}: {c.name} {c.note}" for s in run.steps for c in s.checks if not c.passed]
+    return failed + [f"{s.name}: {s.reason}" for s in run.steps if s.verdict is Verdict.ERROR]
