@@ -73,7 +73,7 @@ def _keep_copy(database: Database, copies: Path | None, old: str, new: str) -> N
     """Copy a database before its form is changed, and log the place of the copy. Raises `StorageFailure`."""
     from bench_service.persistence.upkeep.copies import copy_database
 
-    stamp = wall_clock.now().strftime("%Y%m%dT%H%M%SZ")
+    stamp = wall_clock.now().strftime("%Y%m%dT%H%M%S.%fZ")
     file = None if database.is_postgres else Path(database.engine.url.database or "")
     folder = copies or (None if file is None else file.parent)
     if folder is None:

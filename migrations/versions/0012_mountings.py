@@ -41,5 +41,4 @@ def upgrade() -> None:
 
 def downgrade() -> None:
     op.drop_table("mountings")
-    with op.batch_alter_table("jobs") as jobs:
-        jobs.drop_column("mounting")
+    op.drop_column("jobs", "mounting")  # in place: jobs made anew would be dropped under the rows that name them

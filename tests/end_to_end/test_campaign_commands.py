@@ -18,7 +18,7 @@ from tests.kit.command_line import Command, Done, command_in, environment, one_l
 pytestmark = pytest.mark.timeout(120)
 
 SHORT = {"dwell_s": 5.0, "settle_s": 0.5}
-OUT_OF_REACH = {"quantity": "gyro.b_x", "unit": "deg/h", "minimum": 1e4}
+OUT_OF_REACH = {"quantity": "gyro.b_x", "unit": "deg/h", "minimum": 1e4, "source": "a test"}
 CAMPAIGNS: dict[str, dict[str, Any]] = {
     "good": {"title": "Nothing [much]", "steps": [{"name": "a", "procedure": "no_operation"}]},
     "bad": {

@@ -16,7 +16,7 @@ from tests.kit.command_line import Command, Done, command_in, environment
 
 pytestmark = pytest.mark.timeout(240)
 
-RUN = ("run", "calibration_12_orientations", "--unit", "SIM-0001", "--set", "dwell_s=60.0", "--set", "settle_s=0.5")
+RUN = ("run", "calibration_12_orientations", "--unit", "SIM-0001", "--set", "dwell_s=120.0", "--set", "settle_s=0.5")
 
 
 def stations_done(folder: Path) -> int:

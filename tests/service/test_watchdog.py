@@ -117,8 +117,11 @@ def test_a_unit_that_stops_sending_is_named(stores: Stores, tmp_path: Path) -> N
 def test_a_bench_that_cannot_be_made_safe_is_not_free_until_a_person_releases_it(
     stores: Stores, tmp_path: Path
 ) -> None:
-    driver = FailingDriver(tmp_path, hang_move(lost))
-    driver.unreachable = True
+    def fall_silent(bench: Bench) -> None:
+        hang_move(lost)(bench)
+        driver.unreachable = True
+
+    driver = FailingDriver(tmp_path, fall_silent)
     runner, job, _ = failed_first_station(stores, driver)
     outcome = runner.make_safe(job.id)
     assert outcome.failure is not None
