@@ -25,6 +25,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Generator[BenchProcess]
     subprocess.run(
         command, input=f"{PASSWORD}\n", text=True, check=True, env={**os.environ, **made.environment}, timeout=60
     )
+    until(lambda: made.client.get("/start").status_code == 303)  # the service looks for new accounts once a second
     yield made
     made.end()
 
