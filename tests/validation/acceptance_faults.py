@@ -5,7 +5,6 @@ below; exchanged, dead and stuck channels have no size.
 """
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 
@@ -24,7 +23,6 @@ POWER = 0.99
 LATE = ("scale_3", "calibration_3", "verification_3")
 
 
-@cache
 def _planned(campaign: Campaign) -> dict[str, PlannedCheck]:
     """The checks of noise and of the scatter between launches, by name."""
     context = simulated_context()
