@@ -40,6 +40,7 @@ from bench_service.api.units import calibrations
 from bench_service.api.units import routes as units
 from bench_service.bench.devices import BenchDevices
 from bench_service.bench.directory import BenchDirectory
+from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import Heartbeat, LiveBoard
 from bench_service.bench.prompts import AskedOperator
 from bench_service.bench.safety import SafetyService
@@ -81,9 +82,9 @@ from bench_service.persistence.evidence.analysis_run import open_run
 from bench_service.persistence.upkeep.contents import DatabaseContents
 from bench_service.service import LEAST_FREE_BYTES, BenchService
 from bench_service.settings import Settings
-from bench_service.telemetry.audit_retention import AuditRetention
+from bench_service.telemetry.audit_retention import begin_retention
 from bench_service.telemetry.code_version import code_version
-from bench_service.telemetry.tracing import traces_to
+from bench_service.telemetry.tracing import Traces, traces_to
 
 IMPORT_THREADS = 4
 """Maximum number of imports that are stored or wait for a reader at one time; more wait without a thread."""
@@ -137,47 +138,69 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     code = code_version()
     traces = traces_to(settings.traces_url, settings.bench_id, code)
     closing.callback(traces.close)
-    worker: Worker | None = None
-    board = LiveBoard(stores.live)
+    worker, board = None, LiveBoard(stores.live)
     if driver is not None:
-        lease = acquire_lease(settings.database_url, settings.bench_id)
-        closing.callback(lease.release)
-        files.begin_driving()
-        closing.callback(files.host.end_driving)
-        board = LiveBoard(stores.live, settings.bench_id)
-        heartbeat = Heartbeat(board, stores.live)
-        heartbeat.begin()
-        closing.callback(heartbeat.end)
-        runner = InstrumentedRunner(
-            stores, planner, driver, code, lease.held, board, settings.retry_scale, traces, files.stopped
-        )
-        worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease, files))
-        guard = files.guard(runner.stop_now, worker.wake)
-        guard.begin()
-        closing.callback(guard.end)
-        closing.callback(files.keep_books(stores).end)
-        begin_notifier(settings, stores, opened.free_bytes, LEAST_FREE_BYTES, closing)
+        worker, board = _drive(settings, opened, stores, planner, driver, code, traces, files, closing)
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
     roads = _roads(settings, opened, closing)
     processes = _work_apart(settings, code, closing) if apart else None
-    made_of = stores, driver, planner, worker, code, safety, board, opened.free_bytes, traces, roads, rescued, processes
-    service = BenchService(*made_of, DatabaseContents(opened), settings.scrub_at)
-    _keep_access(service, settings, closing)
+    service = BenchService(
+        stores,
+        driver,
+        planner,
+        worker,
+        code,
+        safety,
+        live=board,
+        free_bytes=opened.free_bytes,
+        traces=traces,
+        roads=roads,
+        rescued=rescued,
+        processes=processes,
+        database=DatabaseContents(opened),
+        scrub_at=settings.scrub_at,
+    )
+    if settings.audit_days is not None:
+        begin_retention(stores.audit, timedelta(days=settings.audit_days), closing)
+    service.access.book.begin()
+    closing.callback(service.access.book.end)
     closing.callback(service.stop)
     service.register()
     return service
 
 
-def _keep_access(service: BenchService, settings: Settings, closing: ExitStack) -> None:
-    """Follow accounts and tokens that other processes change, and end stretches of the audit trail that are old."""
-    if settings.audit_days is not None:
-        retention = AuditRetention(service.stores.audit, timedelta(days=settings.audit_days))
-        retention.begin()
-        closing.callback(retention.end)
-    service.access.book.begin()
-    closing.callback(service.access.book.end)
+def _drive(
+    settings: Settings,
+    opened: Database,
+    stores: Stores,
+    planner: Planner,
+    driver: BenchDriver,
+    code: str,
+    traces: Traces,
+    files: BenchFiles,
+    closing: ExitStack,
+) -> tuple[Worker, LiveBoard]:
+    """The worker of this process's bench, with its lease, heartbeat and stop guard. Raises `BenchBusy`."""
+    lease = acquire_lease(settings.database_url, settings.bench_id)
+    closing.callback(lease.release)
+    files.begin_driving()
+    closing.callback(files.host.end_driving)
+    board = LiveBoard(stores.live, settings.bench_id)
+    heartbeat = Heartbeat(board, stores.live)
+    heartbeat.begin()
+    closing.callback(heartbeat.end)
+    runner = InstrumentedRunner(
+        stores, planner, driver, code, lease.held, board, settings.retry_scale, traces, files.stopped
+    )
+    worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease, files))
+    guard = files.guard(runner.stop_now, worker.wake)
+    guard.begin()
+    closing.callback(guard.end)
+    closing.callback(files.keep_books(stores).end)
+    begin_notifier(settings, stores, opened.free_bytes, LEAST_FREE_BYTES, closing)
+    return worker, board
 
 
 def _roads(settings: Settings, opened: Database, closing: ExitStack) -> StopRoads:

@@ -8,23 +8,28 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.extra_terms import ExtraFit, Kind, TermEstimate, fit_terms, require_terms, terms_of
 from procedures.analysis.calibration.misfit import MISFIT_MAX
-from procedures.analysis.calibration.reference import INPUT_UNITS
+from procedures.analysis.calibration.plan import TriadPlan, predicted_parts
+from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
 from procedures.analysis.calibration.station_means import StationMeans, launch_warnings, station_means
-from procedures.analysis.calibration.summary import TriadSummary
-from procedures.analysis.calibration.table_errors import TableErrors
+from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
+from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
 from procedures.analysis.calibration.triad_analysis import analyse_inputs, noise_of_means
 from procedures.core.arrays import Array
+from procedures.core.coefficient_name import CoefficientName
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, triad_calibration
 from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import Recording
 from procedures.core.report import Report, Table
+from procedures.core.site import Site
+from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
-from procedures.procedure import Outcome, Parameters
+from procedures.procedure import Outcome, Parameters, PredictedUncertainty
 from procedures.reports import calibration as pictures
 
 TriadName = Literal["accelerometer", "gyro"]
@@ -85,6 +90,31 @@ class Result(Outcome):
 
     triads: tuple[TriadSummary, ...]
     extended: tuple[Extended, ...] = ()
+
+
+def inputs_at(
+    triads: Sequence[str], angles: Sequence[TableAngles], site: Site, uncertainty: TableUncertainty
+) -> dict[str, Inputs]:
+    """Inputs of the triads at table angles (n) and what the table makes of them, by triad."""
+    forces = reference_vectors("accelerometer", angles, site)
+    found: dict[str, Inputs] = {}
+    for triad in triads:
+        vectors, of_gravity = reference_vectors(triad, angles, site), triad == "accelerometer"
+        errors = table_errors(angles, vectors, uncertainty, of_gravity=of_gravity)
+        found[triad] = Inputs(vectors, errors, reference_magnitude(triad, site), None if of_gravity else forces)
+    return found
+
+
+def predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
+    """Predicted uncertainties of the twelve coefficients of a plan; none where the noise is not known."""
+    parts, unit = predicted_parts(plan), INPUT_UNITS[plan.triad]
+    if parts is None:
+        return []
+    rows = [(name, coefficient_unit(name, unit, unit)) for name in COEFFICIENT_NAMES]
+    return [
+        PredictedUncertainty(CoefficientName(plan.triad, name), of, float(np.hypot(n, t)), n, t)
+        for (name, of), n, t in zip(rows, parts[0].tolist(), parts[1].tolist(), strict=True)
+    ]
 
 
 def require_determined(params: FitParameters, triad: str, inputs: Inputs) -> None:

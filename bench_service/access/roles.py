@@ -48,8 +48,3 @@ def has(role: Role, right: Right) -> bool:
     """Return whether a role has a right."""
     least = LEAST[right]
     return least is None or RANK[role] >= RANK[least]
-
-
-def rights_of(role: Role) -> tuple[Right, ...]:
-    """List the rights of a role."""
-    return tuple(right for right in Right if has(role, right))

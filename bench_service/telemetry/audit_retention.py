@@ -1,6 +1,7 @@
 """Retention of the audit trail: entries that are older go, stretch by stretch, and leave checkpoints."""
 
 import logging
+from contextlib import ExitStack
 from datetime import timedelta
 from threading import Event, Thread
 
@@ -58,3 +59,10 @@ class AuditRetention:
                 log.exception("old entries of the audit trail could not be removed")
             if self._ending.wait(EVERY_S):
                 return
+
+
+def begin_retention(trail: AuditTrail, kept: timedelta, closing: ExitStack) -> None:
+    """Begin to close stretches of a trail; `closing` ends it."""
+    retention = AuditRetention(trail, kept)
+    retention.begin()
+    closing.callback(retention.end)

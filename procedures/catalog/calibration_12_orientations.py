@@ -21,12 +21,11 @@ from procedures.analysis.calibration.plan import (
     basis,
     in_run_check,
     in_run_unresolved,
-    predicted_parts,
     run_to_run_requirements,
     triad_plan,
     unresolved,
 )
-from procedures.analysis.calibration.reference import INPUT_UNITS, TRIAD_NAMES
+from procedures.analysis.calibration.reference import TRIAD_NAMES
 from procedures.analysis.calibration.reference_temperature import ThermalShare, require_correctable
 from procedures.analysis.calibration.scalar import require_scalar_determined
 from procedures.analysis.calibration.station_means import launch_warnings
@@ -36,14 +35,14 @@ from procedures.analysis.calibration.triad_analysis import AccelerometerSettings
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
-from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import BadParameter, Undetermined
 from procedures.core.frames import orientation_beta_gamma, orientation_gamma_beta
-from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, coefficient_unit
+from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
 from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
-from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+from procedures.multi_position import predicted
+from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
 from procedures.reports import calibration as pictures
 from procedures.site_parameters import TableParameters, declared_table
 
@@ -137,7 +136,7 @@ def predict(params: Params, context: Context) -> Prediction:
     stations = schedule(params)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     _require_scalar(params, plans[1])
-    uncertainties = tuple(u for plan in plans for u in _predicted(plan))
+    uncertainties = tuple(u for plan in plans for u in predicted(plan))
     thermal = (_NOT_PREDICTED,) if params.thermal_correction == "current" else ()
     duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1])
     rests_on = basis(plans) if uncertainties else ""
@@ -222,17 +221,6 @@ def _require_scalar(params: Params, accelerometer: TriadPlan) -> None:
         way_out = "scalar_check=false calibrates linearly where the linear model is determined"
         what = f"the nine scalar accelerometer parameters ({way_out})"
         raise Undetermined(what, lost.lost, lost.rank, lost.wanted, lost.condition) from lost
-
-
-def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
-    parts, unit = predicted_parts(plan), INPUT_UNITS[plan.triad]
-    if parts is None:
-        return []
-    rows = [(name, coefficient_unit(name, unit, unit)) for name in COEFFICIENT_NAMES]
-    return [
-        PredictedUncertainty(CoefficientName(plan.triad, name), of, float(np.hypot(n, t)), n, t)
-        for (name, of), n, t in zip(rows, parts[0].tolist(), parts[1].tolist(), strict=True)
-    ]
 
 
 def _warnings(params: Params, plans: Sequence[TriadPlan]) -> tuple[str, ...]:

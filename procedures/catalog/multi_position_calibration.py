@@ -7,26 +7,20 @@ this procedure by default. Positions are (outer, middle, inner) angles of the ta
 from collections.abc import AsyncIterator, Sequence
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from procedures import multi_position, steps
-from procedures.analysis.calibration.plan import TriadPlan, basis, predicted_parts, triad_plan
-from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
+from procedures.analysis.calibration.plan import TriadPlan, basis, triad_plan
 from procedures.analysis.calibration.station_plan import windows
-from procedures.analysis.calibration.summary import coefficient_unit
-from procedures.analysis.calibration.table_errors import table_errors
 from procedures.analysis.table_program.dialect import read_program
 from procedures.analysis.table_program.writing import THESIS_POSITIONS
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
-from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import BadParameter
-from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import Recording, Station
 from procedures.core.table_angles import TableAngles
 from procedures.multi_position import FitParameters, Inputs, Result
-from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
+from procedures.procedure import Context, Prediction, Procedure
 from procedures.site_parameters import TableParameters, declared_table
 
 Angle = Annotated[float, Field(ge=-3600.0, le=3600.0)]
@@ -87,7 +81,7 @@ def predict(params: Params, context: Context) -> Prediction:
     for triad, inputs in _inputs(params, context).items():
         multi_position.require_determined(params, triad, inputs)
     plans = [_plan(triad, params, context) for triad in params.triads]
-    uncertainties = tuple(u for plan in plans for u in _predicted(plan))
+    uncertainties = tuple(u for plan in plans for u in multi_position.predicted(plan))
     terms = ("the predicted uncertainties are without the further terms, which take some from b and K",)
     duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1])
     return Prediction(duration_s, uncertainties, terms if params.terms else (), basis(plans) if uncertainties else "")
@@ -107,15 +101,8 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
 
 def _inputs(params: Params, context: Context) -> dict[str, Inputs]:
     site = params.site(context)
-    uncertainty = params.table(site)
     angles = [s.angles for s in schedule(params) if s.angles is not None]
-    forces = reference_vectors("accelerometer", angles, site)
-    found: dict[str, Inputs] = {}
-    for triad in params.triads:
-        vectors, of_gravity = reference_vectors(triad, angles, site), triad == "accelerometer"
-        errors = table_errors(angles, vectors, uncertainty, of_gravity=of_gravity)
-        found[triad] = Inputs(vectors, errors, reference_magnitude(triad, site), None if of_gravity else forces)
-    return found
+    return multi_position.inputs_at(params.triads, angles, site, params.table(site))
 
 
 def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
@@ -123,17 +110,6 @@ def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
     return triad_plan(
         triad, context.unit, schedule(params), context.bench.axis_motion, site, params.table(site), params.weighting
     )
-
-
-def _predicted(plan: TriadPlan) -> list[PredictedUncertainty]:
-    parts, unit = predicted_parts(plan), INPUT_UNITS[plan.triad]
-    if parts is None:
-        return []
-    rows = [(name, coefficient_unit(name, unit, unit)) for name in COEFFICIENT_NAMES]
-    return [
-        PredictedUncertainty(CoefficientName(plan.triad, name), of, float(np.hypot(n, t)), n, t)
-        for (name, of), n, t in zip(rows, parts[0].tolist(), parts[1].tolist(), strict=True)
-    ]
 
 
 PROCEDURE = Procedure(

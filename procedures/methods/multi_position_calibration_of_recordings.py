@@ -11,10 +11,8 @@ import numpy as np
 from pydantic import Field
 
 from procedures import multi_position
-from procedures.analysis.calibration.reference import reference_magnitude, reference_vectors
-from procedures.analysis.calibration.table_errors import TableUncertainty, direction_errors, table_errors
+from procedures.analysis.calibration.table_errors import TableUncertainty, direction_errors
 from procedures.core import units
-from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.recording import TRIADS
 from procedures.core.site import Site
@@ -103,14 +101,7 @@ def _from_angles(evidence: Evidence, params: Params) -> dict[str, Inputs]:
         params.azimuth_sd_arcsec,
         params.gravity_sd_m_s2 / params.gravity_m_s2,
     )
-    forces = reference_vectors("accelerometer", angles, site)
-    return {triad: _inputs(triad, angles, site, uncertainty, forces) for triad in params.triads}
-
-
-def _inputs(triad: str, angles: list[TableAngles], site: Site, uncertainty: TableUncertainty, forces: Array) -> Inputs:
-    vectors, of_gravity = reference_vectors(triad, angles, site), triad == "accelerometer"
-    errors = table_errors(angles, vectors, uncertainty, of_gravity=of_gravity)
-    return Inputs(vectors, errors, reference_magnitude(triad, site), None if of_gravity else forces)
+    return multi_position.inputs_at(params.triads, angles, site, uncertainty)
 
 
 def _angles(evidence: Evidence, params: Params) -> list[TableAngles]:

@@ -2,7 +2,7 @@
 
 import asyncio
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -53,12 +53,13 @@ class Stream(Tape):
         return frame + frame if kind == "doubled" else frame
 
 
-class FramePort:
-    """Port that sends the stream to each line that is open; it reads nothing."""
+class LinePort:
+    """TCP port whose lines get the stream; a listener that does not read is cut off."""
 
     def __init__(self, stream: Stream) -> None:
         self._stream = stream
-        self._lines: set[asyncio.StreamWriter] = set()
+        self._lines: dict[asyncio.StreamWriter, int] = {}
+        """Line -> channel of the protocol, -1 before one is open."""
         self._server: asyncio.Server | None = None
 
     async def open(self, host: str, port: int) -> int:
@@ -79,22 +80,33 @@ class FramePort:
         for line in tuple(self._lines):
             line.transport.abort()
 
+    def _listeners(self) -> Iterable[asyncio.StreamWriter]:
+        """Lines that get the stream."""
+        return self._lines
+
     def _send(self, data: bytes) -> None:
-        for line in tuple(self._lines):
+        for line in tuple(self._listeners()):
             if line.transport.get_write_buffer_size() > MOST_WAITING:
                 line.transport.abort()
             elif data:
                 line.write(data)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._lines.add(writer)
+        raise NotImplementedError("each protocol reads its own lines")
+
+
+class FramePort(LinePort):
+    """Port that sends the stream to each line that is open; it reads nothing."""
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._lines[writer] = -1
         try:
             while await reader.read(4096):
                 continue
         except ConnectionError:
             return
         finally:
-            self._lines.discard(writer)
+            self._lines.pop(writer, None)
             writer.close()
 
 
@@ -127,7 +139,7 @@ class DatagramPort:
                 self._transport.sendto(data[at : at + self._length])
 
 
-class IxcomPort:
+class IxcomPort(LinePort):
     """Port of iXCOM: one logical channel, commands and parameters, and IMURAW once it was asked for."""
 
     TEXTS: tuple[tuple[int, str], ...] = ((0, "BENCH"), (1, "SIM-INAT"), (3, "2026"), (5, "1.0"), (6, "1.0"))
@@ -135,36 +147,12 @@ class IxcomPort:
     def __init__(self, stream: Stream, serial: str, rate_hz: float) -> None:
         if not isinstance(stream.frames, IxcomFrames):
             raise TypeError("the stream holds no iXCOM frames")
-        self._stream, self._frames, self._serial, self._rate_hz = stream, stream.frames, serial, rate_hz
-        self._server: asyncio.Server | None = None
-        self._lines: dict[asyncio.StreamWriter, int] = {}
-        """Line -> channel, -1 before one is open."""
+        super().__init__(stream)
+        self._frames, self._serial, self._rate_hz = stream.frames, serial, rate_hz
         self._logging: set[asyncio.StreamWriter] = set()
 
-    async def open(self, host: str, port: int) -> int:
-        """Open the port; 0: any free one. Returns its number."""
-        self._server = await asyncio.start_server(self._serve, host, port)
-        self._stream.send = self._send
-        return self._server.sockets[0].getsockname()[1]
-
-    async def close(self) -> None:
-        """Close the port and its lines."""
-        if self._server is not None:
-            self._server.close()
-        for line in tuple(self._lines):
-            line.close()
-
-    def cut(self) -> None:
-        """Cut all lines of the unit."""
-        for line in tuple(self._lines):
-            line.transport.abort()
-
-    def _send(self, data: bytes) -> None:
-        for line in tuple(self._logging):
-            if line.transport.get_write_buffer_size() > MOST_WAITING:
-                line.transport.abort()
-            elif data:
-                line.write(data)
+    def _listeners(self) -> Iterable[asyncio.StreamWriter]:
+        return self._logging
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._lines[writer] = -1

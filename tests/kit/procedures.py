@@ -20,7 +20,7 @@ from bench_service.drivers.simulated import SimulatedDriver
 from bench_service.evidence.documents import document_of, require_storable
 from procedures.bench import BenchNeeds
 from procedures.bench.imu import Stream
-from procedures.core.recording import MemoryRecording, RecordingInfo, Station
+from procedures.core.recording import MemoryRecording, RawArray, RecordingInfo, Station
 from procedures.core.report import Figure, Report, Table
 from procedures.procedure import Context, Method, Outcome, Parameters, Procedure
 
@@ -69,21 +69,26 @@ async def _acquired(
         assert len(found) < len(stations), "`acquire` gives more streams than there are stations"
         assert stream.station == stations[len(found)], "`acquire` must give the stations' streams in order"
         raw = np.concatenate([block async for block in stream.blocks])
-        info = RecordingInfo(
-            f"station {len(found)}",
-            unit,
-            stream.channels,
-            stream.rate_hz,
-            len(raw),
-            stream.start_s,
-            stream.station,
-            simulated=True,
-            launched_s=stream.launched_s,
-        )
-        found.append(MemoryRecording(info, raw))
+        found.append(recorded(stream, raw, len(found), unit))
     assert len(found) == len(stations), "`acquire` gives fewer streams than there are stations"
     await bench.make_safe()
     return found
+
+
+def recorded(stream: Stream, raw: RawArray, number: int, unit: str) -> MemoryRecording:
+    """A stream's samples as the recording of a station, as the service would describe it."""
+    info = RecordingInfo(
+        f"station {number}",
+        unit,
+        stream.channels,
+        stream.rate_hz,
+        len(raw),
+        stream.start_s,
+        stream.station,
+        simulated=True,
+        launched_s=stream.launched_s,
+    )
+    return MemoryRecording(info, raw)
 
 
 def run(procedure: AnyProcedure, seed: int = 1, unit: str = "SIM-0001", **parameters: object) -> Any:

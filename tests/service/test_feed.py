@@ -1,29 +1,20 @@
 """The feed: every bench and the events of chosen jobs in one stream, with a sign of life every second."""
 
 import json
-import socket
 from collections.abc import Generator, Iterator
 from typing import Any
 
 import httpx
 import pytest
 
-from bench_service.cli.processes.serving import serving
-from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s
+from tests.kit.served import served
 from tests.service.client import FAST, Client
 
 
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Generator[Client]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-    url = f"sqlite:///{tmp_path_factory.mktemp('fed') / 'bench.sqlite'}"
-    with (
-        serving(Settings(database_url=url, port=port)),
-        httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60) as http,
-    ):
+    with served(tmp_path_factory.mktemp("fed")) as at, httpx.Client(base_url=at, timeout=60) as http:
         yield Client(http)
 
 

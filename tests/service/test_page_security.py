@@ -1,7 +1,6 @@
 """What a browser may do with our answers: no frame, no script or style in place, no other host; files that it keeps."""
 
 import re
-import socket
 from collections.abc import Generator
 from importlib.resources import files
 from pathlib import Path
@@ -12,9 +11,8 @@ import pytest
 
 from bench_service.api.http.headers import OWN_FILES_ONLY
 from bench_service.bench.directory import BenchDirectory
-from bench_service.cli.processes.serving import serving
 from bench_service.pages import figures, images
-from bench_service.settings import Settings
+from tests.kit.served import served
 from tests.service.campaigns import add, named, start
 from tests.service.client import FAST, Client
 from tests.service.page import drawn, page
@@ -27,14 +25,7 @@ IN_PLACE = re.compile(
 
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Generator[Client]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-    url = f"sqlite:///{tmp_path_factory.mktemp('served') / 'bench.sqlite'}"
-    with (
-        serving(Settings(database_url=url, port=port)),
-        httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60) as http,
-    ):
+    with served(tmp_path_factory.mktemp("served")) as at, httpx.Client(base_url=at, timeout=60) as http:
         yield Client(http)
 
 

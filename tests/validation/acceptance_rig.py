@@ -22,12 +22,13 @@ from procedures.bench import BenchNeeds
 from procedures.core.errors import DomainError
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Verdict
-from procedures.core.recording import MemoryRecording, RecordingInfo
+from procedures.core.recording import MemoryRecording
 from procedures.core.unit import Unit
 from procedures.inspection import analyse_method, analyse_procedure
 from procedures.procedure import Context, DatedCalibration, Evidence, Outcome
 from simulators.truth import Array, BenchTruth, UnitTruth, default_bench, default_unit
 from simulators.world import WorldConfig, build
+from tests.kit.procedures import recorded
 
 AT = datetime(2026, 1, 1, tzinfo=UTC)
 SCALED: dict[str, dict[str, Any]] = {
@@ -122,18 +123,7 @@ async def _recorded(procedure: Any, stations: Any, step: str, seed: int, fault: 
     async for stream in procedure.acquire(devices, stations):
         raw = np.concatenate([block async for block in stream.blocks])
         raw = fault.samples(step, tuple(c.name for c in stream.channels), raw)
-        info = RecordingInfo(
-            f"station {len(found)}",
-            unit.serial,
-            stream.channels,
-            stream.rate_hz,
-            len(raw),
-            stream.start_s,
-            stream.station,
-            simulated=True,
-            launched_s=stream.launched_s,
-        )
-        found.append(MemoryRecording(info, raw))
+        found.append(recorded(stream, raw, len(found), unit.serial))
     await devices.make_safe()
     return found
 

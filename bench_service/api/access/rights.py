@@ -3,8 +3,6 @@
 `docs/rights.md` is made from this. A route that changes something and is not named here is an admin's alone.
 """
 
-from typing import Any
-
 from bench_service.access.roles import Right
 
 READING = ("GET", "HEAD")
@@ -75,8 +73,3 @@ RIGHTS: dict[str, Right] = {
 def right_of(name: str, method: str) -> Right:
     """The right that a route needs."""
     return RIGHTS.get(name, Right.SEE if method in READING else Right.ADMIN)
-
-
-def right_of_route(route: Any) -> Right:
-    """The right that a route of the application needs."""
-    return right_of(route.name, "GET" if route.methods & set(READING) else "POST")

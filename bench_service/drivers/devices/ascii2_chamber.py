@@ -2,7 +2,13 @@
 
 from pydantic import Field, model_validator
 
-from bench_service.drivers.devices.chamber_rules import limits_of, require_allowed, require_fit, require_same
+from bench_service.drivers.devices.chamber_rules import (
+    limits_of,
+    obey_on_safe,
+    require_allowed,
+    require_fit,
+    require_same,
+)
 from bench_service.drivers.devices.wire import Greeting, patience
 from bench_service.drivers.interface.driver import DeviceDriver, DriverContext, Found
 from bench_service.drivers.interface.sections import NonNegative, WireChamber
@@ -106,14 +112,15 @@ class Ascii2Chamber:
     async def make_safe(self) -> None:
         """Lead a running chamber as `on_safe` says; see the port."""
         state = await self._line.ask(self._state)
-        if not state.bit(self._layout.start) or self._section.on_safe == "hold":
+        if not state.bit(self._layout.start):
             return
-        if self._section.on_safe == "off":
-            switches = ascii2.with_bit(state.digital, self._layout.start, False)
-            await self._write(state.set_points, switches, "its end")
-            return
-        limits = self.limits
-        await self._lead(state, limits.ambient_c, limits.ramp_c_min, start=False)
+        switches = ascii2.with_bit(state.digital, self._layout.start, False)
+        await obey_on_safe(
+            self._section,
+            self.limits,
+            lambda: self._write(state.set_points, switches, "its end"),
+            lambda temperature_c, ramp_c_min: self._lead(state, temperature_c, ramp_c_min, start=False),
+        )
 
     def close(self) -> None:
         """Drop the line; see `WireDevice`."""

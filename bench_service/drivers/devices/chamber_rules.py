@@ -1,9 +1,10 @@
 """Rules that every chamber's driver keeps before it sends a demand."""
 
+from collections.abc import Awaitable, Callable
 from math import isfinite
 
 from bench_service.drivers.interface.driver import Bound, narrowest
-from bench_service.drivers.interface.sections import ChamberBounds
+from bench_service.drivers.interface.sections import ChamberBounds, WireChamber
 from procedures.bench.chamber import ChamberLimits
 from procedures.bench.errors import DeviceFault, OutOfRange
 
@@ -42,3 +43,19 @@ def require_same(name: str, demanded: float, found: float, tolerance: float) -> 
     """Check a value that was read back. Raises `DeviceFault`."""
     if abs(found - demanded) > tolerance:
         raise DeviceFault(f"the chamber was set to {name} {demanded:g} and reads back {found:g}")
+
+
+async def obey_on_safe(
+    section: WireChamber,
+    limits: ChamberLimits,
+    end: Callable[[], Awaitable[object]],
+    lead: Callable[[float, float], Awaitable[object]],
+) -> None:
+    """Make a running chamber safe as its section's `on_safe` says: leave it, end its run, or lead it to ambient.
+
+    `lead` takes a temperature [°C] and a ramp [°C/min]. One that stands still is not to be asked: it gets no demand.
+    """
+    if section.on_safe == "off":
+        await end()
+    elif section.on_safe != "hold":
+        await lead(limits.ambient_c, limits.ramp_c_min)

@@ -2,7 +2,13 @@
 
 from pydantic import model_validator
 
-from bench_service.drivers.devices.chamber_rules import limits_of, require_allowed, require_fit, require_same
+from bench_service.drivers.devices.chamber_rules import (
+    limits_of,
+    obey_on_safe,
+    require_allowed,
+    require_fit,
+    require_same,
+)
 from bench_service.drivers.interface.driver import DeviceDriver, DriverContext, Found
 from bench_service.drivers.interface.sections import Positive, WireChamber
 from bench_service.drivers.link.modbus_line import ModbusLine
@@ -75,13 +81,8 @@ class ModbusChamber:
 
     async def make_safe(self) -> None:
         """Lead a running chamber as `on_safe` says; see the port."""
-        if not await self._line.read_bit(self._map.running) or self._section.on_safe == "hold":
-            return
-        if self._section.on_safe == "off":
-            await self._run(False)
-            return
-        limits = self.limits
-        await self._lead(limits.ambient_c, limits.ramp_c_min)
+        if await self._line.read_bit(self._map.running):
+            await obey_on_safe(self._section, self.limits, lambda: self._run(False), self._lead)
 
     def close(self) -> None:
         """Drop the line; see `WireDevice`."""

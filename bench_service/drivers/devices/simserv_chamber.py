@@ -5,7 +5,13 @@ from typing import TypeVar
 
 from pydantic import Field
 
-from bench_service.drivers.devices.chamber_rules import limits_of, require_allowed, require_fit, require_same
+from bench_service.drivers.devices.chamber_rules import (
+    limits_of,
+    obey_on_safe,
+    require_allowed,
+    require_fit,
+    require_same,
+)
 from bench_service.drivers.devices.wire import Greeting, accepted, patience
 from bench_service.drivers.interface.driver import Bound, DeviceDriver, DriverContext, Found
 from bench_service.drivers.interface.sections import NonNegative, Positive, WireChamber
@@ -102,13 +108,8 @@ class SimservChamber:
     async def make_safe(self) -> None:
         """Lead a running chamber as `on_safe` says; see the port. One that stands still gets no demand."""
         status = await self._status()
-        if not status & ChamberStatus.RUNNING or self._section.on_safe == "hold":
-            return
-        if self._section.on_safe == "off":
-            await self._run(False)
-            return
-        limits = self.limits
-        await self._lead(limits.ambient_c, limits.ramp_c_min)
+        if status & ChamberStatus.RUNNING:
+            await obey_on_safe(self._section, self.limits, lambda: self._run(False), self._lead)
 
     def close(self) -> None:
         """Drop the line; see `WireDevice`."""

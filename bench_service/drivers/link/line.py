@@ -46,10 +46,6 @@ class DeviceLine:
         """Ask and wait for the value of the answer. Raises `Disconnected`, `DeviceBusy`, `Refusal`."""
         return await asyncio.wrap_future(self._put(question, within_s))
 
-    def ask_now(self, question: Question[T], within_s: float | None = None) -> T:
-        """Ask and wait in this thread; for a process that has no loop. Raises as `ask` does."""
-        return self._put(question, within_s).result()
-
     def _put(self, question: Question[T], within_s: float | None) -> "Future[T]":
         patience = self._exchange.patience
         until = wall_clock.monotonic_s() + (patience.deadline_s if within_s is None else within_s)

@@ -158,20 +158,19 @@ def _has_run(same: Mask, zeros: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Mask of the channels, (channels,), with `SHORTEST` consecutive repeats."""
     if same.shape[1] < SHORTEST or not np.any(zeros >= SHORTEST):
         return zeros >= min(SHORTEST, same.shape[1])
-    two = same[:, 1:] & same[:, :-1]
-    return np.asarray((two[:, 3:] & two[:, :-3] & same[:, 2:-2]).any(axis=1))
+    return _has_run_of(same, SHORTEST)
 
 
-def _has_run_of(row: Mask, length: float) -> bool:
-    """Whether `row`, (n,), holds `length` consecutive repeats, found by doubling: a few passes over bytes."""
-    if length > len(row):
-        return False
+def _has_run_of(same: Mask, length: float) -> NDArray[np.bool_]:
+    """Mask of the rows, (…, n), with `length` consecutive repeats, found by doubling: a few passes over bytes."""
+    if length > same.shape[-1]:
+        return np.zeros(same.shape[:-1], np.bool_)
     needed, spanned = int(np.ceil(length)), 1
     while spanned < needed:
         step = min(spanned, needed - spanned)
-        row = row[step:] & row[:-step]
+        same = same[..., step:] & same[..., :-step]
         spanned += step
-    return bool(row.any())
+    return np.asarray(same.any(axis=-1))
 
 
 def _trailing(same: Mask) -> NDArray[np.int64]:
