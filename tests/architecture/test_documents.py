@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from bench_service.settings import Settings
+from procedures import catalog, methods
 from tests.kit.documents import PAGES, ROOT, Block, blocks, texts_of_code
 from tests.kit.layer_picture import PAGE as ARCHITECTURE
 from tests.kit.layer_picture import replaced
@@ -23,6 +24,12 @@ def _headings(page: Path) -> set[str]:
     titles = re.findall(r"^#+ (.+)$", bare, re.MULTILINE)
     anchors = set(re.findall(r'<a id="([\w-]+)">', bare))
     return anchors | {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def test_every_procedure_and_method_is_on_its_page() -> None:
+    page = (ROOT / "docs" / "procedures.md").read_text(encoding="utf-8")
+    catalogue = {*catalog.discover(), *methods.discover()}
+    assert {name for name in catalogue if f"`{name}`" not in page} == set()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))

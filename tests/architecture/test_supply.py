@@ -1,4 +1,4 @@
-"""What ships: the runtime image without tools and root, its packages, the audit of licences, and pinned images."""
+"""Parts that ship: the runtime image without tools and root, its packages, the audit of licences, and pinned images."""
 
 import importlib.util
 import re

@@ -17,7 +17,7 @@ def found() -> str | None:
 
 
 def missing() -> str | None:
-    """What the browser tests lack on this machine, in words; None: nothing."""
+    """Sentence on the part that the browser tests lack on this machine; None: they have all."""
     try:
         import playwright  # noqa: F401
     except ImportError:

@@ -136,6 +136,15 @@ def test_a_hung_data_link_is_found() -> None:
     assert 60 <= finding.count <= 62  # its neighbours may be equal by chance
 
 
+@pytest.mark.parametrize(("repeats", "severity"), [(60, Severity.WARN), (3000, Severity.REFUSE)])
+def test_codes_of_a_constant_current_may_repeat_but_not_for_long(repeats: int, severity: Severity) -> None:
+    """Seen once: a sound converter was refused for 20 rows of 6000. A twentieth of the samples may repeat."""
+    samples = dithered()
+    samples[16_350 : 16_350 + repeats] = samples[16_349]
+    fitness = look(samples, COUNTERS, reads_gravity=False)
+    assert {f.severity for c in fitness for f in c.findings if f.kind is Kind.REPEATED} == {severity}
+
+
 @pytest.mark.parametrize("times", [2, 10])
 def test_rows_sent_more_than_once_are_found(times: int) -> None:
     fitness = look(np.repeat(wide(20_000), times, axis=0))

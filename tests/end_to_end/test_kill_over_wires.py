@@ -34,7 +34,7 @@ def wired(tmp_path: Path, free_port: int) -> Iterator[tuple[BenchProcess, Served
 
 
 def _world(behind: Served) -> tuple[bool, bool, float]:
-    """What is true: whether the table moves, whether the unit has power, and the middle axis' encoder [deg]."""
+    """True state of the served world: whether the table moves, whether the unit is on, the middle encoder [deg]."""
     return behind.do(
         lambda served: (
             not served.bench.turntable.locked,

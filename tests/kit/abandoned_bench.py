@@ -7,7 +7,7 @@ from bench_service.drivers.device_register import DeviceRegister
 
 
 def abandoned(folder: Path, job: str | None = None) -> DeviceRegister:
-    """What a process leaves that was killed in a move."""
+    """Leave the register of a bench as a process does that is killed in a move."""
     register = DeviceRegister(folder, "sim")
     link = register.open(by="process 4711 on bench-host", job=job)
     link.note("supply.switch_on", {}, powered=True)

@@ -46,7 +46,7 @@ def routes() -> Iterator[RouteRight]:
 
 
 def allowed(right: Right, role: Role | None) -> bool:
-    """What the table says: whether a role has a right; None: nobody."""
+    """Whether the table gives a role a right; None as the role: a sender who is not known."""
     least = LEAST[right]
     return least is None or (role is not None and RANK[role] >= RANK[least])
 

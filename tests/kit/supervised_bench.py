@@ -57,7 +57,7 @@ class Books:
 
 
 class Watch:
-    """What the files of the host would say."""
+    """Identities of worker and supervisor, in place of the files of the host."""
 
     def __init__(self, driving: Driving | None) -> None:
         self.now = driving

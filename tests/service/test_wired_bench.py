@@ -192,7 +192,7 @@ def test_a_file_that_was_spoiled_keeps_no_state_from_being_known(east: East) -> 
 def test_a_table_turned_while_the_service_was_down_is_found(
     east: East, turned: dict[str, Any], words: str | None
 ) -> None:
-    """Of the outer axis, which has slip rings, whole turns do not count."""
+    """Whole turns of the outer axis, which has slip rings, do not count."""
     east.leave(table=AT_REST, angles_deg=(0.0, 0.0, 0.0))
     east.table.state |= turned
     found = east.devices().compare("a test")

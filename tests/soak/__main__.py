@@ -34,7 +34,7 @@ LOGS_KB = 61_000.0
 
 @dataclass
 class Samples:
-    """What was seen of the service, one value a sample."""
+    """Figures of the service over the run, one value a sample."""
 
     minutes: list[float] = field(default_factory=list)
     memory_mb: list[float] = field(default_factory=list)

@@ -11,7 +11,7 @@ TRIALS = 400
 
 @pytest.mark.parametrize("correlation", [0.0, 0.5])
 def test_the_interval_holds_the_true_slope_about_as_often_as_it_says(correlation: float) -> None:
-    """Of 400 intervals of 95 % at least 80 % hold the truth.
+    """At least 80 % of 400 intervals of 95 % hold the truth.
 
     Newey and West's interval is known to be too narrow for short records whose values resemble their neighbours, so
     less than 95 % is expected. Least squares without it would hold in about 74 % at a correlation of 0.5: its variance

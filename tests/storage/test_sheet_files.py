@@ -58,7 +58,7 @@ def sheet(treatment: Treatment | None = None, **part: int) -> Sheet:
 
 
 def read(form: SheetFormat, data: bytes, folder: Path) -> pd.DataFrame:
-    """What an engineer's own reader makes of the file."""
+    """Columns of the file as an engineer's own reader has them."""
     file = folder / f"samples.{form.value}"
     file.write_bytes(data)
     readers: dict[SheetFormat, Callable[[], pd.DataFrame]] = {
