@@ -274,7 +274,7 @@ def create_app(
     )
     app.state.service = service
     app.state.hub = EventHub(service.stores.jobs, service.live, event_stream.FRAMES)
-    app.state.news = news.NewsDesk(service)
+    app.state.news = news.NewsReader(service)
     app.state.max_import_bytes = max_import_bytes
     app.state.import_threads = CapacityLimiter(IMPORT_THREADS)
     for module in ROUTERS:

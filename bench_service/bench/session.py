@@ -14,7 +14,7 @@ from bench_service.bench.live.tap import LiveTap
 from bench_service.bench.live.values import PUBLISH_S
 from bench_service.bench.observed import ObservedBench
 from bench_service.bench.streams import require_end, stream_of
-from bench_service.bench.watchdog import Patience, Watchdog
+from bench_service.bench.watchdog import TimeLimits, Watchdog
 from bench_service.evidence.recordings import RecordingStore
 from bench_service.model.errors import StorageFailure
 from bench_service.model.job import Job
@@ -29,7 +29,7 @@ from procedures.procedure import Outcome, Parameters, Procedure
 T = TypeVar("T")
 log = logging.getLogger(__name__)
 
-PATIENCE = Patience()
+TIME_LIMITS = TimeLimits()
 """Time limits for the answers of devices."""
 UNWIND_S = 1.0
 """Time that a procedure may take to leave a cancelled verb [s, real time]."""
@@ -65,7 +65,7 @@ class BenchSession:
     ) -> None:
         self.job = job
         self._procedure = procedure
-        self._watchdog = Watchdog(bench.clock, bench.description.origin == "simulated", PATIENCE)
+        self._watchdog = Watchdog(bench.clock, bench.description.origin == "simulated", TIME_LIMITS)
         self._bench = ObservedBench(bench, self._watchdog)
         self._recordings = recordings
         self._stop_wanted = NonBlockingQuery("stop", stop_wanted)

@@ -19,7 +19,7 @@ UNWATCHED = frozenset({"imu.stream", "operator.set_by_hand"})
 
 
 @dataclass(frozen=True)
-class Patience:
+class TimeLimits:
     """Time limits for the answers of devices [s, real time].
 
     On a simulated bench every verb has `simulated_s`, and an advancing clock is a sign of life: bench time may pass
@@ -38,10 +38,10 @@ class Patience:
 class Watchdog:
     """A `bench_service.bench.observed.Observer` that detects silent devices; its caller polls `silence`."""
 
-    def __init__(self, clock: Clock, simulated: bool, patience: Patience) -> None:
+    def __init__(self, clock: Clock, simulated: bool, limits: TimeLimits) -> None:
         self._clock = clock
         self._simulated = simulated
-        self._patience = patience
+        self._patience = limits
         self._mutex = Lock()
         self._waiting: dict[str, float] = {}
         self._signs = 0

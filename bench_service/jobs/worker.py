@@ -72,7 +72,7 @@ class Worker:
         """
         self._thread = Thread(target=self._begin, args=(then,), name="worker", daemon=True)
         self._thread.start()
-        Thread(target=self._give_up, name="worker's patience", daemon=True).start()
+        Thread(target=self._give_up, name="engine's launch limit", daemon=True).start()
 
     def require_engine(self) -> JobEngine:
         """The engine, once it runs. Raises `NotDriving` with the reason where it did not start."""

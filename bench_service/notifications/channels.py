@@ -11,7 +11,7 @@ from email.utils import format_datetime, make_msgid
 from bench_service.notifications.messages import Message
 from bench_service.notifications.targets import Mail, Webhook, secret
 
-PATIENCE_S = 10.0
+TIMEOUT_S = 10.0
 SIGNATURE = "X-Bench-Signature"
 
 
@@ -41,7 +41,7 @@ def _mail(target: Mail, message: Message, pages: str) -> None:
     password = secret(target.password_file)
     try:
         made = smtplib.SMTP_SSL if target.security == "tls" else smtplib.SMTP
-        with made(target.host, target.port, timeout=PATIENCE_S) as server:
+        with made(target.host, target.port, timeout=TIMEOUT_S) as server:
             if target.security == "starttls":
                 server.starttls(context=ssl.create_default_context())
             if target.user is not None and password is not None:
@@ -76,7 +76,7 @@ def _post(target: Webhook, message: Message, pages: str) -> None:
     if (key := secret(target.secret_file)) is not None:
         headers[SIGNATURE] = "sha256=" + hmac.new(key.encode(), body, hashlib.sha256).hexdigest()
     try:
-        answer = httpx.post(target.url, content=body, headers=headers, timeout=PATIENCE_S, trust_env=False)
+        answer = httpx.post(target.url, content=body, headers=headers, timeout=TIMEOUT_S, trust_env=False)
     except httpx.HTTPError as error:
         raise Undelivered(f"the webhook {target.name}: {type(error).__name__}: {error}") from error
     if not answer.is_success:

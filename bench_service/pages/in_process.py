@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 KEPT = ("host", "origin", "referer", "sec-fetch-site", "sec-fetch-mode", "sec-fetch-dest", "cookie", "authorization")
 """Headers of the person's own request by which the API decides who asks, and from where."""
-PATIENCE_S = 20.0
+TIMEOUT_S = 20.0
 SENDER = "bench.access"
 """Key of a request's scope under which the API keeps what it knows of the sender; no client can set it."""
 
@@ -29,5 +29,5 @@ async def ask(request: Request, method: str, path: str, document: dict[str, Any]
 
     transport = httpx.ASGITransport(app=as_the_same_sender, client=client)
     base = f"{request.url.scheme}://{request.headers.get('host', 'localhost')}"
-    async with httpx.AsyncClient(transport=transport, base_url=base, timeout=PATIENCE_S) as http:
+    async with httpx.AsyncClient(transport=transport, base_url=base, timeout=TIMEOUT_S) as http:
         return await http.request(method, path, json=document, headers=headers)

@@ -4,13 +4,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bench_service.bench.watchdog import Patience
+from bench_service.bench.watchdog import TimeLimits
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver
 from procedures.bench import Bench, BenchNeeds
 from procedures.bench.errors import BenchError
 
-IMPATIENT = Patience(0.4, 0.4, 0.8, 0.4)
+IMPATIENT = TimeLimits(0.4, 0.4, 0.8, 0.4)
 
 
 class FailingDriver(SimulatedDriver):

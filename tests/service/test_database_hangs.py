@@ -81,7 +81,7 @@ def test_a_worker_sees_its_devices_and_its_own_end(
     postgres: OwnPostgres, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
     silent = what == "a device falls silent"
-    monkeypatch.setattr(session, "PATIENCE", IMPATIENT if silent else session.PATIENCE)
+    monkeypatch.setattr(session, "TIME_LIMITS", IMPATIENT if silent else session.TIME_LIMITS)
     moving, go_on = Event(), Event()
 
     async def move(*_: object) -> None:

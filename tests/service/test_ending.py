@@ -18,7 +18,7 @@ from bench_service.wall_clock import pause
 
 @pytest.fixture
 def server() -> Iterator[tuple[uvicorn.Server, str, threading.Event]]:
-    """A real server with one route that takes longer than the server's patience at its end."""
+    """A real server with one route that takes longer than the server waits at its end."""
     app, reached, free = FastAPI(), threading.Event(), threading.Event()
     errors.install(app)
     endings.install(app)

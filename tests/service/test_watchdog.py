@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from bench_service.bench import session
-from bench_service.bench.watchdog import Patience, Watchdog
+from bench_service.bench.watchdog import TimeLimits, Watchdog
 from bench_service.campaigns.stores import Stores
 from bench_service.drivers.device_faults import FaultPlan
 from bench_service.drivers.device_register import DeviceRegister
@@ -42,7 +42,7 @@ released = Event()
 
 @pytest.fixture
 def stores(sqlite_url: str, monkeypatch: pytest.MonkeyPatch) -> Generator[Stores]:
-    monkeypatch.setattr(session, "PATIENCE", IMPATIENT)
+    monkeypatch.setattr(session, "TIME_LIMITS", IMPATIENT)
     monkeypatch.setattr(session, "UNWIND_S", 0.4)
     released.clear()
     made, database = open_stores(sqlite_url)
@@ -171,8 +171,8 @@ class Clock:
 
 
 def test_what_counts_as_silence() -> None:
-    clock, patience = Clock(), Patience(5.0, 2.0, 120.0, 5.0)
-    real, simulated = Watchdog(clock, False, patience), Watchdog(clock, True, patience)
+    clock, limits = Clock(), TimeLimits(5.0, 2.0, 120.0, 5.0)
+    real, simulated = Watchdog(clock, False, limits), Watchdog(clock, True, limits)
     for dog in (real, simulated):
         assert dog.silence(100.0, 100.0) is None  # nothing is asked of anybody
         dog.begin("turntable.move_to", {})

@@ -35,7 +35,7 @@ class News:
     at_s: float = float("-inf")
 
 
-class NewsDesk:
+class NewsReader:
     """Reads the benches at most every `LOOK_S`, whatever the number of listeners."""
 
     def __init__(self, service: BenchService) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import StreamingResponse
 
-from bench_service.api.feed.news import NewsDesk, frame, live_frame
+from bench_service.api.feed.news import NewsReader, frame, live_frame
 from bench_service.api.feed.schemas import Beat
 from bench_service.api.http.errors import problems
 from bench_service.api.jobs.event_stream import HEAD, HEADERS
@@ -39,30 +39,30 @@ async def follow(
     request: Request, job: Annotated[list[str] | None, Query(max_length=MOST_JOBS, description="Jobs to follow")] = None
 ) -> StreamingResponse:
     """Stream every bench's state, and the events of some jobs, in one connection: one is enough for a browser."""
-    desk: NewsDesk = request.app.state.news
-    return StreamingResponse(_told(desk, job or []), media_type="text/event-stream", headers=HEADERS)
+    reader: NewsReader = request.app.state.news
+    return StreamingResponse(_frames(reader, job or []), media_type="text/event-stream", headers=HEADERS)
 
 
-async def _told(desk: NewsDesk, jobs: list[str]) -> AsyncIterator[bytes]:
+async def _frames(reader: NewsReader, jobs: list[str]) -> AsyncIterator[bytes]:
     yield HEAD
     told: dict[str, bytes] = {}
     lives: dict[str, BenchLive] = {}
     sequences = dict.fromkeys(jobs, 0)
     beat_s = jobs_s = float("-inf")
     while True:
-        news = await desk.news()
+        news = await reader.news()
         at_s = monotonic_s()
         pieces = [piece for bench, piece in news.benches.items() if told.get(bench) != piece]
         told = dict(news.benches)
         for bench in news.benches:
-            live = desk.live(bench, news)
+            live = reader.live(bench, news)
             if live is not None and live is not lives.get(bench) and live != lives.get(bench):
                 lives[bench] = live
                 pieces.append(live_frame(live))
         if at_s - jobs_s >= JOBS_S:
             jobs_s = at_s
             for job, after in sequences.items():
-                sequences[job], piece = await desk.events(job, after)
+                sequences[job], piece = await reader.events(job, after)
                 pieces.append(piece)
         if at_s - beat_s >= BEAT_S:
             beat_s = at_s

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from bench_service.cli.asking.client import call
-from bench_service.cli.asking.patience import patiently
+from bench_service.cli.asking.retries import with_retries
 from bench_service.cli.options import notice
 from bench_service.wall_clock import pause
 
@@ -37,7 +37,7 @@ def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict
             paused = job["state"] == "paused"
             pause(LOOK_S)
             ask = partial(call, client, "GET", f"/api/v1/jobs/{job['id']}", JOB, timeout=LOOK_TIMEOUT_S)
-            job = patiently(ask, notice, goes_on)
+            job = with_retries(ask, notice, goes_on)
             progress.update(bar, completed=job["progress"]["station"])
         if job["state"] == "succeeded":
             progress.update(bar, completed=job["progress"]["stations"] or 1)
@@ -65,7 +65,7 @@ def watch_campaign(client: "httpx.Client", run: dict[str, Any], console: Console
             pause(LOOK_S)
             path = f"/api/v1/campaign-runs/{run['id']}"
             ask = partial(call, client, "GET", path, CAMPAIGN_RUN, timeout=LOOK_TIMEOUT_S)
-            run = patiently(ask, notice, goes_on)
+            run = with_retries(ask, notice, goes_on)
 
 
 def _progress(console: Console) -> Progress:

@@ -10,7 +10,7 @@ import typer
 
 from bench_service.cli.asking.client import answer, call, connect, segment
 from bench_service.cli.asking.lists import everything, show
-from bench_service.cli.asking.patience import patiently
+from bench_service.cli.asking.retries import with_retries
 from bench_service.cli.files import clear_place, whole_file
 from bench_service.cli.options import (
     NO_ITEMS,
@@ -72,10 +72,10 @@ def run_campaign(
             leave_campaign(client, run["id"], server, again, notice)
             return INTERRUPTED
         path = f"/api/v1/campaign-runs/{run['id']}/report"
-        report = patiently(partial(call, client, "GET", path, ("run",)), notice, goes_on)
+        report = with_retries(partial(call, client, "GET", path, ("run",)), notice, goes_on)
         if junit is not None:
             ask = partial(answer, client, "GET", path, params={"format": "junit"})
-            _write_junit(patiently(ask, notice, goes_on).content, run["id"], junit)
+            _write_junit(with_retries(ask, notice, goes_on).content, run["id"], junit)
     if as_json:
         print(json.dumps(report, indent=2))
     else:

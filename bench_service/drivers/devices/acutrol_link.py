@@ -6,7 +6,7 @@ from typing import Literal, TypeVar
 from pydantic import Field, model_validator
 
 from bench_service.drivers.answers import Refusal
-from bench_service.drivers.devices.wire import Greeting, Note, accepted, patience
+from bench_service.drivers.devices.wire import Greeting, Note, accepted, line_times
 from bench_service.drivers.interface.driver import Bound
 from bench_service.drivers.interface.sections import NonNegative, Positive, WireTurntable
 from bench_service.drivers.link.exchange import Ask, Question
@@ -66,7 +66,7 @@ class AcutrolLink:
         self._greeting = Greeting("turntable", identity, self._first_words, note)
         framing = Framing(self._dialect.reply_ending, section.reply_prefix_bytes)
         self._line = DeviceLine(
-            "turntable", section.address, framing, self._greeting, patience(section, section.after_demand_s)
+            "turntable", section.address, framing, self._greeting, line_times(section, section.after_demand_s)
         )
         self.own: tuple[Bound, ...] = ()
         """Factory limits of the axes, known once a line was made."""

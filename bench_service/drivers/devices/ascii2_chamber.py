@@ -9,7 +9,7 @@ from bench_service.drivers.devices.chamber_rules import (
     require_fit,
     require_same,
 )
-from bench_service.drivers.devices.wire import Greeting, patience
+from bench_service.drivers.devices.wire import Greeting, line_times
 from bench_service.drivers.interface.driver import DeviceDriver, DriverContext, Found
 from bench_service.drivers.interface.sections import NonNegative, WireChamber
 from bench_service.drivers.link.exchange import Ask, Question
@@ -68,7 +68,7 @@ class Ascii2Chamber:
         identity = Question(self._state.data, "its state", lambda a: _identity(ascii2.state(self._layout, a)))
         self._greeting = Greeting("chamber", identity, self._first_words, context.note)
         self._line = DeviceLine(
-            "chamber", section.address, Framing(ascii2.ENDING), self._greeting, patience(section, section.after_set_s)
+            "chamber", section.address, Framing(ascii2.ENDING), self._greeting, line_times(section, section.after_set_s)
         )
 
     @property

@@ -6,7 +6,7 @@ from typing import Annotated, TypeVar
 from pydantic import Field
 
 from bench_service.drivers.answers import Refusal
-from bench_service.drivers.devices.wire import Greeting, accepted, patience
+from bench_service.drivers.devices.wire import Greeting, accepted, line_times
 from bench_service.drivers.interface.driver import DeviceDriver, DriverContext, Found
 from bench_service.drivers.interface.sections import Positive, WireSupply
 from bench_service.drivers.link.exchange import Ask, Question
@@ -45,7 +45,7 @@ class ScpiSupply:
         identity = Question(scpi.line(self._dialect, scpi.IDENTITY_QUERY), "its identity", _identity)
         self._greeting = Greeting("supply", identity, self._empty_errors, context.note)
         self._line = DeviceLine(
-            "supply", section.address, Framing(self._dialect.ending), self._greeting, patience(section)
+            "supply", section.address, Framing(self._dialect.ending), self._greeting, line_times(section)
         )
         bounds = section.limits
         self.limits = SupplyLimits(

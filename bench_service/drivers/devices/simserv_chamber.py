@@ -12,7 +12,7 @@ from bench_service.drivers.devices.chamber_rules import (
     require_fit,
     require_same,
 )
-from bench_service.drivers.devices.wire import Greeting, accepted, patience
+from bench_service.drivers.devices.wire import Greeting, accepted, line_times
 from bench_service.drivers.interface.driver import Bound, DeviceDriver, DriverContext, Found
 from bench_service.drivers.interface.sections import NonNegative, Positive, WireChamber
 from bench_service.drivers.link.exchange import Ask, Question
@@ -61,7 +61,7 @@ class SimservChamber:
             section.address,
             Framing(simserv.REPLY_ENDING),
             self._greeting,
-            patience(section, section.after_set_s),
+            line_times(section, section.after_set_s),
         )
 
     @property

@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 from bench_service.drivers.answers import Refusal
 from bench_service.drivers.interface.sections import Wire
-from bench_service.drivers.link.exchange import Ask, Patience, Question
+from bench_service.drivers.link.exchange import Ask, LineTimes, Question
 from procedures.bench.device import DeviceIdentity
 from procedures.bench.errors import DeviceFault
 
@@ -41,10 +41,10 @@ class Greeting:
             raise DeviceFault(f"the {self._device} does not tell its status: {refusal}") from None
 
 
-def patience(section: Wire, after_demand_s: float = 0.0) -> Patience:
+def line_times(section: Wire, after_demand_s: float = 0.0) -> LineTimes:
     """Times of a line by its section: a verb's question may take a new connection and a second try."""
     deadline = section.connect_s + 2.0 * section.answer_s + after_demand_s
-    return Patience(section.answer_s, deadline, section.connect_s, after_demand_s)
+    return LineTimes(section.answer_s, deadline, section.connect_s, after_demand_s)
 
 
 async def accepted(asked: Awaitable[T], device: str, name: str) -> T:

@@ -39,7 +39,7 @@ class Question(Generic[T]):
 
 
 @dataclass(frozen=True)
-class Patience:
+class LineTimes:
     """Times of a line [s]."""
 
     answer_s: float = 2.0
@@ -95,8 +95,8 @@ class LineCounts:
 class Exchange:
     """Conversation with one device, which reconnects where that is allowed."""
 
-    def __init__(self, device: str, address: Address, framer: Framer, greeting: Greeting, patience: Patience) -> None:
-        self.device, self.address, self.patience = device, address, patience
+    def __init__(self, device: str, address: Address, framer: Framer, greeting: Greeting, times: LineTimes) -> None:
+        self.device, self.address, self.times = device, address, times
         self._framer, self._greeting = framer, greeting
         self._transport: Transport | None = None
         self._buffer = bytearray()
@@ -178,7 +178,7 @@ class Exchange:
             raise Disconnected(f"{self._named()} does not answer in time")
         if self._transport is None:
             try:
-                self._transport = open_transport(self.address, min(left, self.patience.connect_s))
+                self._transport = open_transport(self.address, min(left, self.times.connect_s))
             except LineCut as cut:
                 raise Disconnected(f"{self._named()} cannot be reached: {cut}") from None
             self.counts.connections += 1
@@ -226,7 +226,7 @@ class Exchange:
         if pause > 0.0:
             wall_clock.pause(pause)
         self.counts.questions += 1
-        until = min(until, wall_clock.monotonic_s() + self.patience.answer_s)
+        until = min(until, wall_clock.monotonic_s() + self.times.answer_s)
         try:
             transport.send(question.data)
             while True:
@@ -240,8 +240,8 @@ class Exchange:
             self.counts.cuts += 1
             raise _Lost(f"the line was cut at {question.name}: {cut}") from None
         finally:
-            if question.demand and self.patience.after_demand_s > 0.0:
-                self._not_before = wall_clock.monotonic_s() + self.patience.after_demand_s
+            if question.demand and self.times.after_demand_s > 0.0:
+                self._not_before = wall_clock.monotonic_s() + self.times.after_demand_s
 
     def _answer(self, transport: Transport, question: Question[T], until: float) -> bytes:
         """Read one answer. Raises `_Lost`, `LineCut`."""
@@ -256,5 +256,5 @@ class Exchange:
             if left <= 0.0:
                 self.counts.silences += 1
                 half = f", only {shown(bytes(self._buffer))} came" if self._buffer else ""
-                raise _Lost(f"no answer to {question.name} within {self.patience.answer_s:g} s{half}")
+                raise _Lost(f"no answer to {question.name} within {self.times.answer_s:g} s{half}")
             self._buffer += transport.receive(left)

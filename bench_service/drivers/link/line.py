@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from bench_service import wall_clock
 from bench_service.drivers.interface.address import Address
-from bench_service.drivers.link.exchange import Exchange, Framer, Greeting, LineCounts, Patience, Question
+from bench_service.drivers.link.exchange import Exchange, Framer, Greeting, LineCounts, LineTimes, Question
 from procedures.bench.errors import Disconnected
 
 T = TypeVar("T")
@@ -29,8 +29,8 @@ class DeviceLine:
     answer is never taken for another's.
     """
 
-    def __init__(self, device: str, address: Address, framer: Framer, greeting: Greeting, patience: Patience) -> None:
-        self._exchange = Exchange(device, address, framer, greeting, patience)
+    def __init__(self, device: str, address: Address, framer: Framer, greeting: Greeting, times: LineTimes) -> None:
+        self._exchange = Exchange(device, address, framer, greeting, times)
         self._named = f"the {device} at {address}"
         self._queue: queue.Queue[_Asked | None] = queue.Queue(WAITING)
         self._thread: threading.Thread | None = None
@@ -47,8 +47,8 @@ class DeviceLine:
         return await asyncio.wrap_future(self._put(question, within_s))
 
     def _put(self, question: Question[T], within_s: float | None) -> "Future[T]":
-        patience = self._exchange.patience
-        until = wall_clock.monotonic_s() + (patience.deadline_s if within_s is None else within_s)
+        times = self._exchange.times
+        until = wall_clock.monotonic_s() + (times.deadline_s if within_s is None else within_s)
         answer: Future[T] = Future()
         with self._begin:
             if self._closed:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from bench_service.cli.asking import patience
-from bench_service.cli.asking.patience import patiently
+from bench_service.cli.asking import retries
+from bench_service.cli.asking.retries import with_retries
 from bench_service.cli.commands import run_command_line
 from bench_service.cli.refusal import Away, Refused
 from bench_service.settings import Settings
@@ -23,8 +23,8 @@ JUNIT = "<testsuites/>"
 
 @pytest.fixture(autouse=True)
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(patience, "PATIENCE_S", 0.4)
-    monkeypatch.setattr(patience, "AGAIN_S", 0.1)
+    monkeypatch.setattr(retries, "AWAY_S", 0.4)
+    monkeypatch.setattr(retries, "AGAIN_S", 0.1)
 
 
 def away_from(look: int, looks: int) -> Callable[[str, str], Answer]:
@@ -106,11 +106,11 @@ def test_every_absence_has_the_whole_patience_and_other_refusals_have_none() -> 
             raise found
         return found
 
-    assert patiently(ask, said.append, "on") == "here"
+    assert with_retries(ask, said.append, "on") == "here"
     assert [line.partition(";")[0] for line in said] == ["away", "the service answers again"]
     answers[:] = [Refused("no"), "here"]
     with pytest.raises(Refused, match="no"):
-        patiently(ask, said.append, "on")
+        with_retries(ask, said.append, "on")
     assert answers == ["here"]
 
 
