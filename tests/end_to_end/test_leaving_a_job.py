@@ -31,9 +31,12 @@ def interrupted(folder: Path, *arguments: str, **settings: str) -> Done:
     """A command that gets Ctrl-C once its job has done a station; its end."""
     command = [sys.executable, "-m", "bench_service", *arguments]
     outside = environment(folder, **settings)
+    # A shell's background job ignores Ctrl-C, and hands that on; the command here is one in the foreground.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     with subprocess.Popen(
         command, env=outside, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as done:
+        signal.signal(signal.SIGINT, before)
         until = monotonic_s() + 60
         while stations_done(folder) < 1:
             assert done.poll() is None, done.communicate()
