@@ -59,9 +59,9 @@ def test_a_person_and_a_token_stop_and_see_health_while_everything_else_hangs(
         client.headers.update(AFAR)
         assert client.get("/api/v1/benches").status_code == 200
     unknown = home.client(Authorization="Bearer nobody-s-token")
-    crowd = httpx.Client(base_url=home.url, headers=dict(senders["a token"].headers))
+    crowd = [home.client(**AFAR, Authorization=senders["a token"].headers["Authorization"]) for _ in range(CROWD)]
     with hung(postgres.data):
-        waiting = [Thread(target=read_in_vain, args=(crowd,), daemon=True) for _ in range(CROWD)]
+        waiting = [Thread(target=read_in_vain, args=(each,), daemon=True) for each in crowd]
         for thread in waiting:
             thread.start()
         pause(0.5)
@@ -75,11 +75,14 @@ def test_a_person_and_a_token_stop_and_see_health_while_everything_else_hangs(
             assert known[answer.json()["stop"]] == {"a token": "eye", "a person": "ada"}[who]
         answer, took_s = timed(unknown, "POST", STOP, json={"reason": "smoke, says somebody on this host"})
         assert (answer.status_code, took_s < IN_TIME_S) == (202, True), (took_s, answer.text)
-        refused, took_s = timed(home.client(**AFAR, Authorization="Bearer nobody-s-token"), "POST", STOP)
-        assert (refused.status_code, took_s < IN_TIME_S) == (401, True), took_s
+        for refusal, path in ((401, STOP), (404, STOP.replace("sim", "nowhere")), (422, STOP)):
+            sender = unknown if refusal == 401 else senders["a person"]
+            headers = AFAR if refusal == 401 else {}
+            answer, took_s = timed(sender, "POST", path, headers=headers, json={"by": 5} if refusal == 422 else {})
+            assert answer.status_code == refusal or (refusal, answer.status_code) == (404, 503), answer.text
+            assert took_s < IN_TIME_S, ("a refusal waits for a thread that hangs", refusal, took_s)
     for thread in waiting:
         thread.join(30)
-    crowd.close()
     deadline_s = monotonic_s() + 30
     while len(stops := home.owner.get("/api/v1/benches/sim").json()["stops"]) < 3:
         assert monotonic_s() < deadline_s, stops
