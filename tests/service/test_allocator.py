@@ -46,8 +46,6 @@ def arenas(folder: Path, how: str, **environment: str) -> int:
     return report.read_text().count("<heap nr=")
 
 
-    not hasattr(os, "confstr") or "glibc" not in (os.confstr("CS_GNU_LIBC_VERSION") or ""), reason="glibc"
-)
 def test_twelve_threads_share_two_arenas(tmp_path: Path) -> None:
     assert arenas(tmp_path, "limited") <= 2
     assert arenas(tmp_path, "unlimited") > 2, "the limit would show nothing"
