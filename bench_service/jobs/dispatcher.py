@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from threading import Event, Thread
 from typing import Protocol
 
+from bench_service.bench.driven import ShuttingDown
 from bench_service.bench.driver import Lease
-from bench_service.bench.session import ShuttingDown
 from bench_service.jobs.queue import BenchQueue, QueueEntry
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.stores import JobStores

@@ -39,7 +39,8 @@ def test_a_rate_covers_rate_times_duration_less_a_ramp(rig: TableRig, rate_deg_s
             await rig.port.command_rate(ConstantRate("inner", 5.0, 6.0, 1.0))
         await rig.clock.sleep(3.0)
         reading = await rig.port.read()
-        assert reading.moving and reading.rates_deg_s is not None
+        assert reading.moving
+        assert reading.rates_deg_s is not None
         assert reading.rates_deg_s[1] == pytest.approx(rate_deg_s, rel=0.01)
         await rig.port.settle()
         reading = await rig.port.read()
