@@ -56,6 +56,7 @@ from bench_service.jobs.events.hub import EventHub
 from bench_service.jobs.planning import Planner
 from bench_service.pages import (
     access_pages,
+    bench_pages,
     campaign_pages,
     console_pages,
     docs,
@@ -106,7 +107,18 @@ ROUTERS = (
     metrics,
     feed,
 )
-PAGES = (static_files, languages, docs, access_pages, images, stop_pages, console_pages, pages, campaign_pages)
+PAGES = (
+    static_files,
+    languages,
+    docs,
+    access_pages,
+    images,
+    stop_pages,
+    bench_pages,
+    console_pages,
+    pages,
+    campaign_pages,
+)
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apart: bool = False) -> BenchService:

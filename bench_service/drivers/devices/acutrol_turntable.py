@@ -127,8 +127,9 @@ class AcutrolTurntable(WatchedTable):
         if await self._rests():
             return
         longest = max(axis.rate_deg_s / axis.acceleration_deg_s2 for axis in self._axes())
+        braked: list[int] = []
         try:
-            await self._brake()
+            await self._brake(braked)
         except DeviceFault:  # an open interlock refuses, and brakes by itself: rest is what counts
             await self._wait_for_rest(None, longest, self._demand)
             return
@@ -137,8 +138,9 @@ class AcutrolTurntable(WatchedTable):
             await self._link.mode("off")
             return
         for index, state in enumerate(await self._link.states()):
-            await self._link.demand("position", index, state.position_deg)
-        await self._link.mode("position")
+            if index in braked or await self._link.mode_of(index) != "position":  # an axis that holds goes on holding
+                await self._link.demand("position", index, state.position_deg)
+                await self._link.mode("position", [index])
 
     async def _prepare_brake(self, demand: int) -> None:
         """Set the limits of rate mode before a motion, so that a stop needs two statements an axis."""
@@ -149,11 +151,12 @@ class AcutrolTurntable(WatchedTable):
             await self._link.limit("rate", index, axis.rate_deg_s, axis.acceleration_deg_s2)
         self._can_brake = True
 
-    async def _brake(self) -> None:
-        """Take the rate away from each axis that moves, the fastest one first."""
+    async def _brake(self, braked: list[int]) -> None:
+        """Take the rate away from each axis that moves, the fastest one first, and note it as `braked`."""
         states = await self._link.states()
         moving = [k for k, state in enumerate(states) if abs(state.rate_deg_s) > self._section.rest_rate_deg_s]
         for index in sorted(moving, key=lambda k: -abs(states[k].rate_deg_s)):
+            braked.append(index)
             await self._link.demand("rate", index, 0.0)
             await self._link.mode("rate", [index])
 
