@@ -19,6 +19,8 @@ from bench_service.evidence.units import register
 from bench_service.evidence.upkeep import NightlyScrub, UpkeepService
 from bench_service.evidence.work_processes import WorkProcesses
 from bench_service.jobs.history import is_empty, missing_history
+from bench_service.jobs.manual.presence import Presence
+from bench_service.jobs.manual.service import ManualService
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue_service import QueueService
 from bench_service.jobs.service import JobService
@@ -74,6 +76,8 @@ class BenchService:
         self.analyses = AnalysisService(stores, planner.catalogue, stores.jobs.get, code_version, processes)
         self.queues = QueueService(stores, planner.benches, self._wake)
         self.jobs = JobService(stores, planner, self.queues, driver, worker, code_version, self._wake)
+        self.manual = ManualService(stores, planner.benches, self.queues, self._wake)
+        self._presence = Presence(stores.manual)
         self._roads = roads or StopRoads(None)
         self.stops = StopService(stores, planner.benches, safety, self._wake, self._roads, stores.audit)
         self.campaigns = CampaignService(stores, planner, self.analyses, self.jobs.submit, self.jobs.cancel)
@@ -101,11 +105,14 @@ class BenchService:
                 log.warning("bench %s: %s", self._driver.description.id, self._missing)
             self.safety.at_start(self._driver.description.id, self._rescued)
 
-    def begin(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
+    def begin(self, warm_up: Sequence[Callable[[], object]] = (), answers: bool = False) -> None:
         """Begin to work while the service already answers. The bench's lease must be held.
 
+        `answers`: this process answers clients, which keeps leases of manual mode alive.
         `warm_up` is called while no job runs, once the engine runs and the numerics are loaded.
         """
+        if answers:
+            self._presence.begin()
         if self._worker is not None:
             self._worker.begin([lambda: self.catalogue.procedures, lambda: self.catalogue.methods, *warm_up])
             self.campaigns.conductor.begin()
@@ -149,6 +156,7 @@ class BenchService:
     def stop(self) -> None:
         """End the service: the running job is left for the next start, and the bench made safe."""
         self._nightly.end()
+        self._presence.end()
         self.campaigns.conductor.stop()
         if self._worker is not None:
             self._worker.shut_down()

@@ -1,4 +1,4 @@
--- revision 0012
+-- revision 0013
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -228,6 +228,42 @@ CREATE TABLE jobs (
 	CONSTRAINT pk_jobs PRIMARY KEY (id)
 );
 
+CREATE TABLE manual_demands (
+	id VARCHAR NOT NULL, 
+	lease VARCHAR NOT NULL, 
+	"key" VARCHAR NOT NULL, 
+	kind VARCHAR NOT NULL, 
+	"values" JSON NOT NULL, 
+	"by" VARCHAR NOT NULL, 
+	at DATETIME NOT NULL, 
+	state VARCHAR NOT NULL, 
+	answer JSON NOT NULL, 
+	ended_at DATETIME, 
+	CONSTRAINT pk_manual_demands PRIMARY KEY (id), 
+	CONSTRAINT uq_manual_demands_lease_key UNIQUE (lease, "key")
+);
+
+CREATE TABLE manual_leases (
+	id VARCHAR NOT NULL, 
+	bench VARCHAR NOT NULL, 
+	unit VARCHAR NOT NULL, 
+	holder VARCHAR NOT NULL, 
+	proven BOOLEAN NOT NULL, 
+	reason VARCHAR NOT NULL, 
+	created_at DATETIME NOT NULL, 
+	until DATETIME NOT NULL, 
+	team VARCHAR NOT NULL, 
+	reservation VARCHAR, 
+	began_at DATETIME, 
+	process VARCHAR NOT NULL, 
+	heard INTEGER NOT NULL, 
+	end_asked VARCHAR NOT NULL, 
+	ended_at DATETIME, 
+	ended_because VARCHAR NOT NULL, 
+	safe BOOLEAN, 
+	CONSTRAINT pk_manual_leases PRIMARY KEY (id)
+);
+
 CREATE TABLE mountings (
 	id VARCHAR NOT NULL, 
 	unit VARCHAR NOT NULL, 
@@ -417,6 +453,12 @@ CREATE INDEX ix_jobs_state_id ON jobs (state, id);
 
 CREATE INDEX ix_jobs_unit_id ON jobs (unit, id);
 
+CREATE INDEX ix_manual_demands_lease_id ON manual_demands (lease, id);
+
+CREATE INDEX ix_manual_leases_bench_id ON manual_leases (bench, id);
+
+CREATE UNIQUE INDEX ix_manual_leases_open ON manual_leases (bench) WHERE ended_at IS NULL;
+
 CREATE INDEX ix_mountings_bench_id ON mountings (bench, id);
 
 CREATE INDEX ix_mountings_unit_id ON mountings (unit, id);
@@ -457,5 +499,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0012');
+INSERT INTO "alembic_version" VALUES ('0013');
 

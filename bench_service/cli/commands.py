@@ -20,6 +20,7 @@ from bench_service.cli.groups import (
     evidence,
     importing,
     jobs,
+    manual,
     mountings,
     plans,
     reservations,
@@ -75,6 +76,7 @@ app.add_typer(job, name="job", rich_help_panel="Jobs")
 app.add_typer(calibrations.calibration, name="calibration", rich_help_panel="Evidence")
 app.add_typer(certificates.certificate, name="certificate", rich_help_panel="Evidence")
 app.add_typer(mountings.mounting, name="mounting", rich_help_panel="Service and bench")
+app.add_typer(manual.manual, name="manual", rich_help_panel="Service and bench")
 app.add_typer(campaigns.campaigns, name="campaign", rich_help_panel="Jobs")
 app.add_typer(campaigns.schedules, name="schedule", rich_help_panel="Jobs")
 app.add_typer(access.users, name="user", rich_help_panel="Access")
