@@ -1,4 +1,4 @@
--- revision 0013
+-- revision 0014
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -72,7 +72,7 @@ CREATE TABLE bench_stops (
 	safe_by VARCHAR NOT NULL, 
 	released_at DATETIME, 
 	released_by VARCHAR NOT NULL, 
-	remark VARCHAR NOT NULL, 
+	remark VARCHAR NOT NULL, entered_at DATETIME, 
 	CONSTRAINT pk_bench_stops PRIMARY KEY (id)
 );
 
@@ -135,7 +135,7 @@ CREATE TABLE campaigns (
 	name VARCHAR NOT NULL, 
 	document JSON NOT NULL, 
 	created_at DATETIME NOT NULL, 
-	updated_at DATETIME NOT NULL, 
+	updated_at DATETIME NOT NULL, team VARCHAR DEFAULT '' NOT NULL, 
 	CONSTRAINT pk_campaigns PRIMARY KEY (name)
 );
 
@@ -224,7 +224,7 @@ CREATE TABLE jobs (
 	started_at DATETIME, 
 	finished_at DATETIME, 
 	result_id VARCHAR, 
-	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, mounting VARCHAR, 
+	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, mounting VARCHAR, team VARCHAR DEFAULT '' NOT NULL, 
 	CONSTRAINT pk_jobs PRIMARY KEY (id)
 );
 
@@ -499,5 +499,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0013');
+INSERT INTO "alembic_version" VALUES ('0014');
 
