@@ -1,6 +1,6 @@
 """teams of campaigns and of their jobs; the moment at which a stop was entered
 
-Revision: 0014, after 0012
+Revision: 0014, after 0013
 """
 
 import sqlalchemy as sa
