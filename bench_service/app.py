@@ -79,6 +79,7 @@ from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.database import as_storage_error
 from bench_service.persistence.evidence.analysis_run import open_run
+from bench_service.persistence.evidence.batch_running import runner_maker
 from bench_service.persistence.upkeep.contents import DatabaseContents
 from bench_service.service import LEAST_FREE_BYTES, BenchService
 from bench_service.settings import Settings
@@ -161,6 +162,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         processes=processes,
         database=DatabaseContents(opened),
         scrub_at=settings.scrub_at,
+        runner=runner_maker(opened, settings.database_url, code, closing, apart),
     )
     if settings.audit_days is not None:
         begin_retention(stores.audit, timedelta(days=settings.audit_days), closing)

@@ -14,6 +14,8 @@ from bench_service.bench.stop.road import StopRoads
 from bench_service.campaigns.service import CampaignService
 from bench_service.campaigns.stores import Stores
 from bench_service.evidence.analyses import AnalysisService
+from bench_service.evidence.batches.runner import RunnerMaker
+from bench_service.evidence.batches.service import BatchService
 from bench_service.evidence.imports import ImportService
 from bench_service.evidence.units import register
 from bench_service.evidence.upkeep import NightlyScrub, UpkeepService
@@ -53,6 +55,7 @@ class BenchService:
         processes: WorkProcesses | None = None,
         database: DatabasePort | None = None,
         scrub_at: str = "",
+        runner: RunnerMaker | None = None,
     ) -> None:
         """Set up with `driver` of this process's own bench; None: it plans and queues for benches that workers drive.
 
@@ -60,6 +63,7 @@ class BenchService:
         through the database alone. `rescued`: the result of making devices safe at start. `processes`: where
         analyses are computed; None: in the caller's thread. `database`: the database as a whole; None: not known.
         `scrub_at`: the time of the nightly check, "HH:MM"; empty: none.
+        `runner`: builds the runner of batches of analyses; None: other processes run their tasks.
         """
         self.access = AccessService(stores.access, AccessBook(stores.access))
         self.safety = safety
@@ -72,6 +76,8 @@ class BenchService:
         self.benches = planner.benches
         self.imports = ImportService(stores)
         self.analyses = AnalysisService(stores, planner.catalogue, stores.jobs.get, code_version, processes)
+        self._runner = None if runner is None else runner(stores.batches, self.analyses)
+        self.batches = BatchService(stores, planner.catalogue, self._runner.wake if self._runner else lambda: None)
         self.queues = QueueService(stores, planner.benches, self._wake)
         self.jobs = JobService(stores, planner, self.queues, driver, worker, code_version, self._wake)
         self._roads = roads or StopRoads(None)
@@ -106,6 +112,8 @@ class BenchService:
 
         `warm_up` is called while no job runs, once the engine runs and the numerics are loaded.
         """
+        if self._runner is not None and self._runner.resumes:
+            self._runner.begin()
         if self._worker is not None:
             self._worker.begin([lambda: self.catalogue.procedures, lambda: self.catalogue.methods, *warm_up])
             self.campaigns.conductor.begin()

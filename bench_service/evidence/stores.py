@@ -1,8 +1,11 @@
-"""Stores of the evidence room: units, recordings, results, calibrations, corrections, and clients' idempotency keys."""
+"""Stores of the evidence room: units, recordings, results, calibrations, corrections, batches of analyses,
+and clients' idempotency keys.
+"""
 
 from dataclasses import dataclass
 
 from bench_service.access.stores import AccessStores
+from bench_service.evidence.batches.store import BatchStore
 from bench_service.evidence.calibrations import CalibrationStore
 from bench_service.evidence.corrections import CorrectionStore
 from bench_service.evidence.keys import KeyStore
@@ -21,3 +24,4 @@ class EvidenceStores(AccessStores):
     calibrations: CalibrationStore
     corrections: CorrectionStore
     keys: KeyStore
+    batches: BatchStore

@@ -40,6 +40,8 @@ RIGHTS: dict[str, Right] = {
     "cancel_campaign_run": Right.OPERATE,
     "analyse_again": Right.ENGINEER,
     "run_method": Right.ENGINEER,
+    "cancel_batch": Right.ENGINEER,
+    "retry_batch": Right.ENGINEER,
     "import_recording": Right.ENGINEER,
     "describe_file": Right.ENGINEER,
     "declare_unit": Right.ENGINEER,
