@@ -53,7 +53,7 @@ def until(condition: Callable[[], bool], what: str, seconds: float = 90.0) -> No
 @pytest.mark.timeout(240)
 def test_a_killed_worker_loses_nothing_and_doubles_nothing(start: Start, postgres_url: str) -> None:
     stores, database = open_stores(postgres_url)
-    store_white(stores, TASKS, 400_000)
+    store_white(stores, TASKS, 200_000)
     batches = stores.batches
     submitted = BatchService(stores, Catalogue()).submit(
         BatchRequest(method="allan_deviation", selection=Selection(unit="IMU-1")), "a test"
@@ -86,7 +86,7 @@ def test_a_killed_worker_loses_nothing_and_doubles_nothing(start: Start, postgre
 
 def test_an_ended_worker_gives_its_task_back_and_the_next_one_goes_on(start: Start, postgres_url: str) -> None:
     stores, database = open_stores(postgres_url)
-    store_white(stores, 2, 20_000_000, seed=1)  # some seconds each
+    store_white(stores, 2, 8_000_000, seed=1)  # some seconds each
     submitted = BatchService(stores, Catalogue()).submit(
         BatchRequest(method="allan_deviation", selection=Selection(unit="IMU-1")), "a test"
     )

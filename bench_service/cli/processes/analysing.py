@@ -11,6 +11,9 @@ from bench_service.persistence.evidence.batch_running import runner_of
 from bench_service.settings import Settings
 from bench_service.telemetry.code_version import code_version
 
+LOOK_S = 0.5
+"""Interval at which the main thread looks for signals that came meanwhile [s]."""
+
 
 def analyse_until_ended(settings: Settings, at_once: int, say: Callable[[str], object]) -> None:
     """Run tasks in `at_once` processes until SIGTERM or SIGINT; those under way go back into the queue.
@@ -26,4 +29,5 @@ def analyse_until_ended(settings: Settings, at_once: int, say: Callable[[str], o
         runner = runner_of(opened, settings.database_url, stores.batches, code_version(), closing, at_once)
         runner.begin()
         say(f"analysing in {at_once} process{'es' if at_once > 1 else ''}")
-        ending.wait()
+        while not ending.wait(LOOK_S):  # a signal that reaches another thread does not wake this one
+            continue
