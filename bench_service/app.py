@@ -161,7 +161,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         rescued=rescued,
         processes=processes,
         database=DatabaseContents(opened),
-        scrub_at=settings.scrub_at,
+        settings=settings,
         runner=runner_maker(opened, settings.database_url, code, closing, apart),
     )
     if settings.audit_days is not None:

@@ -17,6 +17,8 @@ from bench_service.evidence.analyses import AnalysisService
 from bench_service.evidence.batches.runner import RunnerMaker
 from bench_service.evidence.batches.service import BatchService
 from bench_service.evidence.imports import ImportService
+from bench_service.evidence.raw_data.nightly import NightlyStorage
+from bench_service.evidence.raw_data.service import RawDataService, StorageSettings
 from bench_service.evidence.units import register
 from bench_service.evidence.upkeep import NightlyScrub, UpkeepService
 from bench_service.evidence.work_processes import WorkProcesses
@@ -28,6 +30,7 @@ from bench_service.jobs.stops import StopService
 from bench_service.jobs.worker import Worker
 from bench_service.model.errors import NotDriving, NotReady
 from bench_service.model.records import reasons_of
+from bench_service.settings import Settings
 from bench_service.telemetry.tracing import Traces
 from bench_service.telemetry.upkeep import DatabasePort, NoDatabase
 
@@ -54,7 +57,7 @@ class BenchService:
         rescued: Rescue | None = None,
         processes: WorkProcesses | None = None,
         database: DatabasePort | None = None,
-        scrub_at: str = "",
+        settings: Settings | None = None,
         runner: RunnerMaker | None = None,
     ) -> None:
         """Set up with `driver` of this process's own bench; None: it plans and queues for benches that workers drive.
@@ -62,7 +65,7 @@ class BenchService:
         `free_bytes`: room on the database's disk, where that is known. `roads`: the ways of a stop to its bench; None:
         through the database alone. `rescued`: the result of making devices safe at start. `processes`: where
         analyses are computed; None: in the caller's thread. `database`: the database as a whole; None: not known.
-        `scrub_at`: the time of the nightly check, "HH:MM"; empty: none.
+        `settings`: the time of the nightly work, and the rules for raw data; None: no such work, and no rules.
         `runner`: builds the runner of batches of analyses; None: other processes run their tasks.
         """
         self.access = AccessService(stores.access, AccessBook(stores.access))
@@ -90,7 +93,11 @@ class BenchService:
         self.upkeep = UpkeepService(stores, database or NoDatabase(), f"the service, {ProcessIdentity.own()}")
         self._missing = ""
         """The sentence on a history that the devices remember and the database does not; empty: there is none."""
-        self._nightly = NightlyScrub(self.upkeep, scrub_at)
+        rules = settings or Settings(scrub_at="")
+        kept = StorageSettings(rules.raw_days, rules.archive_days, rules.archive)
+        self.raw_data = RawDataService(stores, database or NoDatabase(), kept, stores.raw_data.archive_at)
+        nightly = NightlyStorage(self.raw_data, stores, f"the service, {ProcessIdentity.own()}")
+        self._nightly = NightlyScrub(self.upkeep, rules.scrub_at, nightly.run)
 
     def register(self) -> None:
         """Register the bench and its units, and discard orphaned imports."""

@@ -1,4 +1,4 @@
--- revision 0015
+-- revision 0016
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -292,6 +292,18 @@ CREATE TABLE mountings (
 	CONSTRAINT pk_mountings PRIMARY KEY (id)
 );
 
+CREATE TABLE recording_holds (
+	id VARCHAR NOT NULL, 
+	recording_id VARCHAR NOT NULL, 
+	reason VARCHAR NOT NULL, 
+	"by" VARCHAR NOT NULL, 
+	held_at DATETIME NOT NULL, 
+	released_at DATETIME, 
+	released_by VARCHAR NOT NULL, 
+	CONSTRAINT pk_recording_holds PRIMARY KEY (id), 
+	CONSTRAINT fk_recording_holds_recording_id_recordings FOREIGN KEY(recording_id) REFERENCES recordings (id)
+);
+
 CREATE TABLE recordings (
 	id VARCHAR NOT NULL, 
 	unit VARCHAR NOT NULL, 
@@ -312,7 +324,7 @@ CREATE TABLE recordings (
 	state VARCHAR NOT NULL, 
 	created_at DATETIME NOT NULL, 
 	source JSON NOT NULL, 
-	checkpoint JSON, launched_s FLOAT, measured JSON, 
+	checkpoint JSON, launched_s FLOAT, measured JSON, raw VARCHAR DEFAULT 'stored' NOT NULL, raw_changed_at DATETIME, archive VARCHAR, 
 	CONSTRAINT pk_recordings PRIMARY KEY (id), 
 	CONSTRAINT fk_recordings_job_id_jobs FOREIGN KEY(job_id) REFERENCES jobs (id)
 );
@@ -480,7 +492,11 @@ CREATE INDEX ix_mountings_bench_id ON mountings (bench, id);
 
 CREATE INDEX ix_mountings_unit_id ON mountings (unit, id);
 
+CREATE INDEX ix_recording_holds_recording_id ON recording_holds (recording_id);
+
 CREATE INDEX ix_recordings_job_id_id ON recordings (job_id, id);
+
+CREATE INDEX ix_recordings_raw_state_stored_bytes ON recordings (raw, state, stored_bytes);
 
 CREATE INDEX ix_recordings_state_stored_bytes ON recordings (state, stored_bytes);
 
@@ -516,5 +532,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0015');
+INSERT INTO "alembic_version" VALUES ('0016');
 

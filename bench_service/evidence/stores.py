@@ -9,6 +9,7 @@ from bench_service.evidence.batches.store import BatchStore
 from bench_service.evidence.calibrations import CalibrationStore
 from bench_service.evidence.corrections import CorrectionStore
 from bench_service.evidence.keys import KeyStore
+from bench_service.evidence.raw_data.store import RawDataStore
 from bench_service.evidence.recordings import RecordingStore
 from bench_service.evidence.results import ResultStore
 from bench_service.evidence.units import UnitStore
@@ -25,3 +26,4 @@ class EvidenceStores(AccessStores):
     corrections: CorrectionStore
     keys: KeyStore
     batches: BatchStore
+    raw_data: RawDataStore

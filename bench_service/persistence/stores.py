@@ -16,6 +16,7 @@ from bench_service.persistence.database import Database, connect
 from bench_service.persistence.evidence.batch_store import SqlBatchStore
 from bench_service.persistence.evidence.calibration_store import SqlCalibrationStore
 from bench_service.persistence.evidence.correction_store import SqlCorrectionStore
+from bench_service.persistence.evidence.raw_store import SqlRawDataStore
 from bench_service.persistence.evidence.recording_store import SqlRecordingStore
 from bench_service.persistence.evidence.result_store import SqlResultStore
 from bench_service.persistence.evidence.unit_store import SqlUnitStore
@@ -68,6 +69,7 @@ def stores_of(database: Database) -> Stores:
         access=SqlAccessStore(database),
         keys=SqlKeyStore(database),
         batches=SqlBatchStore(database),
+        raw_data=SqlRawDataStore(database),
     )
 
 

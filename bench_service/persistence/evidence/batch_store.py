@@ -7,6 +7,7 @@ from sqlalchemy import exists, insert, select, update
 
 from bench_service.model.batches import AnalysisBatch, AnalysisTask, Selection, TaskState
 from bench_service.model.errors import IllegalTransition
+from bench_service.model.raw_data import GONE
 from bench_service.model.records import Idempotency, Page, RecordingState
 from bench_service.persistence.evidence.batch_queue import SqlBatchQueue
 from bench_service.persistence.evidence.batch_rows import (
@@ -23,6 +24,7 @@ from bench_service.persistence.tables.batches import BatchRow, TaskRecordingRow,
 from bench_service.persistence.tables.evidence import RecordingRow
 from bench_service.persistence.tables.jobs import JobRow
 
+_GONE = tuple(state.value for state in GONE)
 AT_ONCE = 500
 """Ids in one statement, and rows in one insert: databases limit the number of values."""
 
@@ -32,7 +34,8 @@ class SqlBatchStore(SqlBatchQueue):
 
     def select(self, selection: Selection, limit: int) -> tuple[tuple[str, str | None, str], ...]:
         query = select(RecordingRow.id, RecordingRow.job_id, RecordingRow.unit)
-        query = find_recordings(query.where(RecordingRow.state == RecordingState.COMPLETE.value), selection.search)
+        complete = RecordingRow.state == RecordingState.COMPLETE.value
+        query = find_recordings(query.where(complete, RecordingRow.raw.not_in(_GONE)), selection.search)
         if selection.unit is not None:
             query = query.where(RecordingRow.unit == selection.unit)
         if selection.job is not None:
