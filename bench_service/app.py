@@ -73,6 +73,7 @@ from bench_service.persistence import Database, lease_holder, open_stores
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.evidence.analysis_run import open_run
+from bench_service.persistence.evidence.batch_running import runner_maker
 from bench_service.persistence.upkeep.contents import DatabaseContents
 from bench_service.service import BenchService
 from bench_service.settings import Settings
@@ -166,7 +167,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         rescued=rescued,
         processes=processes,
         database=DatabaseContents(opened),
-        scrub_at=settings.scrub_at,
+        settings=settings,
+        runner=runner_maker(opened, settings.database_url, code, closing, apart),
     )
     if settings.audit_days is not None:
         begin_retention(stores.audit, timedelta(days=settings.audit_days), closing)

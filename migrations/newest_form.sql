@@ -1,4 +1,4 @@
--- revision 0014
+-- revision 0016
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -19,6 +19,52 @@ CREATE TABLE accounts (
 CREATE TABLE alembic_version (
 	version_num VARCHAR(32) NOT NULL, 
 	CONSTRAINT alembic_version_pkc PRIMARY KEY (version_num)
+);
+
+CREATE TABLE analysis_batches (
+	id VARCHAR NOT NULL, 
+	method VARCHAR NOT NULL, 
+	version VARCHAR NOT NULL, 
+	parameters JSON NOT NULL, 
+	calibrations JSON NOT NULL, 
+	selection JSON NOT NULL, 
+	"each" VARCHAR NOT NULL, 
+	priority INTEGER NOT NULL, 
+	requested_by VARCHAR NOT NULL, 
+	created_at DATETIME NOT NULL, 
+	total INTEGER NOT NULL, 
+	cancelled_at DATETIME, 
+	cancelled_by VARCHAR NOT NULL, 
+	ended_at DATETIME, 
+	final_counts JSON, 
+	CONSTRAINT pk_analysis_batches PRIMARY KEY (id)
+);
+
+CREATE TABLE analysis_task_recordings (
+	batch_id VARCHAR NOT NULL, 
+	number INTEGER NOT NULL, 
+	position INTEGER NOT NULL, 
+	recording_id VARCHAR NOT NULL, 
+	CONSTRAINT pk_analysis_task_recordings PRIMARY KEY (batch_id, number, position), 
+	CONSTRAINT fk_analysis_task_recordings_batch_id_analysis_tasks FOREIGN KEY(batch_id, number) REFERENCES analysis_tasks (batch_id, number), 
+	CONSTRAINT fk_analysis_task_recordings_recording_id_recordings FOREIGN KEY(recording_id) REFERENCES recordings (id)
+);
+
+CREATE TABLE analysis_tasks (
+	batch_id VARCHAR NOT NULL, 
+	number INTEGER NOT NULL, 
+	state VARCHAR NOT NULL, 
+	priority INTEGER NOT NULL, 
+	attempt INTEGER NOT NULL, 
+	worker VARCHAR NOT NULL, 
+	claimed_at DATETIME, 
+	ended_at DATETIME, 
+	not_before DATETIME, 
+	result_id VARCHAR, 
+	failure JSON, 
+	CONSTRAINT pk_analysis_tasks PRIMARY KEY (batch_id, number), 
+	CONSTRAINT fk_analysis_tasks_batch_id_analysis_batches FOREIGN KEY(batch_id) REFERENCES analysis_batches (id), 
+	CONSTRAINT fk_analysis_tasks_result_id_results FOREIGN KEY(result_id) REFERENCES results (id)
 );
 
 CREATE TABLE approvals (
@@ -282,6 +328,18 @@ CREATE TABLE mountings (
 	CONSTRAINT pk_mountings PRIMARY KEY (id)
 );
 
+CREATE TABLE recording_holds (
+	id VARCHAR NOT NULL, 
+	recording_id VARCHAR NOT NULL, 
+	reason VARCHAR NOT NULL, 
+	"by" VARCHAR NOT NULL, 
+	held_at DATETIME NOT NULL, 
+	released_at DATETIME, 
+	released_by VARCHAR NOT NULL, 
+	CONSTRAINT pk_recording_holds PRIMARY KEY (id), 
+	CONSTRAINT fk_recording_holds_recording_id_recordings FOREIGN KEY(recording_id) REFERENCES recordings (id)
+);
+
 CREATE TABLE recordings (
 	id VARCHAR NOT NULL, 
 	unit VARCHAR NOT NULL, 
@@ -302,7 +360,7 @@ CREATE TABLE recordings (
 	state VARCHAR NOT NULL, 
 	created_at DATETIME NOT NULL, 
 	source JSON NOT NULL, 
-	checkpoint JSON, launched_s FLOAT, measured JSON, 
+	checkpoint JSON, launched_s FLOAT, measured JSON, raw VARCHAR DEFAULT 'stored' NOT NULL, raw_changed_at DATETIME, archive VARCHAR, 
 	CONSTRAINT pk_recordings PRIMARY KEY (id), 
 	CONSTRAINT fk_recordings_job_id_jobs FOREIGN KEY(job_id) REFERENCES jobs (id)
 );
@@ -326,6 +384,13 @@ CREATE TABLE result_calibrations (
 	CONSTRAINT pk_result_calibrations PRIMARY KEY (result_id, position), 
 	CONSTRAINT fk_result_calibrations_calibration_id_calibrations FOREIGN KEY(calibration_id) REFERENCES calibrations (id), 
 	CONSTRAINT fk_result_calibrations_result_id_results FOREIGN KEY(result_id) REFERENCES results (id)
+);
+
+CREATE TABLE result_contents (
+	content VARCHAR NOT NULL, 
+	result_id VARCHAR NOT NULL, 
+	CONSTRAINT pk_result_contents PRIMARY KEY (content), 
+	CONSTRAINT fk_result_contents_result_id_results FOREIGN KEY(result_id) REFERENCES results (id)
 );
 
 CREATE TABLE result_corrections (
@@ -427,6 +492,12 @@ CREATE TABLE upkeep (
 	CONSTRAINT pk_upkeep PRIMARY KEY (id)
 );
 
+CREATE INDEX ix_analysis_task_recordings_recording_id ON analysis_task_recordings (recording_id);
+
+CREATE INDEX ix_analysis_tasks_batch_id_state ON analysis_tasks (batch_id, state);
+
+CREATE INDEX ix_analysis_tasks_state_priority_batch_id_number ON analysis_tasks (state, priority, batch_id, number);
+
 CREATE UNIQUE INDEX ix_audit_sequence ON audit (sequence);
 
 CREATE INDEX ix_bench_stops_bench_id ON bench_stops (bench, id);
@@ -463,7 +534,11 @@ CREATE INDEX ix_mountings_bench_id ON mountings (bench, id);
 
 CREATE INDEX ix_mountings_unit_id ON mountings (unit, id);
 
+CREATE INDEX ix_recording_holds_recording_id ON recording_holds (recording_id);
+
 CREATE INDEX ix_recordings_job_id_id ON recordings (job_id, id);
+
+CREATE INDEX ix_recordings_raw_state_stored_bytes ON recordings (raw, state, stored_bytes);
 
 CREATE INDEX ix_recordings_state_stored_bytes ON recordings (state, stored_bytes);
 
@@ -499,5 +574,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0014');
+INSERT INTO "alembic_version" VALUES ('0016');
 

@@ -13,8 +13,10 @@ from bench_service.persistence.bench.prompt_store import SqlPromptStore
 from bench_service.persistence.bench.registry_store import SqlBenchRegistry
 from bench_service.persistence.campaign_store import SqlCampaignStore
 from bench_service.persistence.database import Database, connect
+from bench_service.persistence.evidence.batch_store import SqlBatchStore
 from bench_service.persistence.evidence.calibration_store import SqlCalibrationStore
 from bench_service.persistence.evidence.correction_store import SqlCorrectionStore
+from bench_service.persistence.evidence.raw_store import SqlRawDataStore
 from bench_service.persistence.evidence.recording_store import SqlRecordingStore
 from bench_service.persistence.evidence.result_store import SqlResultStore
 from bench_service.persistence.evidence.unit_store import SqlUnitStore
@@ -68,6 +70,8 @@ def stores_of(database: Database) -> Stores:
         upkeep=SqlUpkeepStore(database),
         access=SqlAccessStore(database),
         keys=SqlKeyStore(database),
+        batches=SqlBatchStore(database),
+        raw_data=SqlRawDataStore(database),
     )
 
 

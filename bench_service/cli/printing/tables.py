@@ -119,6 +119,16 @@ def result_table(results: list[dict[str, Any]]) -> Table:
     return table
 
 
+def batch_table(batches: list[dict[str, Any]]) -> Table:
+    """Table of batches of analyses, newest first."""
+    table = _table("batch", "method", "state", "analyses", "done", "reused", "failed", "submitted")
+    for one in batches:
+        numbers = (str(one["counts"][state]) for state in ("done", "reused", "failed"))
+        made = moment(one["created_at"])
+        table.add_row(one["id"], Text(one["method"]), one["state"], str(one["total"]), *numbers, made)
+    return table
+
+
 def unit_table(units: list[dict[str, Any]]) -> Table:
     """Table of units with what is current of each."""
     table = _table("unit", "rate, Hz", "channels", *(name.replace("_", " ") for name in CURRENT))

@@ -23,6 +23,7 @@ class RecordingRow(Table):
         Index("ix_recordings_job_id_id", "job_id", "id"),
         Index("ix_recordings_unit_id", "unit", "id"),
         Index("ix_recordings_state_stored_bytes", "state", "stored_bytes"),
+        Index("ix_recordings_raw_state_stored_bytes", "raw", "state", "stored_bytes"),
         Index(
             "uq_recordings_complete_station",
             "job_id",
@@ -55,6 +56,9 @@ class RecordingRow(Table):
     source: Mapped[dict[str, Any]]
     checkpoint: Mapped[dict[str, Any] | None] = mapped_column(Document)
     measured: Mapped[dict[str, Any] | None] = mapped_column(Document)
+    raw: Mapped[str] = mapped_column(server_default="stored")
+    raw_changed_at: Mapped[datetime | None]
+    archive: Mapped[str | None]
 
 
 class ChunkRow(Table):
@@ -66,6 +70,22 @@ class ChunkRow(Table):
     samples: Mapped[int]
     sha256: Mapped[str]
     payload: Mapped[bytes] = mapped_column(LargeBinary)
+    """The chunk's bytes; empty once they are in the archive or removed, see the recording's `raw`."""
+
+
+class HoldRow(Table):
+    """A person's hold on the raw data of a recording."""
+
+    __tablename__ = "recording_holds"
+    __table_args__ = (Index("ix_recording_holds_recording_id", "recording_id"),)
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    recording_id: Mapped[str] = mapped_column(Id, ForeignKey("recordings.id"))
+    reason: Mapped[str]
+    by: Mapped[str]
+    held_at: Mapped[datetime]
+    released_at: Mapped[datetime | None]
+    released_by: Mapped[str]
 
 
 class ResultRow(Table):
