@@ -15,9 +15,11 @@ from bench_service.campaigns.service import CampaignService
 from bench_service.campaigns.stores import Stores
 from bench_service.evidence.analyses import AnalysisService
 from bench_service.evidence.imports import ImportService
+from bench_service.evidence.recomputation import RecomputationService
+from bench_service.evidence.reports.service import ReportService
 from bench_service.evidence.units import register
 from bench_service.evidence.upkeep import NightlyScrub, UpkeepService
-from bench_service.evidence.work_processes import WorkProcesses
+from bench_service.evidence.work_processes import WorkApart
 from bench_service.jobs.history import is_empty, missing_history
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue_service import QueueService
@@ -50,7 +52,7 @@ class BenchService:
         traces: Traces | None = None,
         roads: StopRoads | None = None,
         rescued: Rescue | None = None,
-        processes: WorkProcesses | None = None,
+        processes: WorkApart | None = None,
         database: DatabasePort | None = None,
         scrub_at: str = "",
     ) -> None:
@@ -58,8 +60,8 @@ class BenchService:
 
         `free_bytes`: room on the database's disk, where that is known. `roads`: the ways of a stop to its bench; None:
         through the database alone. `rescued`: the result of making devices safe at start. `processes`: where
-        analyses are computed; None: in the caller's thread. `database`: the database as a whole; None: not known.
-        `scrub_at`: the time of the nightly check, "HH:MM"; empty: none.
+        analyses are computed and reports typeset; None: in the caller's thread. `database`: the database as a whole;
+        None: not known. `scrub_at`: the time of the nightly check, "HH:MM"; empty: none.
         """
         self.access = AccessService(stores.access, AccessBook(stores.access))
         self.safety = safety
@@ -71,7 +73,13 @@ class BenchService:
         self.code_version = code_version
         self.benches = planner.benches
         self.imports = ImportService(stores)
-        self.analyses = AnalysisService(stores, planner.catalogue, stores.jobs.get, code_version, processes)
+        self.analyses = AnalysisService(
+            stores, planner.catalogue, stores.jobs.get, code_version, processes and processes.analyses
+        )
+        self.recomputations = RecomputationService(
+            stores, planner.catalogue, stores.jobs.get, code_version, processes and processes.analyses
+        )
+        self.reports = ReportService(stores, planner.catalogue, stores.jobs.get, processes and processes.printing)
         self.queues = QueueService(stores, planner.benches, self._wake)
         self.jobs = JobService(stores, planner, self.queues, driver, worker, code_version, self._wake)
         self._roads = roads or StopRoads(None)

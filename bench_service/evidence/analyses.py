@@ -19,7 +19,9 @@ from bench_service.model.records import Idempotency, RecordingState, StoredResul
 from bench_service.model.request import fingerprint
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Recording
+from procedures.core.unit_correction import UnitCorrection
 from procedures.inspection import analyse_method
 from procedures.procedure import DatedCalibration, Evidence
 
@@ -80,10 +82,22 @@ class AnalysisService:
             return self._stores.results.get(known)
         _require_each_once("recordings", request.recordings)
         _require_each_once("calibrations", request.calibrations)
+        if self._processes is not None:
+            self._catalogue.method(request.method).params.model_validate(request.parameters)
+            return self._stores.results.get(self._processes.result("method", request, key))
+        stored, calibrations, corrections = self.computed(request)
+        require_storable(calibrations, corrections)
+        return self._stores.results.add(stored, calibrations, False, idempotency, corrections)
+
+    def computed(
+        self, request: AnalysisRequest
+    ) -> tuple[StoredResult, tuple[TriadCalibration, ...], tuple[UnitCorrection, ...]]:
+        """The result of a method with the calibrations and corrections that it gives; nothing is stored.
+
+        Raises `NotFound`, `DomainError`, `ValidationError`.
+        """
         method = self._catalogue.method(request.method)
         params = method.params.model_validate(request.parameters)
-        if self._processes is not None:
-            return self._stores.results.get(self._processes.result("method", request, key))
         used = self._stores.calibrations.several(request.calibrations)
         dated = tuple(DatedCalibration(c.id, c.made_at.isoformat(), (c.value,), self._mounting_of(c)) for c in used)
         evidence = Evidence(self._complete(request.recordings), dated)
@@ -107,9 +121,7 @@ class AnalysisService:
             created_at=now(),
             unit=serial,
         )
-        gives = method.calibrations(outcome), method.corrections(outcome)
-        require_storable(*gives)
-        return self._stores.results.add(stored, gives[0], False, idempotency, gives[1])
+        return stored, method.calibrations(outcome), method.corrections(outcome)
 
     def _mounting_of(self, calibration: StoredCalibration) -> str:
         """Id of the mounting that the calibration's job rested on; empty where it rested on none."""
