@@ -140,7 +140,7 @@ async def read_printed_report(result_id: str, service: Service) -> Response:
     return printed(await PRINTED.run(service.reports.of_result, result_id), f"{result_id}.pdf")
 
 
-@router.post("/results/{result_id}/recomputation", responses=problems(404, 409))
+@router.post("/results/{result_id}/recomputation", responses=problems(404, 409, 507))
 def recompute(result_id: str, service: Service) -> Recomputation:
     """Hash a result's stored samples and compute it again with the code of now; nothing is stored."""
     return service.recomputations.recomputed(result_id)

@@ -3,7 +3,7 @@
 from typing import Any
 
 from bench_service.evidence.work_processes import Run
-from bench_service.formats.drawing import drawn_here
+from bench_service.formats.printed.drawing import drawn_here
 from bench_service.pages import figures
 
 

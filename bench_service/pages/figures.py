@@ -1,10 +1,10 @@
-"""Figures of pages as SVG: drawn by `formats.drawing`, in another process where there is one, and kept."""
+"""Figures of pages as SVG: drawn by `formats.printed.drawing`, in another process where there is one, and kept."""
 
 import logging
 from functools import lru_cache
 
 from bench_service.evidence.work_processes import WorkProcesses
-from bench_service.formats.drawing import drawn_here
+from bench_service.formats.printed.drawing import drawn_here
 from bench_service.model.errors import Overloaded, StorageFailure
 from procedures.core.report import Figure, Series
 

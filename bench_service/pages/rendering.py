@@ -11,7 +11,7 @@ from fastapi.templating import Jinja2Templates
 from markupsafe import Markup, escape
 
 from bench_service.access.identity import Identity, Proof
-from bench_service.formats import digits
+from bench_service.formats.printed import digits
 from bench_service.model.errors import ServiceError
 from bench_service.pages.languages import (
     LANGUAGE,

@@ -85,7 +85,7 @@ class CertificateText(Request):
     certificate: str = Field(min_length=1, max_length=900_000, description="The XML, with or without its signature")
 
 
-@router.post("/certificate.pdf", response_class=Response, responses={**problems(404, 413), **PDF})
+@router.post("/certificate.pdf", response_class=Response, responses={**problems(404, 413, 507), **PDF})
 async def print_certificate(serial: Serial, body: CertificateText, service: Service) -> Response:
     """Print a certificate of the unit's calibrations as PDF/A-3, with the XML inside byte for byte.
 

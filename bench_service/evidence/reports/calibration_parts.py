@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from bench_service.formats.digits import to_uncertainty, two_digits
+from bench_service.formats.printed.digits import to_uncertainty, two_digits
 from bench_service.formats.printed.document import Block, Facts, PrintedTable
 from bench_service.model.calibrations import StoredCalibration
 from procedures.core.imu_model import COEFFICIENT_NAMES

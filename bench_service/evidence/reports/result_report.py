@@ -7,7 +7,7 @@ from typing import Any
 from bench_service.evidence.catalogue import Catalogue
 from bench_service.evidence.reports import calibration_parts, context_parts
 from bench_service.evidence.stores import EvidenceStores
-from bench_service.formats.digits import to_uncertainty, two_digits
+from bench_service.formats.printed.digits import to_uncertainty, two_digits
 from bench_service.formats.printed.document import (
     Block,
     Facts,

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pydantic_core import to_json
 
 from bench_service.evidence.catalogue import Catalogue
-from bench_service.evidence.reports.certificate_report import certificate_report
 from bench_service.evidence.reports.result_report import gathered, result_report
 from bench_service.evidence.reports.unit_report import unit_report
 from bench_service.evidence.stores import EvidenceStores
@@ -48,6 +47,8 @@ class ReportService:
 
     def of_certificate(self, serial: str, xml: str) -> bytes:
         """The printed form of a unit's certificate, which is attached byte for byte. Raises `BadParameter`."""
+        from bench_service.evidence.reports.certificate_report import certificate_report  # with scipy and signxml
+
         return self._typeset(certificate_report(self._stores, self._catalogue, serial, xml.encode()))
 
     def _typeset(self, document: PrintedDocument) -> bytes:

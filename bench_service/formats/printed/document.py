@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from bench_service.formats.digits import LEAST_DIGITS
+from bench_service.formats.printed.digits import LEAST_DIGITS
 from procedures.core.report import Cell, Figure, Report, Table
 
 MOST_ROWS = 300

@@ -14,7 +14,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from bench_service.formats.drawing import drawn_here
 from bench_service.formats.printed.document import (
     Attachment,
     Block,
@@ -24,6 +23,7 @@ from bench_service.formats.printed.document import (
     PrintedDocument,
     PrintedTable,
 )
+from bench_service.formats.printed.drawing import drawn_here
 from procedures.core.report import Figure
 
 STANDARD = "a-3b"
