@@ -1,7 +1,7 @@
 """From a foreign log to a consumer: import, noise, calibration, export, and |a| at rest after its correction.
 
 The unit is made here: ``U = b + K·v + n`` with b, K, n known to nobody else. Its logs are CSV files. What a consumer
-does with its file is written from the consumer's own documents, or is its own code (imucal; the compiled C function), and
+does with its file is written from its own documents, or is its own code (imucal, the compiled C function), and
 shares nothing with the exports. |a| must be g within the claimed uncertainty, and a wrong sign or order must show.
 """
 
