@@ -51,7 +51,8 @@ from bench_service.drivers.composition import devices_of, driver_of, own_devices
 from bench_service.drivers.simulated import drawn_unit
 from bench_service.driving import driving
 from bench_service.evidence.catalogue import Catalogue
-from bench_service.evidence.work_processes import WorkProcesses
+from bench_service.evidence.reports.printing_process import open_printing
+from bench_service.evidence.work_processes import WorkApart, WorkProcesses
 from bench_service.jobs.events.hub import EventHub
 from bench_service.jobs.planning import Planner
 from bench_service.pages import (
@@ -187,14 +188,15 @@ def _roads(settings: Settings, opened: Database, closing: ExitStack) -> StopRoad
     return StopRoads(settings.devices_in(), addresses.road, addresses.host)
 
 
-def _work_apart(settings: Settings, code: str, closing: ExitStack) -> WorkProcesses:
-    """Processes for analyses; figures are drawn in another one from now on."""
+def _work_apart(settings: Settings, code: str, closing: ExitStack) -> WorkApart:
+    """Processes for analyses and for printing; figures are drawn in another one from now on."""
     processes = WorkProcesses(open_run, settings.database_url, code)
     drawing = WorkProcesses(open_drawing, at_once=1, waiting=DRAWINGS)
+    printing = WorkProcesses(open_printing, at_once=1)
     figures.draw_in(drawing)
-    for undo in (processes.close, drawing.close, partial(figures.draw_in, None)):
+    for undo in (processes.close, drawing.close, printing.close, partial(figures.draw_in, None)):
         closing.callback(undo)
-    return processes
+    return WorkApart(processes, printing)
 
 
 def _devices(settings: Settings, bench_id: str) -> BenchDevices:

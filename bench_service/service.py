@@ -19,9 +19,11 @@ from bench_service.evidence.batches.service import BatchService
 from bench_service.evidence.imports import ImportService
 from bench_service.evidence.raw_data.nightly import NightlyStorage
 from bench_service.evidence.raw_data.service import RawDataService, StorageSettings
+from bench_service.evidence.recomputation import RecomputationService
+from bench_service.evidence.reports.service import ReportService
 from bench_service.evidence.units import register
 from bench_service.evidence.upkeep import NightlyScrub, UpkeepService
-from bench_service.evidence.work_processes import WorkProcesses
+from bench_service.evidence.work_processes import WorkApart
 from bench_service.jobs.history import is_empty, missing_history
 from bench_service.jobs.manual.presence import Presence
 from bench_service.jobs.manual.service import ManualService
@@ -57,7 +59,7 @@ class BenchService:
         traces: Traces | None = None,
         roads: StopRoads | None = None,
         rescued: Rescue | None = None,
-        processes: WorkProcesses | None = None,
+        processes: WorkApart | None = None,
         database: DatabasePort | None = None,
         settings: Settings | None = None,
         runner: RunnerMaker | None = None,
@@ -66,9 +68,9 @@ class BenchService:
 
         `free_bytes`: room on the database's disk, where that is known. `roads`: the ways of a stop to its bench; None:
         through the database alone. `rescued`: the result of making devices safe at start. `processes`: where
-        analyses are computed; None: in the caller's thread. `database`: the database as a whole; None: not known.
-        `settings`: the time of the nightly work, and the rules for raw data; None: no such work, and no rules.
-        `runner`: builds the runner of batches of analyses; None: other processes run their tasks.
+        analyses are computed and reports typeset; None: in the caller's thread. `database`: the database as a whole;
+        None: not known. `settings`: the time of the nightly work, and the rules for raw data; None: no such work, and
+        no rules. `runner`: builds the runner of batches of analyses; None: other processes run their tasks.
         """
         self.access = AccessService(stores.access, AccessBook(stores.access))
         self.safety = safety
@@ -80,7 +82,13 @@ class BenchService:
         self.code_version = code_version
         self.benches = planner.benches
         self.imports = ImportService(stores)
-        self.analyses = AnalysisService(stores, planner.catalogue, stores.jobs.get, code_version, processes)
+        self.analyses = AnalysisService(
+            stores, planner.catalogue, stores.jobs.get, code_version, processes and processes.analyses
+        )
+        self.recomputations = RecomputationService(
+            stores, planner.catalogue, stores.jobs.get, code_version, processes and processes.analyses
+        )
+        self.reports = ReportService(stores, planner.catalogue, stores.jobs.get, processes and processes.printing)
         self._runner = None if runner is None else runner(stores.batches, self.analyses)
         self.batches = BatchService(stores, planner.catalogue, self._runner.wake if self._runner else lambda: None)
         self.queues = QueueService(stores, planner.benches, self._wake)

@@ -18,7 +18,8 @@ RIGHTS: dict[str, Right] = {
     "read_session": Right.OPEN,
     "log_in": Right.OPEN,
     "log_out": Right.SEE,
-    # previews change nothing
+    # previews and prints change nothing
+    "print_certificate": Right.SEE,
     "preview": Right.SEE,
     "preview_batch": Right.SEE,
     "preview_campaign": Right.SEE,
@@ -42,6 +43,7 @@ RIGHTS: dict[str, Right] = {
     "demand_by_hand": Right.OPERATE,
     "end_reservation": Right.OPERATE,
     "cancel_campaign_run": Right.OPERATE,
+    "recompute": Right.OPERATE,
     "analyse_again": Right.ENGINEER,
     "run_method": Right.ENGINEER,
     "cancel_batch": Right.ENGINEER,

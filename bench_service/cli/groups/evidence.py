@@ -77,7 +77,7 @@ def export(
     form: Annotated[str, typer.Option("--format", help="Format of the files in a .zip")] = "csv",
     server: Server = None,
 ) -> None:
-    """Take a recording's samples out as .csv, .parquet, .arrow, .npy, .feather, .h5 or .mat; a job's as .zip."""
+    """Take a recording's samples out as .csv, .parquet, .arrow, .npy, .feather, .h5, .mat or .mcap; a job's as .zip."""
     options: dict[str, Any] = {"channels": channels, "start_s": start_s, "stop_s": stop_s}
     treated = {"values": values, "corrected_by": corrected_by, "decimate": decimate}
     ending = output.suffix.removeprefix(".")
@@ -85,7 +85,7 @@ def export(
     if ending == "zip":
         path = f"/api/v1/jobs/{segment(recording)}/samples"
         ending = form
-    elif ending in ("feather", "h5", "mat") or any(treated.values()):
+    elif ending in ("feather", "h5", "mat", "mcap") or any(treated.values()):
         path = f"/api/v1/recordings/{segment(recording)}/samples"
     query = {"format": ending, **{k: v for k, v in {**options, **treated}.items() if v is not None}}
     check_folder(output)
