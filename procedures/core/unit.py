@@ -11,6 +11,7 @@ from procedures.core.imu_model import TriadCalibration
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import TRIADS, Channel
 from procedures.core.thermal_correction import ThermalCorrection
+from procedures.core.thermometers import ThermometerCorrection
 from procedures.core.unit_correction import CorrectionKind
 
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
@@ -69,9 +70,10 @@ class UnitDeclaration:
 
 @dataclass(frozen=True)
 class WithheldCalibration:
-    """The calibration of a triad that would be in use, but was rejected or has expired."""
+    """A calibration or correction that would be in use, but was rejected or has expired."""
 
     triad: str
+    """Triad of a calibration, or kind of a correction."""
     id: str
     why: str
     """Sentence that says why it is not used, and what to do."""
@@ -93,13 +95,16 @@ class Unit:
     calibration_ids: tuple[str, ...] = ()
     """Ids of the stored calibrations in use, in the order of `calibrations`."""
     withheld: tuple[WithheldCalibration, ...] = field(default=(), repr=False)
-    """Current calibrations that may not be used."""
+    """Current calibrations and corrections that may not be used."""
     thermal_correction: ThermalCorrection | None = field(default=None, repr=False)
     """The current correction of the kind "thermal", or None."""
     thermal_correction_id: str | None = None
     converter: ConverterTriad | None = field(default=None, repr=False)
     """Current models of the signal converter, x, y, z, or None."""
     converter_id: str | None = None
+    thermometers: ThermometerCorrection | None = field(default=None, repr=False)
+    """Current correction of the temperature sensors, or None: they are taken as they read."""
+    thermometers_id: str | None = None
     declaration: UnitDeclaration | None = field(default=None, repr=False)
     """Declaration from the unit's own file; None for a simulated unit."""
 
@@ -122,7 +127,12 @@ class Unit:
 
     def correction_id(self, kind: CorrectionKind) -> str | None:
         """Id of the current correction of a kind, or None."""
-        return {"thermal": self.thermal_correction_id, "converter": self.converter_id}[kind]
+        ids = {"thermal": self.thermal_correction_id, "converter": self.converter_id}
+        return self.thermometers_id if kind == "thermometers" else ids[kind]
+
+    def why_withheld(self, kind: CorrectionKind) -> str:
+        """The reason why the current correction of a kind may not be used; empty where it may, or there is none."""
+        return next((w.why for w in self.withheld if w.triad == kind), "")
 
     def triad(self, triad: str) -> TriadRecord | None:
         """The record of a triad by name."""

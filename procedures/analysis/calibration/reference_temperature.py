@@ -55,7 +55,8 @@ def require_correctable(thermal_correction: str, dwell_s: float | None, unit: Un
     if thermal_correction != "current":
         return
     if unit.thermal_correction is None:
-        raise BadParameter("thermal_correction", "current", f"none: unit {unit.serial} has no thermal correction yet")
+        why = unit.why_withheld("thermal") or f"unit {unit.serial} has no thermal correction yet"
+        raise BadParameter("thermal_correction", "current", f"none: {why}")
     if dwell_s is not None and dwell_s < LEAST_DWELL_S:
         raise BadParameter("dwell_s", dwell_s, f"at least {LEAST_DWELL_S:g}: temperatures are read beside")
 
