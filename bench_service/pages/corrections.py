@@ -3,10 +3,12 @@
 import numpy as np
 
 from procedures.core.converter import ConverterTriad, Normalised
+from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.report import Cell, Table
 from procedures.core.thermal_correction import COEFFICIENTS, ThermalCorrection
 from procedures.core.thermometers import ThermometerCorrection
 from procedures.core.unit_correction import UnitCorrection
+from procedures.core.units import DEG_PER_HOUR
 
 
 def correction_table(correction: UnitCorrection) -> Table:
@@ -15,6 +17,8 @@ def correction_table(correction: UnitCorrection) -> Table:
         return _thermal(correction.thermal)
     if correction.thermometers is not None:
         return _thermometers(correction.thermometers)
+    if correction.gyros is not None:
+        return _gyros(correction.gyros)
     return _converter(correction.converter or ())
 
 
@@ -40,6 +44,16 @@ def _thermometers(value: ThermometerCorrection) -> Table:
     low, high = value.fitted_range_c
     note = f"About {value.reference_c:g} °C; compared with the chamber at {low:.1f} … {high:.1f} °C."
     return Table("Thermometers", ("sensor", "offset, °C", "±", "slope, °C/°C", "±"), tuple(rows), note)
+
+
+def _gyros(value: GyroThermalCorrection) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for name, gyro in zip("xyz", value.gyros, strict=True):
+        for k, c in enumerate(gyro.coefficients):
+            rows.append((name, k + 1, c / DEG_PER_HOUR, gyro.covariance[k][k] ** 0.5 / DEG_PER_HOUR))
+    low, high = value.fitted_range_c
+    note = f"About {value.reference_c:g} °C of each gyro's own sensor; fitted at {low:.1f} … {high:.1f} °C."
+    return Table("Gyros over temperature", ("gyro", "power", "deg/h/°C^k", "±"), tuple(rows), note)
 
 
 def _converter(models: ConverterTriad | tuple[()]) -> Table:

@@ -7,6 +7,7 @@ import numpy as np
 from procedures.core.arrays import Array
 from procedures.core.converter import ConverterTriad
 from procedures.core.errors import NoCalibration
+from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import TRIADS, Channel
@@ -105,6 +106,9 @@ class Unit:
     thermometers: ThermometerCorrection | None = field(default=None, repr=False)
     """Current correction of the temperature sensors, or None: they are taken as they read."""
     thermometers_id: str | None = None
+    gyro_correction: GyroThermalCorrection | None = field(default=None, repr=False)
+    """Current correction of the gyros for temperature, or None."""
+    gyro_correction_id: str | None = None
     declaration: UnitDeclaration | None = field(default=None, repr=False)
     """Declaration from the unit's own file; None for a simulated unit."""
 
@@ -127,8 +131,12 @@ class Unit:
 
     def correction_id(self, kind: CorrectionKind) -> str | None:
         """Id of the current correction of a kind, or None."""
-        ids = {"thermal": self.thermal_correction_id, "converter": self.converter_id}
-        return self.thermometers_id if kind == "thermometers" else ids[kind]
+        return {
+            "thermal": self.thermal_correction_id,
+            "converter": self.converter_id,
+            "thermometers": self.thermometers_id,
+            "gyros": self.gyro_correction_id,
+        }[kind]
 
     def why_withheld(self, kind: CorrectionKind) -> str:
         """The reason why the current correction of a kind may not be used; empty where it may, or there is none."""

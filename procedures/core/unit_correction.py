@@ -8,10 +8,11 @@ from typing import Literal
 
 from procedures.core.converter import ConverterTriad
 from procedures.core.errors import BadParameter
+from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.thermal_correction import ThermalCorrection
 from procedures.core.thermometers import ThermometerCorrection
 
-CorrectionKind = Literal["thermal", "converter", "thermometers"]
+CorrectionKind = Literal["thermal", "converter", "thermometers", "gyros"]
 
 
 @dataclass(frozen=True)
@@ -20,9 +21,9 @@ class UnitCorrection:
 
     kind: CorrectionKind
     """Kind "thermal" for the accelerometer triad (thesis 4.1), "converter" for the converter (thesis 3.8-3.13),
-    "thermometers" for the unit's temperature sensors."""
-    value: ThermalCorrection | ConverterTriad | ThermometerCorrection
-    """A `ThermalCorrection`, three `ConverterModel`s, x, y, z, or a `ThermometerCorrection`."""
+    "thermometers" for the unit's temperature sensors, "gyros" for gyros that depend on temperature."""
+    value: ThermalCorrection | ConverterTriad | ThermometerCorrection | GyroThermalCorrection
+    """A `ThermalCorrection`, three `ConverterModel`s, a `ThermometerCorrection`, or a `GyroThermalCorrection`."""
 
     def __post_init__(self) -> None:
         belongs = "converter"
@@ -30,6 +31,8 @@ class UnitCorrection:
             belongs = "thermal"
         elif isinstance(self.value, ThermometerCorrection):
             belongs = "thermometers"
+        elif isinstance(self.value, GyroThermalCorrection):
+            belongs = "gyros"
         if self.kind != belongs:
             raise BadParameter("kind", self.kind, f"{belongs!r}, as the value is")
 
@@ -47,3 +50,8 @@ class UnitCorrection:
     def thermometers(self) -> ThermometerCorrection | None:
         """The value of the kind "thermometers", else None."""
         return self.value if isinstance(self.value, ThermometerCorrection) else None
+
+    @property
+    def gyros(self) -> GyroThermalCorrection | None:
+        """The value of the kind "gyros", else None."""
+        return self.value if isinstance(self.value, GyroThermalCorrection) else None

@@ -92,5 +92,5 @@ def true_lines(truth: UnitThermalTruth) -> Array:
 
     The sensor is wrong by ``o + s·(T − 20)``; of the reading r = T + that it is ``(o + s·(r − 20))/(1 + s)``.
     """
-    assert REFERENCE_C == SETTINGS.reference_c
+    assert SETTINGS.reference_c == REFERENCE_C
     return np.array([v / (1.0 + t.slope) for t in truth.thermometers for v in (t.offset_c, t.slope)])

@@ -11,6 +11,7 @@ from bench_service.mapping import copied
 from bench_service.model.calibrations import Approval
 from bench_service.wall_clock import now
 from procedures.core.converter import ConverterTriad
+from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.recording import Channel
 from procedures.core.thermal_correction import ThermalCorrection
 from procedures.core.thermometers import ThermometerCorrection
@@ -43,6 +44,7 @@ class UnitView(BaseModel):
     thermal_correction: str | None = Field(description="Id of the current correction of the kind `thermal`")
     converter: str | None = Field(description="Id of the current correction of the kind `converter`")
     thermometers: str | None = Field(description="Id of the current correction of the kind `thermometers`")
+    gyro_correction: str | None = Field(description="Id of the current correction of the kind `gyros`")
 
     @classmethod
     def of(cls, unit: Unit) -> "UnitView":
@@ -55,6 +57,7 @@ class UnitView(BaseModel):
             thermal_correction=unit.thermal_correction_id,
             converter=unit.converter_id,
             thermometers=unit.thermometers_id,
+            gyro_correction=unit.gyro_correction_id,
         )
 
 
@@ -71,6 +74,7 @@ class CorrectionView(BaseModel):
     thermal: ThermalCorrection | None = Field(description="Thesis 4.1, of the kind `thermal`; else null")
     converter: ConverterTriad | None = Field(description="Models of x, y, z, of the kind `converter`; else null")
     thermometers: ThermometerCorrection | None = Field(description="Sensors, of the kind `thermometers`; else null")
+    gyros: GyroThermalCorrection | None = Field(description="Polynomials of x, y, z, of the kind `gyros`; else null")
     approval: Approval
     valid_until: datetime | None
     unusable: str = Field(description="Why it may not be used now, and the way out; empty where it may")

@@ -29,6 +29,8 @@ _JOINED = {
     "converter_id",
     "thermometers",
     "thermometers_id",
+    "gyro_correction",
+    "gyro_correction_id",
 }
 """Fields of a unit that are stored in other tables."""
 
@@ -80,6 +82,7 @@ def _unit(
     usable = sorted((c for c in calibrations if not doubts[c.id]), key=lambda c: c.triad != "gyro")
     of_kind = {c.correction.kind: c for c in corrections if not doubts[c.id]}
     thermal, converter, thermometers = (of_kind.get(kind) for kind in ("thermal", "converter", "thermometers"))
+    gyros = of_kind.get("gyros")
     subjects = [*((c.triad, c) for c in calibrations), *((c.correction.kind, c) for c in corrections)]
     joined: dict[str, Any] = {
         "calibrations": tuple(c.value for c in usable),
@@ -91,5 +94,7 @@ def _unit(
         "converter_id": converter and converter.id,
         "thermometers": thermometers and thermometers.correction.thermometers,
         "thermometers_id": thermometers and thermometers.id,
+        "gyro_correction": gyros and gyros.correction.gyros,
+        "gyro_correction_id": gyros and gyros.id,
     }
     return UNIT.validate_python({**document, **joined})

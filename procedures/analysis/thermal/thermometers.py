@@ -12,6 +12,7 @@ that of the air at the unit's place (common to all, it enters each offset whole)
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.special import chdtrc
@@ -227,7 +228,7 @@ def calibrate(soaked: Soaked, settings: SoakSettings) -> Calibrated:
 def _hysteresis(soaked: Soaked, sensors: Sequence[SensorFit]) -> tuple[UpAgainstDown, ...]:
     """Errors on the way up against those on the way down, at every target that was reached both ways."""
     targets = soaked.target_c.tolist()
-    ways = [np.sign(b - a) for a, b in zip(targets, targets[1:], strict=False)]
+    ways = [np.sign(b - a) for a, b in pairwise(targets)]
     found: list[UpAgainstDown] = []
     for target in sorted(set(targets)):
         up, down = ([k + 1 for k, w in enumerate(ways) if w == way and targets[k + 1] == target] for way in (1, -1))
