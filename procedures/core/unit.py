@@ -6,7 +6,7 @@ import numpy as np
 
 from procedures.core.arrays import Array
 from procedures.core.converter import ConverterTriad
-from procedures.core.errors import NoCalibration
+from procedures.core.errors import BadParameter, NoCalibration
 from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.noise import NoiseCoefficients
@@ -30,6 +30,13 @@ class TriadRecord:
     """Standard deviation of the scale factor from run to run, relative."""
     noise_origin: str = "data sheet"
     """Origin of the coefficients: a data sheet, or the result that found them."""
+    dither_frequency_hz: tuple[float, float, float] | None = None
+    """Frequencies of the mechanical dithers of x, y, z, by the data sheet; 0: no dither. None: not declared."""
+
+    def __post_init__(self) -> None:
+        for name, value in zip("xyz", self.dither_frequency_hz or (), strict=False):
+            if not 0.0 <= value <= 1e5:
+                raise BadParameter(f"dither_frequency_hz.{name}", value, "within 0 … 100 000 Hz")
 
     def launch_covariance(self, outputs: Array) -> Array:
         """Covariance by which outputs K·v (n, 3) of one launch depart from the unit's mean, per channel, (3, n, n).
