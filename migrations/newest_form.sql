@@ -1,4 +1,4 @@
--- revision 0016
+-- revision 0019
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -207,6 +207,18 @@ CREATE TABLE coefficients (
 	CONSTRAINT fk_coefficients_calibration_id_calibrations FOREIGN KEY(calibration_id) REFERENCES calibrations (id)
 );
 
+CREATE TABLE correction_decisions (
+	id VARCHAR NOT NULL, 
+	correction_id VARCHAR NOT NULL, 
+	act VARCHAR NOT NULL, 
+	at DATETIME NOT NULL, 
+	"by" VARCHAR NOT NULL, 
+	proven BOOLEAN NOT NULL, 
+	remark VARCHAR NOT NULL, 
+	CONSTRAINT pk_correction_decisions PRIMARY KEY (id), 
+	CONSTRAINT fk_correction_decisions_correction_id_corrections FOREIGN KEY(correction_id) REFERENCES corrections (id)
+);
+
 CREATE TABLE corrections (
 	id VARCHAR NOT NULL, 
 	unit VARCHAR NOT NULL, 
@@ -215,7 +227,7 @@ CREATE TABLE corrections (
 	made_at DATETIME NOT NULL, 
 	is_current BOOLEAN NOT NULL, 
 	simulated BOOLEAN NOT NULL, 
-	document JSON NOT NULL, 
+	document JSON NOT NULL, approval VARCHAR DEFAULT 'open' NOT NULL, valid_until DATETIME, 
 	CONSTRAINT pk_corrections PRIMARY KEY (id), 
 	CONSTRAINT fk_corrections_result_id_results FOREIGN KEY(result_id) REFERENCES results (id)
 );
@@ -512,6 +524,8 @@ CREATE INDEX ix_campaign_runs_campaign_id ON campaign_runs (campaign, id);
 
 CREATE INDEX ix_campaign_runs_state_id ON campaign_runs (state, id);
 
+CREATE INDEX ix_correction_decisions_correction_id_id ON correction_decisions (correction_id, id);
+
 CREATE INDEX ix_corrections_unit_id ON corrections (unit, id);
 
 CREATE INDEX ix_jobs_bench_state_priority_queued_at_id ON jobs (bench, state, priority, queued_at, id);
@@ -574,5 +588,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0016');
+INSERT INTO "alembic_version" VALUES ('0019');
 

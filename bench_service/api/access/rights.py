@@ -52,6 +52,8 @@ RIGHTS: dict[str, Right] = {
     "describe_file": Right.ENGINEER,
     "declare_unit": Right.ENGINEER,
     "choose_correction": Right.ENGINEER,
+    "approve_correction": Right.ENGINEER,
+    "reject_correction": Right.ENGINEER,
     "enter_calibration": Right.ENGINEER,
     "choose_calibration": Right.ENGINEER,
     "choose_by_rule": Right.ENGINEER,

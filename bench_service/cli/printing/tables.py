@@ -11,7 +11,7 @@ from bench_service.cli.printing.moments import moment
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.units import DISPLAY
 
-CURRENT = ("gyro_calibration", "accelerometer_calibration", "thermal_correction", "converter")
+CURRENT = ("gyro_calibration", "accelerometer_calibration", "thermal_correction", "converter", "thermometers")
 """Fields of a unit that name what is current of it."""
 
 
