@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 from bench_service.api import (
     audit,
     audit_chain,
+    console,
     database,
     health,
     metrics,
@@ -111,6 +112,7 @@ ROUTERS = (
     health,
     metrics,
     feed,
+    console,
 )
 PAGES = (static_files, languages, docs, access_pages, images, stop_pages, console_pages, pages, campaign_pages)
 

@@ -14,6 +14,7 @@ from bench_service.bench.stop.road import StopRoads
 from bench_service.campaigns.service import CampaignService
 from bench_service.campaigns.stores import Stores
 from bench_service.evidence.analyses import AnalysisService
+from bench_service.evidence.estimates import EstimateService
 from bench_service.evidence.imports import ImportService
 from bench_service.evidence.units import register
 from bench_service.evidence.upkeep import NightlyScrub, UpkeepService
@@ -72,6 +73,7 @@ class BenchService:
         self.benches = planner.benches
         self.imports = ImportService(stores)
         self.analyses = AnalysisService(stores, planner.catalogue, stores.jobs.get, code_version, processes)
+        self.estimates = EstimateService(stores, stores.jobs.get, processes)
         self.queues = QueueService(stores, planner.benches, self._wake)
         self.jobs = JobService(stores, planner, self.queues, driver, worker, code_version, self._wake)
         self._roads = roads or StopRoads(None)

@@ -19,6 +19,7 @@ RIGHTS: dict[str, Right] = {
     "log_in": Right.OPEN,
     "log_out": Right.SEE,
     # previews change nothing
+    "check_certificate_file": Right.SEE,
     "preview": Right.SEE,
     "preview_batch": Right.SEE,
     "preview_campaign": Right.SEE,
