@@ -112,7 +112,7 @@ ROUTERS = (
     health,
     metrics,
     feed,
-    console,
+    *console.PARTS,
 )
 PAGES = (static_files, languages, docs, access_pages, images, stop_pages, console_pages, pages, campaign_pages)
 

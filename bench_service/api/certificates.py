@@ -1,4 +1,4 @@
-"""Route that checks a calibration certificate: by whom it is signed, whether it is unchanged, and what is stored here."""
+"""Route that checks a calibration certificate: the signer, whether it is unchanged, and what is stored of it here."""
 
 from typing import Annotated
 

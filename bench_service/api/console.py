@@ -1,10 +1,7 @@
-"""Routes behind the console's own pages, as one router."""
-
-from fastapi import APIRouter
+"""Modules with the routes behind the console's own pages."""
 
 from bench_service.api import certificates
 from bench_service.api.jobs import estimates
+from bench_service.api.units import notes
 
-router = APIRouter()
-router.include_router(certificates.router)
-router.include_router(estimates.router)
+PARTS = (certificates, estimates, notes)

@@ -31,6 +31,7 @@ RIGHTS: dict[str, Right] = {
     "pause": Right.OPERATE,
     "answer": Right.OPERATE,
     "add_note": Right.OPERATE,
+    "add_unit_note": Right.OPERATE,
     "resume": Right.OPERATE,
     "release": Right.OPERATE,
     "release_stop": Right.OPERATE,
