@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from bench_service.access.book import AccessBook
 from bench_service.access.service import AccessService
@@ -73,7 +74,7 @@ class BenchService:
         self.benches = planner.benches
         self.imports = ImportService(stores)
         self.analyses = AnalysisService(stores, planner.catalogue, stores.jobs.get, code_version, processes)
-        self.estimates = EstimateService(stores, stores.jobs.get, processes)
+        self.estimates = EstimateService(partial(_estimates, stores), stores.jobs.get, processes)
         self.queues = QueueService(stores, planner.benches, self._wake)
         self.jobs = JobService(stores, planner, self.queues, driver, worker, code_version, self._wake)
         self._roads = roads or StopRoads(None)
@@ -163,3 +164,10 @@ class BenchService:
                 self._worker.wake()
         else:
             self._roads.wake(bench_id)
+
+
+def _estimates(stores: Stores, job_id: str) -> str:
+    """Work out a job's estimates here: only a command's own service does, its numerics are loaded for that alone."""
+    from bench_service.evidence.estimating import Estimating
+
+    return Estimating(stores, stores.jobs.get).text(job_id)

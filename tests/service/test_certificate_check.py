@@ -1,4 +1,4 @@
-"""Check of a certificate over the API: a sound one, each way to be unsound, and a calibration that is not stored here."""
+"""Check of a certificate over the API: a sound one, each way to be unsound, and one of calibrations of elsewhere."""
 
 import json
 from typing import Any
@@ -8,8 +8,8 @@ import pytest
 from bench_service.formats.certificate.document import certificate
 from bench_service.formats.certificate.laboratory import laboratory_of
 from bench_service.formats.certificate.signature import KeyPair, new_key, signed
+from tests.kit.certificate_facts import TEXT
 from tests.service.client import Client
-from tests.storage.test_certificates import TEXT
 
 
 @pytest.fixture(scope="module")
