@@ -155,7 +155,7 @@ def noise_checks(params: NoiseParameters, unit: Unit, duration_s: float, launche
     for triad, process, name, size, field in LIMITED:
         record = unit.triad(triad)
         limit = Limit(name, maximum=getattr(params.noise_limits, field), source=SOURCE)
-        for channel, noise in zip(TRIADS[triad], record.noise if record else (), strict=False):
+        for channel, noise in zip(TRIADS[triad], record.observed_noise if record else (), strict=False):
             of_process = [p for p in predicted_noise(channel, noise, duration_s, launches) if p.process == process]
             check_name = f"{channel} {process.replace('_', ' ')}"
             for p in of_process:

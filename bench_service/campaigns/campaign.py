@@ -89,6 +89,13 @@ class DecisionRule(Document):
     rule: Literal["simple", "guarded"] = "simple"
     guard: float = Field(1.0, gt=0.0, le=10.0, description="r of the guarded rule: the guard band is r·U")
     coverage_factor: float = Field(2.0, ge=1.0, le=10.0, description="k of U = k·u; 2 is about 95 %")
+    false_alarm: float | None = Field(
+        None,
+        gt=0.0,
+        le=0.5,
+        description="chance, stated beforehand, that a sound unit fails any test of significance of all steps: the sum "
+        "of their levels (Bonferroni) must stay within it",
+    )
 
 
 class Step(Document):

@@ -31,10 +31,17 @@ def decided(check: Check, rule: DecisionRule) -> Check:
 
 def in_words(rule: DecisionRule) -> str:
     """The rule as a sentence for a report."""
+    stated = (
+        ""
+        if rule.false_alarm is None
+        else f"; all tests of significance together refuse a sound unit with a chance of at most {rule.false_alarm:g} "
+        "(Bonferroni)"
+    )
     if rule.rule == "simple":
-        return f"simple acceptance: a value passes at its limit; U = k·u is told with k = {rule.coverage_factor:g}"
+        told = f"simple acceptance: a value passes at its limit; U = k·u is told with k = {rule.coverage_factor:g}"
+        return told + stated
     band = f"{rule.guard:g}·U, U = k·u with k = {rule.coverage_factor:g}"
-    return f"guarded acceptance on the campaign's own limits: a value passes within its limit by {band}"
+    return f"guarded acceptance on the campaign's own limits: a value passes within its limit by {band}{stated}"
 
 
 def _inside(check: Check) -> float:

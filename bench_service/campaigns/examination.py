@@ -60,6 +60,18 @@ class Examination:
     """Probability that the unit as recorded fails a limit of known false alarm, were they independent."""
 
 
+def _require_stated(rule: DecisionRule, levels: Sequence[float]) -> None:
+    """Refuse a stated chance of false alarms that the levels exceed together. Raises `BadParameter`.
+
+    Bonferroni's bound, which holds for dependent tests as well: the chance of any is at most the sum.
+    """
+    stated, together = rule.false_alarm, sum(levels)
+    if stated is not None and together > stated * (1.0 + 1e-9):
+        enough = f"at least {together:.3g}: so much have the {len(levels)} tests of significance together"
+        way_out = f"with a level of {stated / len(levels):.2g} each, they would do"
+        raise BadParameter("decision.false_alarm", stated, f"{enough} ({way_out})")
+
+
 _CORRECTED = "predicted without the share of the thermal correction, which an earlier step is to give"
 _EXPECTED = "predicted with the calibration that earlier steps are to give, at nominal scale factors"
 
@@ -94,6 +106,7 @@ class Examiner:
         warnings = _warnings(plans)
         if all(plan.left_out for plan in plans):
             warnings.append("every step is left out: the verdict will be error, because nothing is judged")
+        _require_stated(campaign.decision, [one.level for p in plans for one in p.limits if one.level is not None])
         sound = prod(1.0 - one.false_alarm for p in plans for one in p.limits if one.false_alarm is not None)
         told = (plans, duration_s, sum(p.data_bytes for p in plans), tuple(warnings), in_words(campaign.decision))
         return Examination(*told, false_alarm=1.0 - sound)

@@ -21,6 +21,7 @@ from pydantic import Field
 from procedures import steps
 from procedures.analysis.calibration.diagnosis import LIKELY_P_VALUE
 from procedures.analysis.calibration.plan import (
+    IN_RUN_LEVEL,
     TriadPlan,
     basis,
     in_run_check,
@@ -62,8 +63,9 @@ ORIENTATIONS = tuple((40.0 * i, 10.0 * i, 20.0 * i) for i in range(9))
 
 
 _OF_PLAN = (
-    "None: the expanded uncertainty of the plan (k = 2), which has the unit's change between launches; with 80 ppm of "
-    "accelerometer scale factor a sound unit may exceed 0.0005 m/s^2 in another launch"
+    "None: the expanded uncertainty of the plan, which has the unit's change between launches and which a sound unit "
+    "exceeds with a chance of prediction_p_value_min; with 80 ppm of accelerometer scale factor a sound unit may "
+    "exceed 0.0005 m/s^2 in another launch"
 )
 
 
@@ -253,7 +255,10 @@ def _warnings(plans: Sequence[TriadPlan], limits: Limits) -> tuple[str, ...]:
 def _in_run(plan: TriadPlan, limits: Limits) -> PlannedCheck:
     gyro = plan.triad == "gyro"
     maximum = limits.gyro_bias_in_run_deg_h if gyro else limits.accelerometer_bias_in_run_m_s2
-    return in_run_check(plan, maximum, planned_covariance(plan))
+    level = limits.prediction_p_value_min
+    if maximum is None and level == 0.0:
+        raise BadParameter("limits.prediction_p_value_min", level, "above 0: the limit of the plan is made with it")
+    return in_run_check(plan, maximum, planned_covariance(plan), level or IN_RUN_LEVEL)
 
 
 def _checks(t: TriadVerification, limits: Limits, plan: TriadPlan) -> list[Check]:

@@ -1,6 +1,6 @@
 """Record of a unit before a job: its channels, its noise, its stability from launch to launch."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,6 +28,16 @@ class TriadRecord:
     """Standard deviation of the scale factor from run to run, relative."""
     noise_origin: str = "data sheet"
     """Origin of the coefficients: a data sheet, or the result that found them."""
+    not_observed: tuple[tuple[str, ...], ...] = ((), (), ())
+    """Processes of x, y, z that no launch showed: their coefficients come from upper limits, and are no finding."""
+
+    @property
+    def observed_noise(self) -> tuple[NoiseCoefficients, ...]:
+        """The noise that was declared or found, x, y, z: zero for what no launch showed."""
+        return tuple(
+            replace(noise, **dict.fromkeys(absent, 0.0))
+            for noise, absent in zip(self.noise, self.not_observed, strict=True)
+        )
 
     def launch_covariance(self, outputs: Array) -> Array:
         """Covariance by which outputs K·v (n, 3) of one launch depart from the unit's mean, per channel, (3, n, n).
