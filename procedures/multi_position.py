@@ -193,7 +193,7 @@ def _checks(t: TriadSummary, extended: Extended | None, params: FitParameters) -
     p_value = t.p_value if extended is None else extended.p_value
     if p_value is not None:
         limit = Limit("1", minimum=params.residual_p_value_min)
-        checks.append(check(f"{triad} residuals, p-value of chi-square", p_value, limit, note=f"worst: {t.worst}"))
+        checks.append(check(f"{triad} residuals, p-value of chi-square", p_value, limit, note=t.residual_note))
     elif t.misfit is not None and extended is None:
         limit = Limit("1", maximum=MISFIT_MAX, source="ours")
         name = f"{triad} residuals over what noise and positions allow"

@@ -264,7 +264,7 @@ def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
     ]
     if t.p_value is not None:
         limit = Limit("1", minimum=limits.residual_p_value_min)
-        checks.append(check(f"{triad} residuals, p-value of chi-square", t.p_value, limit, note=f"worst: {t.worst}"))
+        checks.append(check(f"{triad} residuals, p-value of chi-square", t.p_value, limit, note=t.residual_note))
     elif t.misfit is not None:
         limit = Limit("1", maximum=MISFIT_MAX, source="ours")
         checks.append(
