@@ -19,7 +19,7 @@ from procedures.core.errors import UnfitRecording
 from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
 from procedures.core.recording import TRIADS, Recording
 from procedures.core.unit import Unit
-from procedures.procedure import Outcome, Parameters
+from procedures.procedure import JudgedParameters, Outcome, Parameters
 
 SOURCE = "thesis 4.3, 5.6"
 LAUNCH = INSPECTION
@@ -35,7 +35,7 @@ class NoiseLimits(Parameters):
     accelerometer_bias_in_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0, description="bias instability")
 
 
-class NoiseParameters(Parameters):
+class NoiseParameters(JudgedParameters):
     """Steps of the analysis, each can be switched; what it changes is in the result's table of steps."""
 
     cell_s: float = Field(1.0, gt=0.0, le=3600.0, description="cell whose means the slow part works on")

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from procedures.core.decision import RuleName
 from procedures.core.limits import bounds
 from procedures.core.units import converted
 
@@ -38,6 +39,7 @@ class StepLimit(Document):
     unit: str = Field(min_length=1, max_length=32, pattern=TEXT, description="of the limits; deg/h, m/s^2, ppm, 1, …")
     minimum: float | None = None
     maximum: float | None = None
+    rule: RuleName | None = Field(None, description="of the decision on this limit; null: the campaign's")
     source: str = Field(
         "", max_length=300, pattern=TEXT, description="where the limit comes from; a new campaign needs it for each"
     )

@@ -121,6 +121,7 @@ def _lineage(result: StoredResult) -> dict[str, Any]:
         "corrections": list(result.corrections),
         "code_version": result.code_version,
         "job": result.job_id,
+        "statement": result.document.get("statement"),
     }
 
 

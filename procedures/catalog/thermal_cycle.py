@@ -32,7 +32,7 @@ from procedures.core.report import Report
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
 from procedures.core.thermal_correction import Form
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
-from procedures.procedure import STATIONS, Context, Outcome, Parameters, Prediction, Procedure
+from procedures.procedure import STATIONS, Context, JudgedParameters, Outcome, Parameters, Prediction, Procedure
 from procedures.reports import thermal_figures, thermal_tables
 
 LEAST_OFF_S = 3.0 * units.HOUR
@@ -92,7 +92,7 @@ class Limits(Parameters):
     gyro_bias_in_run_deg_h: float = Field(0.015, gt=0.0, le=1e6, description="bias instability in the cycle")
 
 
-class Params(Parameters):
+class Params(JudgedParameters):
     """Profile, analysis and limits of the cycle."""
 
     legs: tuple[Leg, ...] = Field(DEFAULT_LEGS, min_length=1, max_length=100)

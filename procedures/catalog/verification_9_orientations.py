@@ -46,7 +46,7 @@ from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter
-from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, check, significance, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
@@ -264,10 +264,10 @@ def _in_run(plan: TriadPlan, limits: Limits) -> PlannedCheck:
 def _checks(t: TriadVerification, limits: Limits, plan: TriadPlan) -> list[Check]:
     m, planned = t.magnitudes, _in_run(plan, limits)
     size = units.DISPLAY[m.unit][1]
-    checks = [check(planned.check, m.per_axis / size, planned.limit, m.per_axis_sd / size)]
+    checks = [check(planned.check, m.per_axis / size, planned.limit, m.per_axis_sd / size, "", len(m.after) - 1.0)]
     if t.p_value is not None:
-        agreement = Limit("1", minimum=limits.prediction_p_value_min)
-        checks.append(check(f"{m.triad} errors as predicted, p-value of chi-square", t.p_value, agreement))
+        name = f"{m.triad} errors as predicted, p-value of chi-square"
+        checks.append(significance(name, t.p_value, limits.prediction_p_value_min))
     return checks
 
 

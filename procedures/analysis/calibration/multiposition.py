@@ -120,7 +120,7 @@ def fit_triad(
         weighting,
         coefficients,
         plan,
-        table_share(plan, of_table, table),
+        table_share(plan, of_table, table, coefficients.reshape(3, 4)[:, 1:]),
         noise_covariance * factor,
         of_table,
         outputs - plan.modelled(coefficients),

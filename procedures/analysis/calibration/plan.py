@@ -70,7 +70,7 @@ class TriadPlan:
 
     def share(self, plan: Estimator) -> TableShare:
         """Contribution of the table's flaws to the coefficients of this plan."""
-        return table_share(plan, self._of_outputs, self.table)
+        return table_share(plan, self._of_outputs, self.table, self.matrix)
 
     @cached_property
     def _of_outputs(self) -> Array:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from procedures.analysis.calibration.budget import Budget
 from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.misfit import residual_misfit
 from procedures.analysis.calibration.multiposition import TriadFit
@@ -84,6 +85,8 @@ class TriadSummary:
     """Magnitudes out of sample, each station corrected by the fit of the others; None where that cannot be made."""
     suspect: str = ""
     """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared."""
+    budgets: tuple[Budget, ...] = ()
+    """Uncertainty budget of each coefficient; empty in results of older versions."""
 
     @property
     def residual_note(self) -> str:

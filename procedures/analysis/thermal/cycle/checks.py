@@ -6,7 +6,7 @@ import numpy as np
 
 from procedures.analysis.thermal.cycle.results import GyroNoise, ThermalCycle
 from procedures.core import units
-from procedures.core.limits import Check, Limit, PlannedCheck, check
+from procedures.core.limits import Check, Limit, PlannedCheck, check, significance
 from procedures.core.recording import AXES
 
 THESIS = "thesis 4.3, 5.6"
@@ -46,8 +46,11 @@ def cycle_checks(cycle: ThermalCycle, limits: CycleLimits) -> tuple[Check, ...]:
         limit = Limit("1", maximum=limits.allan_rise, source="thesis fig. 4.15: no positive slope")
         found.append(check(f"accelerometer_{name} rise of the Allan deviation", steepest, limit, note="worst run"))
     # Bonferroni: three gyros, one chance.
-    limit = Limit("1", minimum=limits.level / len(AXES), source="thesis table 4.6: no correlation")
-    found += [check(f"gyro_{g.axis} independence of temperature, p-value", g.p_value, limit) for g in cycle.gyros]
+    level, source = limits.level / len(AXES), "thesis table 4.6: no correlation"
+    found += [
+        significance(f"gyro_{g.axis} independence of temperature, p-value", g.p_value, level, source=source)
+        for g in cycle.gyros
+    ]
     for name in AXES:
         noises = [g for g in cycle.gyro_noise if g.axis == name]
         found.append(_noise(f"gyro_{name} random walk in the cycle", noises, 1, limits.gyro_random_walk_deg_sqrt_h))
