@@ -31,7 +31,7 @@ from procedures.analysis.calibration.scalar import require_scalar_determined
 from procedures.analysis.calibration.station_means import launch_warnings
 from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS, windows
 from procedures.analysis.calibration.summary import TriadSummary
-from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers, analyse_triad
+from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers, analyse_gyros
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
@@ -158,8 +158,10 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     _require_scalar(params, plans[1])
     gyro, accelerometer = (context.unit.triad(triad) for triad in TRIAD_NAMES)
-    first = analyse_triad(recordings, "gyro", site, uncertainty, gyro, weighting=params.weighting)
-    correction = context.unit.thermal_correction if params.thermal_correction == "current" else None
+    warm = params.thermal_correction == "current"
+    of_gyros = context.unit.gyro_correction if warm else None
+    first = analyse_gyros(recordings, site, uncertainty, gyro, params.weighting, of_gyros)
+    correction = context.unit.thermal_correction if warm else None
     settings = AccelerometerSettings(
         params.scalar_check, params.weighting, correction, (params.case_lag_s, params.converter_lag_s)
     )
@@ -279,7 +281,7 @@ def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
 PROCEDURE = Procedure(
     *("calibration_12_orientations", "Calibration in twelve orientations", "1.4.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report, calibrations),
-    uses_corrections=lambda params: ("thermal",) if params.thermal_correction == "current" else (),
+    uses_corrections=lambda params: ("thermal", "gyros") if params.thermal_correction == "current" else (),
     quantities=quantities,
     planned_checks=planned_checks,
 )

@@ -39,6 +39,7 @@ from procedures.analysis.calibration.triad_verification import (
     planned_covariance,
     planned_diagnosis,
     verify_at_reference,
+    verify_gyros,
     verify_triad,
 )
 from procedures.analysis.calibration.verification import predicted_sd
@@ -152,7 +153,8 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     site = params.site(context)
     used = context.unit.thermal_correction if params.thermal_correction == "current" else None
     table = params.table(site)
-    doubts, gyro = (), verify_triad(recordings, "gyro", site, context.unit, table)
+    of_gyros = None if used is None else context.unit.gyro_correction
+    doubts, gyro = (), verify_gyros(recordings, site, context.unit, table, of_gyros)
     if used is None:
         accelerometer = verify_triad(recordings, "accelerometer", site, context.unit, table)
     else:
@@ -275,7 +277,7 @@ PROCEDURE = Procedure(
     *("verification_9_orientations", "Verification in nine orientations", "1.2.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report),
     uses_calibration=TRIAD_NAMES,
-    uses_corrections=lambda params: ("thermal",) if params.thermal_correction == "current" else (),
+    uses_corrections=lambda params: ("thermal", "gyros") if params.thermal_correction == "current" else (),
     quantities=quantities,
     planned_checks=planned_checks,
 )

@@ -11,7 +11,7 @@ from bench_service.cli.printing.moments import moment
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.units import DISPLAY
 
-CURRENT = ("gyro_calibration", "accelerometer_calibration", "thermal_correction", "converter")
+CURRENT = ("gyro_calibration", "accelerometer_calibration", "thermal_correction", "converter", "thermometers")
 """Fields of a unit that name what is current of it."""
 
 
@@ -144,6 +144,16 @@ def result_table(results: list[dict[str, Any]]) -> Table:
     return table
 
 
+def batch_table(batches: list[dict[str, Any]]) -> Table:
+    """Table of batches of analyses, newest first."""
+    table = _table("batch", "method", "state", "analyses", "done", "reused", "failed", "submitted")
+    for one in batches:
+        numbers = (str(one["counts"][state]) for state in ("done", "reused", "failed"))
+        made = moment(one["created_at"])
+        table.add_row(one["id"], Text(one["method"]), one["state"], str(one["total"]), *numbers, made)
+    return table
+
+
 def unit_table(units: list[dict[str, Any]]) -> Table:
     """Table of units with what is current of each."""
     table = _table("unit", "rate, Hz", "channels", *(name.replace("_", " ") for name in CURRENT))
@@ -229,4 +239,33 @@ def _table(*columns: str, title: str | None = None) -> Table:
     table = Table(title=title)
     for number, column in enumerate(columns):
         table.add_column(column, no_wrap=number == 0)
+    return table
+
+
+def live_table(bench: str, live: dict[str, Any]) -> Table:
+    """Table of a bench's live readings; one row a reading."""
+    table = Table(title=f"bench {bench}, {moment(live['at'])}")
+    table.add_column("reading")
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("unit")
+    devices, manual = live["devices"], live["manual"]
+    rates = devices["rates_deg_s"] or (None, None, None)
+    for axis, rate in zip(("outer", "middle", "inner"), rates, strict=True):
+        table.add_row(f"{axis} angle", f"{devices[f'{axis}_deg']:.4f}", "deg")
+        if rate is not None:
+            table.add_row(f"{axis} rate", f"{rate:.4f}", "deg/s")
+    table.add_row("table", "moves" if devices["moving"] else "rests", "")
+    chamber = devices["chamber"]
+    if chamber is not None:
+        table.add_row("air", f"{chamber['air_c']:.2f}", "°C")
+        target = "off" if chamber["target_c"] is None else f"{chamber['target_c']:.2f}"
+        table.add_row("set point", target, "°C")
+    table.add_row("supply", "on" if devices["unit_on"] else "off", "")
+    for name, unit in (("voltage_v", "V"), ("current_a", "A")):
+        if devices[name] is not None:
+            table.add_row(f"supply {name.partition('_')[0]}", f"{devices[name]:.3f}", unit)
+    for sensor in [] if manual is None else manual["sensors"]:
+        table.add_row(sensor["name"], f"{sensor['value']:.6g}", sensor["unit"])
+    for word in devices["status"]:
+        table.add_row(f"{word['device']} {word['name']}", word["raw"], ", ".join(word["bits"]))
     return table

@@ -14,6 +14,7 @@ import uvicorn
 from bench_service.api.access.identify import Proxies, behind_proxies
 from bench_service.api.http.door import Door, may_listen
 from bench_service.app import create_app, open_service
+from bench_service.cli.processes.allocator import few_arenas
 from bench_service.cli.processes.connections import AT_ONCE, BoundedConnections, lengthen_queue, raise_descriptors
 from bench_service.cli.processes.logs import set_up
 from bench_service.cli.processes.private_files import protect
@@ -67,6 +68,7 @@ def _opened(
 ) -> Generator[tuple[uvicorn.Server, BenchService]]:
     set_up(settings, level)
     protect(settings)
+    few_arenas()
     BoundedConnections.most = raise_descriptors()
     if socket_file is None:
         check_address(settings)

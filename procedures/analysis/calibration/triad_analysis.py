@@ -13,6 +13,7 @@ from procedures.analysis.calibration.reference import INPUT_UNITS, reference_mag
 from procedures.analysis.calibration.reference_temperature import (
     ThermalShare,
     bring_to_reference,
+    gyros_at_reference,
     thermal_share,
     thermal_warnings,
 )
@@ -30,6 +31,7 @@ from procedures.analysis.calibration.table_errors import TableErrors, TableUncer
 from procedures.analysis.calibration.verification import magnitudes
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
+from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.recording import Recording
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
@@ -49,6 +51,21 @@ def analyse_triad(
     """Calibrate one triad from one recording a station. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
     means = station_means(recordings, triad)
     return analyse_means(means, site, uncertainty, record, with_scalar, weighting)[0]
+
+
+def analyse_gyros(
+    recordings: Sequence[Recording],
+    site: Site,
+    uncertainty: TableUncertainty,
+    record: TriadRecord | None,
+    weighting: Weighting = "noise_and_table",
+    correction: GyroThermalCorrection | None = None,
+) -> TriadSummary:
+    """Calibrate the gyros, by a correction for temperature first where there is one. Raises as `analyse_triad`."""
+    means, more = station_means(recordings, "gyro"), None
+    if correction is not None:
+        means, more = gyros_at_reference(recordings, means, correction)
+    return analyse_means(means, site, uncertainty, record, False, weighting, more)[0]
 
 
 def analyse_means(
