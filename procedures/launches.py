@@ -22,7 +22,7 @@ from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import TRIADS, Recording
 from procedures.core.unit import Unit
-from procedures.procedure import Outcome, Parameters
+from procedures.procedure import JudgedParameters, Outcome, Parameters
 
 SOURCE = "thesis 4.3, 5.6"
 LAUNCH = INSPECTION
@@ -52,7 +52,7 @@ class NoiseLimits(Parameters):
     vibration_m_s2: float | None = Field(None, gt=0.0, description="the same by the accelerometers")
 
 
-class NoiseParameters(Parameters):
+class NoiseParameters(JudgedParameters):
     """Steps of the analysis, each can be switched; what it changes is in the result's table of steps."""
 
     cell_s: float = Field(1.0, gt=0.0, le=3600.0, description="cell whose means the slow part works on")
@@ -214,7 +214,7 @@ def noise_checks(params: NoiseParameters, unit: Unit, duration_s: float, launche
     for triad, process, name, size, field in LIMITED:
         record = unit.triad(triad)
         limit = Limit(name, maximum=getattr(params.noise_limits, field), source=SOURCE)
-        for channel, noise in zip(TRIADS[triad], record.noise if record else (), strict=False):
+        for channel, noise in zip(TRIADS[triad], record.observed_noise if record else (), strict=False):
             of_process = [p for p in predicted_noise(channel, noise, duration_s, launches) if p.process == process]
             check_name = f"{channel} {process.replace('_', ' ')}"
             for p in of_process:

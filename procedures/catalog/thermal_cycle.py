@@ -32,7 +32,7 @@ from procedures.core.report import Report
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
 from procedures.core.thermal_correction import Form
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
-from procedures.procedure import STATIONS, Context, Outcome, Parameters, Prediction, Procedure
+from procedures.procedure import STATIONS, Context, JudgedParameters, Outcome, Prediction, Procedure
 from procedures.reports import thermal_figures, thermal_tables
 from procedures.thermal_parameters import DEFAULT_LEGS, Leg, Limits, Regime, Soak
 
@@ -40,7 +40,7 @@ LEAST_OFF_S = 3.0 * units.HOUR
 """Least time switched off between runs, three hours (thesis 4.2.1)."""
 
 
-class Params(Parameters):
+class Params(JudgedParameters):
     """Profile, analysis and limits of the cycle."""
 
     legs: tuple[Leg, ...] = Field(DEFAULT_LEGS, min_length=1, max_length=100)

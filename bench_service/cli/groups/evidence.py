@@ -130,6 +130,9 @@ def recordings(
 def results(
     context: typer.Context,
     result: Annotated[str | None, typer.Argument(help="Id of one result, to be shown whole")] = None,
+    budget: Annotated[
+        str | None, typer.Option(help="With an id: only the uncertainty budget of this coefficient (gyro.K11)")
+    ] = None,
     name: Annotated[str | None, typer.Option(help="Only of this procedure or method")] = None,
     unit: Annotated[str | None, typer.Option(help="Only of this unit")] = None,
     verdict: Verdict = None,
@@ -148,10 +151,22 @@ def results(
     with connect(context.obj, server, drive=False) as client:
         if result is not None:
             found = call(client, "GET", f"/api/v1/results/{segment(result)}", (*RESULT, "name"))
+            if budget is not None and not as_json:
+                _print_budget(found, budget)
+                return
             _print_result(found["name"], found, as_json)
             return
         page = newest(client, "/api/v1/results", limit, {**query, "label": label, "text": text})
     show(page if as_json else page["items"], as_json, result_table)
+
+
+def _print_budget(result: dict[str, Any], coefficient: str) -> None:
+    from bench_service.cli.printing.tables import budget_table
+
+    try:
+        console.print(budget_table(result["document"], coefficient))
+    except KeyError as error:
+        raise typer.BadParameter(f"{coefficient} is not among {error.args[0]}", param_hint="--budget") from error
 
 
 def _print_result(name: str, result: dict[str, Any], as_json: bool) -> None:
