@@ -52,6 +52,7 @@ from bench_service.collector import no_collection
 from bench_service.drivers.composition import devices_of, driver_of, own_devices
 from bench_service.drivers.simulated import drawn_unit
 from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.spread_processes import spread_processes
 from bench_service.evidence.work_processes import WorkProcesses
 from bench_service.jobs.dispatcher import Dispatcher, JobEngine
 from bench_service.jobs.events.hub import EventHub
@@ -191,8 +192,9 @@ def _drive(
     heartbeat = Heartbeat(board, stores.live)
     heartbeat.begin()
     closing.callback(heartbeat.end)
+    spread = spread_processes(closing)
     runner = InstrumentedRunner(
-        stores, planner, driver, code, lease.held, board, settings.retry_scale, traces, files.stopped
+        stores, planner, driver, code, lease.held, board, settings.retry_scale, traces, files.stopped, spread
     )
     worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease, files))
     guard = files.guard(runner.stop_now, worker.wake)

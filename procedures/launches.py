@@ -9,7 +9,8 @@ from typing import Literal, TypeVar
 
 from pydantic import Field
 
-from procedures.analysis.launch.analysis import INSPECTION, analyse_launch
+from procedures.analysis.launch.analysis import INSPECTION
+from procedures.analysis.launch.analysis import analyse_launches as all_launches
 from procedures.analysis.launch.prediction import predicted_noise
 from procedures.analysis.launch.results import LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
@@ -94,7 +95,8 @@ def analyse_launches(result: type[R], recordings: Sequence[Recording], params: N
     if not recordings:
         raise UnfitRecording("there is no recording to analyse")
     settings = params.settings()
-    launches = tuple(analyse_launch(r, _label(r, i), settings) for i, r in enumerate(recordings, start=1))
+    labels = [_label(r, i) for i, r in enumerate(recordings, start=1)]
+    launches = all_launches(recordings, labels, settings)
     names = {tuple((c.channel, c.rate_unit) for c in launch.channels) for launch in launches}
     if len(names) > 1:
         raise UnfitRecording("the recordings have different channels: analyse them one by one")
