@@ -14,6 +14,8 @@ from threadpoolctl import threadpool_limits
 from bench_service.api import (
     audit,
     audit_chain,
+    batches,
+    console,
     database,
     health,
     metrics,
@@ -23,6 +25,7 @@ from bench_service.api import (
     reservations,
     results,
     samples,
+    storage,
     trends,
 )
 from bench_service.api.access import guard, identify
@@ -51,7 +54,8 @@ from bench_service.drivers.composition import devices_of, driver_of, own_devices
 from bench_service.drivers.simulated import drawn_unit
 from bench_service.driving import driving
 from bench_service.evidence.catalogue import Catalogue
-from bench_service.evidence.work_processes import WorkProcesses
+from bench_service.evidence.reports.printing_process import open_printing
+from bench_service.evidence.work_processes import WorkApart, WorkProcesses
 from bench_service.jobs.events.hub import EventHub
 from bench_service.jobs.planning import Planner
 from bench_service.pages import (
@@ -73,6 +77,7 @@ from bench_service.persistence import Database, lease_holder, open_stores
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
 from bench_service.persistence.evidence.analysis_run import open_run
+from bench_service.persistence.evidence.batch_running import runner_maker
 from bench_service.persistence.upkeep.contents import DatabaseContents
 from bench_service.service import BenchService
 from bench_service.settings import Settings
@@ -89,6 +94,7 @@ ROUTERS = (
     jobs,
     recordings,
     samples,
+    batches,
     results,
     units,
     calibrations,
@@ -102,10 +108,12 @@ ROUTERS = (
     access,
     audit,
     database,
+    storage,
     audit_chain,
     health,
     metrics,
     feed,
+    *console.PARTS,
 )
 PAGES = (
     static_files,
@@ -166,7 +174,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         rescued=rescued,
         processes=processes,
         database=DatabaseContents(opened),
-        scrub_at=settings.scrub_at,
+        settings=settings,
+        runner=runner_maker(opened, settings.database_url, code, closing, apart),
     )
     if settings.audit_days is not None:
         begin_retention(stores.audit, timedelta(days=settings.audit_days), closing)
@@ -185,14 +194,15 @@ def _roads(settings: Settings, opened: Database, closing: ExitStack) -> StopRoad
     return StopRoads(settings.devices_in(), addresses.road, addresses.host)
 
 
-def _work_apart(settings: Settings, code: str, closing: ExitStack) -> WorkProcesses:
-    """Processes for analyses; figures are drawn in another one from now on."""
+def _work_apart(settings: Settings, code: str, closing: ExitStack) -> WorkApart:
+    """Processes for analyses and for printing; figures are drawn in another one from now on."""
     processes = WorkProcesses(open_run, settings.database_url, code)
     drawing = WorkProcesses(open_drawing, at_once=1, waiting=DRAWINGS)
+    printing = WorkProcesses(open_printing, at_once=1)
     figures.draw_in(drawing)
-    for undo in (processes.close, drawing.close, partial(figures.draw_in, None)):
+    for undo in (processes.close, drawing.close, printing.close, partial(figures.draw_in, None)):
         closing.callback(undo)
-    return processes
+    return WorkApart(processes, printing)
 
 
 def _devices(settings: Settings, bench_id: str) -> BenchDevices:

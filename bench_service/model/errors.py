@@ -22,10 +22,12 @@ ServiceError
 ├── NotUnderstood        a job was stored by a version whose format this one does not know
 ├── NotMounted           this bench does not have that unit
 ├── MountingChanged      the unit was mounted anew, or taken off, since the job was planned
+├── RawDataRemoved       the raw data of a recording were removed by a rule
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
     ├── DamagedDatabase   the database's file is damaged
     ├── DatabaseMoved     the database's file was deleted or replaced while it was open
+    ├── ArchiveAway       the archive of raw data cannot be reached or written
     ├── DamagedRecording  the stored bytes of a recording are not those written
     └── UnfitValue        a value cannot be stored, now or later
 """
@@ -162,6 +164,10 @@ class NotUnderstood(ServiceError):
         )
 
 
+class RawDataRemoved(ServiceError):
+    """Raised where raw data are wanted that a retention rule removed; the message says where their hash is."""
+
+
 class StorageFull(ServiceError):
     """Raised where the database cannot grow: the disk is full."""
 
@@ -176,6 +182,10 @@ class DamagedDatabase(StorageFailure):
 
 class DatabaseMoved(StorageFailure):
     """Raised where the file of the database is no longer the one that was opened."""
+
+
+class ArchiveAway(StorageFailure):
+    """Raised where the archive of raw data cannot be reached, read or written."""
 
 
 class DamagedRecording(StorageFailure):

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from procedures.bench.chamber import ChamberLimits
+from procedures.bench.chamber import ChamberAccuracy, ChamberLimits
 from procedures.bench.current_source import CurrentSourceLimits
 from procedures.bench.declared_device import DeclaredDevice
 from procedures.bench.supply import SupplyLimits
@@ -72,6 +72,8 @@ class BenchDescription:
     """Policy for a certificate that has expired: no job is planned, or its result is marked."""
     no_thermal_jobs: str = ""
     """The reason why no job that reads temperatures can run here; empty: one can, where there is a chamber."""
+    chamber_accuracy: ChamberAccuracy | None = None
+    """Accuracy of the chamber by its certificate; None: not declared, so that it cannot calibrate thermometers."""
 
     @property
     def origin(self) -> Literal["real", "mixed", "simulated"]:

@@ -19,8 +19,19 @@ def worker(
     context: typer.Context,
     bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
     bench_file: BenchFile = None,
+    analyse: Annotated[
+        bool, typer.Option("--analyse", help="Drive no bench: run batches of analyses, on any machine")
+    ] = False,
+    at_once: Annotated[int, typer.Option(min=1, max=256, help="With --analyse: processes, one thread each")] = 1,
 ) -> None:
     """Run the jobs of a bench, without HTTP, until SIGTERM or SIGINT. Its running job is left for the next start."""
+    if analyse:
+        from bench_service.cli.processes.analysing import analyse_until_ended
+
+        if bench is not None or bench_file is not None:
+            raise Refused("--analyse: such a worker drives no bench; leave --bench and --bench-file out")
+        analyse_until_ended(context.obj, at_once, announce)
+        return
     from bench_service.cli.processes.working import work
 
     settings = of_bench(context.obj, bench, bench_file)
