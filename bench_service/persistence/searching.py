@@ -3,10 +3,11 @@
 Ids sort by time, so a moment bounds the ids too: a search for an old month does not walk over everything newer.
 """
 
+from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Any, TypeVar
 
-from sqlalchemy import ColumnElement, Select, exists, or_, select
+from sqlalchemy import ColumnElement, Select, exists, func, or_, select
 from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.orm import InstrumentedAttribute
 from sqlalchemy.sql.functions import FunctionElement
@@ -36,7 +37,7 @@ def find_jobs(query: S, search: Search) -> S:
     if search.text is None:
         return query
     named = (JobRow.id, JobRow.procedure, JobRow.unit, JobRow.bench, JobRow.requested_by)
-    return query.where(or_(*(_holds(column, search.text) for column in named), _label_holds(search.text, JobRow.id)))
+    return query.where(or_(_one_holds(named, search.text), _label_holds(search.text, JobRow.id)))
 
 
 def find_recordings(query: S, search: Search) -> S:
@@ -53,7 +54,7 @@ def find_recordings(query: S, search: Search) -> S:
     named = (RecordingRow.id, RecordingRow.unit, RecordingRow.bench, RecordingRow.job_id, station)
     in_job = _label_holds(search.text, RecordingRow.job_id)
     in_file = exists(select(files.c.name).where(_holds(files.c.name, search.text)))
-    return query.where(or_(*(_holds(column, search.text) for column in named), in_job, in_file))
+    return query.where(or_(_one_holds(named, search.text), in_job, in_file))
 
 
 def find_results(query: S, search: Search) -> S:
@@ -66,7 +67,7 @@ def find_results(query: S, search: Search) -> S:
         return query
     named = (ResultRow.id, ResultRow.name, ResultRow.unit, ResultRow.job_id)
     in_job = _label_holds(search.text, ResultRow.job_id)
-    return query.where(or_(*(_holds(column, search.text) for column in named), in_job))
+    return query.where(or_(_one_holds(named, search.text), in_job))
 
 
 def _made(query: S, key: InstrumentedAttribute[str], at: InstrumentedAttribute[datetime], search: Search) -> S:
@@ -94,8 +95,15 @@ def _has_label(label: LabelSought, job: ColumnElement[Any] | InstrumentedAttribu
 
 
 def _label_holds(text: str, job: ColumnElement[Any] | InstrumentedAttribute[Any]) -> ColumnElement[bool]:
-    found = or_(_holds(JobLabelRow.name, text), _holds(JobLabelRow.value, text))
-    return job.in_(select(JobLabelRow.job_id).where(found))
+    return job.in_(select(JobLabelRow.job_id).where(_one_holds((JobLabelRow.name, JobLabelRow.value), text)))
+
+
+def _one_holds(columns: Sequence[Any], text: str) -> ColumnElement[bool]:
+    """Return whether one of some columns holds a text: one comparison with all of them in a row, a line each."""
+    joined = func.coalesce(columns[0], "")
+    for column in columns[1:]:
+        joined = joined.concat("\n").concat(func.coalesce(column, ""))
+    return or_(*(_holds(column, text) for column in columns)) if "\n" in text else _holds(joined, text)
 
 
 def _holds(column: Any, text: str) -> ColumnElement[bool]:

@@ -12,6 +12,8 @@ from bench_service.persistence.database import Database
 
 UNITS = 1000
 """Units that share the history; every tenth job is of the unit `U-0`, for a long trend."""
+LOTS, CUSTOMERS = 500, 37
+"""Values of the two labels of a job."""
 PER_JOB = 10
 """Recordings of a job."""
 STEP_MS = 300_000
@@ -86,7 +88,7 @@ class _Rows:
         unit = f"CASE WHEN n % 10 = 0 THEN 'U-0' ELSE 'U-' || (n % {UNITS}) END"
         verdict = "CASE WHEN n % 7 = 0 THEN 'fail' ELSE 'pass' END"
         labels = self._dialect.json.format(
-            x='\'{"lot": "\' || (n % 500) || \'", "customer": "customer \' || (n % 37) || \'"}\''
+            x='\'{"lot": "\' || (n % {LOTS}) || \'", "customer": "customer \' || (n % {CUSTOMERS}) || \'"}\''
         )
         moment, series = self._dialect.moment.format(x=at), self._dialect.series
         of_recording = f"(SELECT n, k FROM {series}, ({self._small(PER_JOB)}) small) s"
@@ -113,8 +115,8 @@ class _Rows:
         return [
             self._insert("jobs", "id = :job", jobs, series),
             self._insert("results", "id = :result", results, series),
-            f"INSERT INTO job_labels (job_id, name, value) SELECT {job}, 'lot', '' || (n % 500) FROM {series}",
-            f"INSERT INTO job_labels (job_id, name, value) SELECT {job}, 'customer', 'customer ' || (n % 37) FROM {series}",
+            self._label("lot", f"'' || (n % {LOTS})", job, series),
+            self._label("customer", f"'customer ' || (n % {CUSTOMERS})", job, series),
             self._insert("recordings", "id = :recording", recordings, of_recording),
             self._insert("result_quantities", "result_id = :result", {"result_id": self._id("n", 2)}, series),
             self._insert(
@@ -125,6 +127,9 @@ class _Rows:
             ),
             self._insert("events", "job_id = :job AND sequence <= 3", {"job_id": job, "at": moment}, series),
         ]
+
+    def _label(self, name: str, value: str, job: str, series: str) -> str:
+        return f"INSERT INTO job_labels (job_id, name, value) SELECT {job}, '{name}', {value} FROM {series}"
 
     def _insert(self, table: str, template: str, changed: dict[str, str], series: str) -> str:
         names = self._columns[table]
