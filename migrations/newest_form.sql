@@ -1,4 +1,4 @@
--- revision 0016
+-- revision 0021
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -118,7 +118,7 @@ CREATE TABLE bench_stops (
 	safe_by VARCHAR NOT NULL, 
 	released_at DATETIME, 
 	released_by VARCHAR NOT NULL, 
-	remark VARCHAR NOT NULL, 
+	remark VARCHAR NOT NULL, entered_at DATETIME, 
 	CONSTRAINT pk_bench_stops PRIMARY KEY (id)
 );
 
@@ -181,7 +181,7 @@ CREATE TABLE campaigns (
 	name VARCHAR NOT NULL, 
 	document JSON NOT NULL, 
 	created_at DATETIME NOT NULL, 
-	updated_at DATETIME NOT NULL, 
+	updated_at DATETIME NOT NULL, team VARCHAR DEFAULT '' NOT NULL, 
 	CONSTRAINT pk_campaigns PRIMARY KEY (name)
 );
 
@@ -207,6 +207,18 @@ CREATE TABLE coefficients (
 	CONSTRAINT fk_coefficients_calibration_id_calibrations FOREIGN KEY(calibration_id) REFERENCES calibrations (id)
 );
 
+CREATE TABLE correction_decisions (
+	id VARCHAR NOT NULL, 
+	correction_id VARCHAR NOT NULL, 
+	act VARCHAR NOT NULL, 
+	at DATETIME NOT NULL, 
+	"by" VARCHAR NOT NULL, 
+	proven BOOLEAN NOT NULL, 
+	remark VARCHAR NOT NULL, 
+	CONSTRAINT pk_correction_decisions PRIMARY KEY (id), 
+	CONSTRAINT fk_correction_decisions_correction_id_corrections FOREIGN KEY(correction_id) REFERENCES corrections (id)
+);
+
 CREATE TABLE corrections (
 	id VARCHAR NOT NULL, 
 	unit VARCHAR NOT NULL, 
@@ -215,7 +227,7 @@ CREATE TABLE corrections (
 	made_at DATETIME NOT NULL, 
 	is_current BOOLEAN NOT NULL, 
 	simulated BOOLEAN NOT NULL, 
-	document JSON NOT NULL, 
+	document JSON NOT NULL, approval VARCHAR DEFAULT 'open' NOT NULL, valid_until DATETIME, 
 	CONSTRAINT pk_corrections PRIMARY KEY (id), 
 	CONSTRAINT fk_corrections_result_id_results FOREIGN KEY(result_id) REFERENCES results (id)
 );
@@ -278,8 +290,44 @@ CREATE TABLE jobs (
 	started_at DATETIME, 
 	finished_at DATETIME, 
 	result_id VARCHAR, 
-	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, mounting VARCHAR, 
+	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, mounting VARCHAR, team VARCHAR DEFAULT '' NOT NULL, 
 	CONSTRAINT pk_jobs PRIMARY KEY (id)
+);
+
+CREATE TABLE manual_demands (
+	id VARCHAR NOT NULL, 
+	lease VARCHAR NOT NULL, 
+	"key" VARCHAR NOT NULL, 
+	kind VARCHAR NOT NULL, 
+	"values" JSON NOT NULL, 
+	"by" VARCHAR NOT NULL, 
+	at DATETIME NOT NULL, 
+	state VARCHAR NOT NULL, 
+	answer JSON NOT NULL, 
+	ended_at DATETIME, 
+	CONSTRAINT pk_manual_demands PRIMARY KEY (id), 
+	CONSTRAINT uq_manual_demands_lease_key UNIQUE (lease, "key")
+);
+
+CREATE TABLE manual_leases (
+	id VARCHAR NOT NULL, 
+	bench VARCHAR NOT NULL, 
+	unit VARCHAR NOT NULL, 
+	holder VARCHAR NOT NULL, 
+	proven BOOLEAN NOT NULL, 
+	reason VARCHAR NOT NULL, 
+	created_at DATETIME NOT NULL, 
+	until DATETIME NOT NULL, 
+	team VARCHAR NOT NULL, 
+	reservation VARCHAR, 
+	began_at DATETIME, 
+	process VARCHAR NOT NULL, 
+	heard INTEGER NOT NULL, 
+	end_asked VARCHAR NOT NULL, 
+	ended_at DATETIME, 
+	ended_because VARCHAR NOT NULL, 
+	safe BOOLEAN, 
+	CONSTRAINT pk_manual_leases PRIMARY KEY (id)
 );
 
 CREATE TABLE mountings (
@@ -446,6 +494,16 @@ CREATE TABLE tokens (
 	CONSTRAINT pk_tokens PRIMARY KEY (id)
 );
 
+CREATE TABLE unit_notes (
+	id VARCHAR NOT NULL, 
+	unit VARCHAR NOT NULL, 
+	at DATETIME NOT NULL, 
+	"by" VARCHAR NOT NULL, 
+	proven BOOLEAN NOT NULL, 
+	text VARCHAR NOT NULL, 
+	CONSTRAINT pk_unit_notes PRIMARY KEY (id)
+);
+
 CREATE TABLE units (
 	serial VARCHAR NOT NULL, 
 	document JSON NOT NULL, 
@@ -484,6 +542,8 @@ CREATE INDEX ix_campaign_runs_campaign_id ON campaign_runs (campaign, id);
 
 CREATE INDEX ix_campaign_runs_state_id ON campaign_runs (state, id);
 
+CREATE INDEX ix_correction_decisions_correction_id_id ON correction_decisions (correction_id, id);
+
 CREATE INDEX ix_corrections_unit_id ON corrections (unit, id);
 
 CREATE INDEX ix_job_labels_name_job_id ON job_labels (name, job_id);
@@ -505,6 +565,12 @@ CREATE INDEX ix_jobs_state_id ON jobs (state, id);
 CREATE INDEX ix_jobs_unit_id ON jobs (unit, id);
 
 CREATE INDEX ix_jobs_verdict_id ON jobs (verdict, id);
+
+CREATE INDEX ix_manual_demands_lease_id ON manual_demands (lease, id);
+
+CREATE INDEX ix_manual_leases_bench_id ON manual_leases (bench, id);
+
+CREATE UNIQUE INDEX ix_manual_leases_open ON manual_leases (bench) WHERE ended_at IS NULL;
 
 CREATE INDEX ix_mountings_bench_id ON mountings (bench, id);
 
@@ -546,6 +612,8 @@ CREATE UNIQUE INDEX ix_tokens_digest ON tokens (digest);
 
 CREATE INDEX ix_tokens_name ON tokens (name);
 
+CREATE INDEX ix_unit_notes_unit_id ON unit_notes (unit, id);
+
 CREATE INDEX ix_upkeep_kind_id ON upkeep (kind, id);
 
 CREATE UNIQUE INDEX uq_calibrations_current_unit_triad ON calibrations (unit, triad) WHERE is_current;
@@ -558,5 +626,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0016');
+INSERT INTO "alembic_version" VALUES ('0021');
 

@@ -7,13 +7,14 @@ from fastapi import APIRouter, Query, Response
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 
-from bench_service.api import batches, storage
 from bench_service.api.batches import BatchView, RecordingSelection
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, RequestedBy, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.fields import NAME, Request
+from bench_service.api.http.printed import PDF, PRINTED, printed
 from bench_service.api.http.queries import Searched
 from bench_service.evidence.analyses import AnalysisRequest
+from bench_service.evidence.recomputation import Recomputation
 from bench_service.mapping import copied
 from bench_service.model.batches import BatchRequest, Grouping
 from bench_service.model.records import StoredResult
@@ -24,8 +25,6 @@ from procedures.core.mounting import Mounting
 from procedures.core.report import Figure, Table
 
 router = APIRouter(prefix="/api/v1", tags=["analyses"])
-router.include_router(batches.router)
-router.include_router(storage.router)
 
 
 class AnalysisSubmission(Request):
@@ -170,6 +169,18 @@ def read_report(result_id: str, service: Service) -> ReportView:
         for section in report.sections
     ]
     return ReportView(summary=report.summary, sections=sections)
+
+
+@router.get("/results/{result_id}/report.pdf", response_class=Response, responses={**problems(404), **PDF})
+async def read_printed_report(result_id: str, service: Service) -> Response:
+    """Read a result's report as PDF/A-3, with the result attached as JSON. Refused with 503 where too many wait."""
+    return printed(await PRINTED.run(service.reports.of_result, result_id), f"{result_id}.pdf")
+
+
+@router.post("/results/{result_id}/recomputation", responses=problems(404, 409, 507))
+def recompute(result_id: str, service: Service) -> Recomputation:
+    """Hash a result's stored samples and compute it again with the code of now; nothing is stored."""
+    return service.recomputations.recomputed(result_id)
 
 
 @router.get("/results/{result_id}", responses=problems(404))

@@ -21,8 +21,10 @@ from bench_service.cli.groups import (
     evidence,
     importing,
     jobs,
+    manual,
     mountings,
     plans,
+    reports,
     reservations,
     services,
     storage,
@@ -61,6 +63,7 @@ PANELS = {
         plans.methods,
         evidence.analyse,
         evidence.results,
+        reports.report,
         units.units,
         calibrations.calibrations,
     ),
@@ -78,6 +81,7 @@ app.add_typer(calibrations.calibration, name="calibration", rich_help_panel="Evi
 app.add_typer(certificates.certificate, name="certificate", rich_help_panel="Evidence")
 app.add_typer(batches.batches, name="batch", rich_help_panel="Evidence")
 app.add_typer(mountings.mounting, name="mounting", rich_help_panel="Service and bench")
+app.add_typer(manual.manual, name="manual", rich_help_panel="Service and bench")
 app.add_typer(campaigns.campaigns, name="campaign", rich_help_panel="Jobs")
 app.add_typer(campaigns.schedules, name="schedule", rich_help_panel="Jobs")
 app.add_typer(storage.storage, name="storage", rich_help_panel="Database")

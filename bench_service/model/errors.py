@@ -16,6 +16,7 @@ ServiceError
 ├── NotAllowed           the role or the team does not have this right
 ├── WrongPassword        name or password is wrong
 ├── LockedOut            too many failed log-ins
+├── ManualRefused        manual mode cannot begin now, or its lease has ended
 ├── AlreadyReserved      another holder has reserved this bench or unit
 ├── Overloaded           too much is requested at one time
 ├── NotUnderstood        a job was stored by a version whose format this one does not know
@@ -130,6 +131,10 @@ class LockedOut(ServiceError):
     def __init__(self, message: str, wait_s: float) -> None:
         super().__init__(message)
         self.wait_s = wait_s
+
+
+class ManualRefused(ServiceError):
+    """Raised where manual mode cannot begin on a bench now, or where its lease has ended."""
 
 
 class AlreadyReserved(ServiceError):

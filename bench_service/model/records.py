@@ -104,6 +104,8 @@ class BenchStop:
     released_by: str = ""
     remark: str = ""
     """Remark of the person who released it."""
+    entered_at: datetime | None = field(default=None, compare=False)
+    """Time when the database took it, later than `at` where it was away; None: not stored, or stored before 0014."""
 
     @property
     def stands(self) -> bool:

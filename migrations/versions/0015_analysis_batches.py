@@ -1,13 +1,13 @@
 """batches of analyses, their tasks, and results by the content that they were made from
 
-Revision: 0015, after 0012
+Revision: 0015, after 0014
 """
 
 import sqlalchemy as sa
 from alembic import op
 
 revision = "0015"
-down_revision = "0012"
+down_revision = "0014"
 branch_labels = None
 depends_on = None
 

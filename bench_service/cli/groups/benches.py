@@ -90,7 +90,7 @@ def queue(
     from bench_service.cli.printing.tables import queue_table
 
     with connect(context.obj, server, drive=False) as client:
-        path = f"/api/v1/benches/{segment(_bench_of(client, context.obj, bench))}/queue"
+        path = f"/api/v1/benches/{segment(bench_of(client, context.obj, bench))}/queue"
         found = call(client, "GET", path, ("bench", "entries"))
     if as_json:
         print(json.dumps(found, indent=2))
@@ -112,7 +112,7 @@ def release(
 ) -> None:
     """Release a stop of a bench, once the bench is known to be safe; its jobs go on when no stop stands."""
     with connect(context.obj, server, drive=False) as client:
-        name = _bench_of(client, context.obj, bench)
+        name = bench_of(client, context.obj, bench)
         path = f"/api/v1/benches/{segment(name)}"
         if stop_id is None:
             stop_id = _only_stop(call(client, "GET", path, ("stops",))["stops"], name)
@@ -123,7 +123,7 @@ def release(
     console.print(f"stop {stop_id} of bench {name} is released{left}", soft_wrap=True)
 
 
-def _bench_of(client: "httpx.Client", settings: Settings, bench: str | None) -> str:
+def bench_of(client: "httpx.Client", settings: Settings, bench: str | None) -> str:
     """Return the bench that is meant: the given one, the only one, or that of the settings. Raises `Refused`."""
     if bench is not None:
         return bench

@@ -77,7 +77,7 @@ def export(
     form: Annotated[str, typer.Option("--format", help="Format of the files in a .zip")] = "csv",
     server: Server = None,
 ) -> None:
-    """Take a recording's samples out as .csv, .parquet, .arrow, .npy, .feather, .h5 or .mat; a job's as .zip."""
+    """Take a recording's samples out as .csv, .parquet, .arrow, .npy, .feather, .h5, .mat or .mcap; a job's as .zip."""
     options: dict[str, Any] = {"channels": channels, "start_s": start_s, "stop_s": stop_s}
     treated = {"values": values, "corrected_by": corrected_by, "decimate": decimate}
     ending = output.suffix.removeprefix(".")
@@ -85,7 +85,7 @@ def export(
     if ending == "zip":
         path = f"/api/v1/jobs/{segment(recording)}/samples"
         ending = form
-    elif ending in ("feather", "h5", "mat") or any(treated.values()):
+    elif ending in ("feather", "h5", "mat", "mcap") or any(treated.values()):
         path = f"/api/v1/recordings/{segment(recording)}/samples"
     query = {"format": ending, **{k: v for k, v in {**options, **treated}.items() if v is not None}}
     check_folder(output)
@@ -130,6 +130,9 @@ def recordings(
 def results(
     context: typer.Context,
     result: Annotated[str | None, typer.Argument(help="Id of one result, to be shown whole")] = None,
+    budget: Annotated[
+        str | None, typer.Option(help="With an id: only the uncertainty budget of this coefficient (gyro.K11)")
+    ] = None,
     name: Annotated[str | None, typer.Option(help="Only of this procedure or method")] = None,
     unit: Annotated[str | None, typer.Option(help="Only of this unit")] = None,
     verdict: Verdict = None,
@@ -148,10 +151,22 @@ def results(
     with connect(context.obj, server, drive=False) as client:
         if result is not None:
             found = call(client, "GET", f"/api/v1/results/{segment(result)}", (*RESULT, "name"))
+            if budget is not None and not as_json:
+                _print_budget(found, budget)
+                return
             _print_result(found["name"], found, as_json)
             return
         page = newest(client, "/api/v1/results", limit, {**query, "label": label, "text": text})
     show(page if as_json else page["items"], as_json, result_table)
+
+
+def _print_budget(result: dict[str, Any], coefficient: str) -> None:
+    from bench_service.cli.printing.tables import budget_table
+
+    try:
+        console.print(budget_table(result["document"], coefficient))
+    except KeyError as error:
+        raise typer.BadParameter(f"{coefficient} is not among {error.args[0]}", param_hint="--budget") from error
 
 
 def _print_result(name: str, result: dict[str, Any], as_json: bool) -> None:

@@ -17,6 +17,20 @@ class UnitRow(Table):
     updated_at: Mapped[datetime]
 
 
+class UnitNoteRow(Table):
+    """A remark of a person about a unit."""
+
+    __tablename__ = "unit_notes"
+    __table_args__ = (Index(None, "unit", "id"),)
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    unit: Mapped[str] = mapped_column(Id)
+    at: Mapped[datetime]
+    by: Mapped[str]
+    proven: Mapped[bool]
+    text: Mapped[str]
+
+
 class RecordingRow(Table):
     __tablename__ = "recordings"
     __table_args__ = (
@@ -215,7 +229,7 @@ class ResultCalibrationRow(Table):
 
 
 class CorrectionRow(Table):
-    """A correction set of a unit, of the kind "thermal" or "converter"; one of a kind is current."""
+    """A correction set of a unit, of the kind "thermal", "converter" or "thermometers"; one of a kind is current."""
 
     __tablename__ = "corrections"
     __table_args__ = (
@@ -238,6 +252,23 @@ class CorrectionRow(Table):
     is_current: Mapped[bool]
     simulated: Mapped[bool]
     document: Mapped[dict[str, Any]]
+    approval: Mapped[str] = mapped_column(server_default="open")
+    valid_until: Mapped[datetime | None]
+
+
+class CorrectionDecisionRow(Table):
+    """A decision about a correction set; rows are added, and never changed or removed."""
+
+    __tablename__ = "correction_decisions"
+    __table_args__ = (Index("ix_correction_decisions_correction_id_id", "correction_id", "id"),)
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    correction_id: Mapped[str] = mapped_column(Id, ForeignKey("corrections.id"))
+    act: Mapped[str]
+    at: Mapped[datetime]
+    by: Mapped[str]
+    proven: Mapped[bool]
+    remark: Mapped[str]
 
 
 class ResultCorrectionRow(Table):
