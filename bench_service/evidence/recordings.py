@@ -86,7 +86,7 @@ class RecordingStore(Protocol):
         ...
 
     def load(self, recording_id: str) -> RecordingSoFar:
-        """The recording for an analysis: blocks are read chunk by chunk. Raises `NotFound`."""
+        """The recording for an analysis: blocks are read chunk by chunk. Raises `NotFound`, `RawDataRemoved`."""
         ...
 
     def so_far(self, job_id: str) -> "RecordingSoFar | None":
@@ -96,13 +96,16 @@ class RecordingStore(Protocol):
     def read(
         self, recording_id: str, channels: Sequence[str] | None, start: int, stop: int
     ) -> Iterator[NDArray[np.int32] | NDArray[np.float64]]:
-        """Raw samples start…stop (half open) of some channels, chunk by chunk. Raises `NotFound`, `MissingChannel`."""
+        """Raw samples start…stop (half open) of some channels, chunk by chunk; archived ones come from the archive.
+
+        Raises `NotFound`, `MissingChannel`, `RawDataRemoved`; `ArchiveAway` where the archive cannot be read.
+        """
         ...
 
     def damage(self, recording_id: str, start: int, stop: int) -> Iterator[DamagedChunk]:
         """Compare the chunks that hold samples start…stop (half open) with their hashes; yield the damaged ones.
 
-        Raises `NotFound`.
+        Raises `NotFound`, `RawDataRemoved`, `ArchiveAway`.
         """
         ...
 

@@ -57,7 +57,8 @@ def _noise_rows(unit: Unit) -> list[list[str]]:
     rows: list[list[str]] = []
     for triad, rate_unit in (("gyro", "rad/s"), ("accelerometer", "m/s^2")):
         record = unit.triad(triad)
-        for name, noise in zip(TRIADS[triad], record.noise if record else (), strict=False):
+        found = zip(TRIADS[triad], record.observed_noise, strict=True) if record else ()
+        for name, noise in found:
             cells = [
                 f"{value / size:.4g} {label}" if (value := getattr(noise, process)) else "–"
                 for process, (label, size) in NOISE_DISPLAY[rate_unit].items()

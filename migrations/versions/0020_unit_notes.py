@@ -1,13 +1,13 @@
 """remarks of people about units
 
-Revision: 0020, after 0012
+Revision: 0020, after 0019
 """
 
 import sqlalchemy as sa
 from alembic import op
 
 revision = "0020"
-down_revision = "0012"
+down_revision = "0019"
 branch_labels = None
 depends_on = None
 

@@ -20,6 +20,7 @@ from bench_service.model.search import EVERYTHING, Search
 from bench_service.persistence.database import Database
 from bench_service.persistence.evidence.chunk_check import damaged_chunks
 from bench_service.persistence.evidence.chunk_reader import ChunkReader
+from bench_service.persistence.evidence.raw_places import require_raw
 from bench_service.persistence.evidence.recording_rows import info_of_row, stored_of_row
 from bench_service.persistence.evidence.recording_writer import SqlRecordingWriter
 from bench_service.persistence.pages import page
@@ -94,6 +95,7 @@ class SqlRecordingStore:
     def load(self, recording_id: str) -> StoredSamples:
         with self._database.read() as session:
             row = _found(session, recording_id)
+            require_raw(row)
             return StoredSamples(info_of_row(row), self._reader(row))
 
     def read(
@@ -102,6 +104,7 @@ class SqlRecordingStore:
         """Read samples, see the port; `start` and `stop` beyond the ends are taken as the ends."""
         with self._database.read() as session:
             row = _found(session, recording_id)
+            require_raw(row)
             info = info_of_row(row)
             reader = self._reader(row)
         names = [c.name for c in info.channels] if channels is None else list(channels)
@@ -118,6 +121,7 @@ class SqlRecordingStore:
     def damage(self, recording_id: str, start: int, stop: int) -> Iterator[DamagedChunk]:
         with self._database.read() as session:
             row = _found(session, recording_id)
+            require_raw(row)
             rows, count = row.chunk_rows, row.samples
         return damaged_chunks(self._database, recording_id, rows, max(0, start), min(stop, count))
 
