@@ -88,7 +88,7 @@ class Stalls:
         for group in self._groups:
             if group.open:
                 part = np.where(np.isnan(self._part), LEAST_PART, self._part)
-                self._keep(group, self._seen - group.open, group.open, part, shift=1)
+                self._keep(group, self._seen - group.open, group.open, self._shortest(group, part), shift=1)
         larger: list[Run] = []
         several = len(self.repeats) > 1
         for group in self._groups:
@@ -110,11 +110,13 @@ class Stalls:
         """
         width = WINDOW if same.shape[1] >= 2 * WINDOW else same.shape[1]
         windows = same.shape[1] // width
-        parts = same[:, : windows * width].reshape(len(same), windows, width).mean(axis=2)
-        for c, row in enumerate(parts):
-            moving = row[row < 1.0]
-            if len(moving) and (windows > 1 or np.isnan(self._part[c])):
-                self._part[c] = np.quantile(moving, USUAL)
+        whole = same[:, : windows * width].reshape(len(same), windows, width)
+        # Bytes are summed, not converted; fewer than 2·WINDOW repeats fit into one.
+        counts = np.sort(np.add.reduce(whole.view(np.uint8), axis=2, dtype=np.uint8), axis=1)
+        moving = np.count_nonzero(counts < width, axis=1).tolist()
+        for c, number in enumerate(moving):
+            if number and (windows > 1 or np.isnan(self._part[c])):
+                self._part[c] = _quantile(counts[c, :number], USUAL) / width
         return np.where(np.isnan(self._part), LEAST_PART, self._part)
 
     def _runs(self, group: Group, rows: Mask, start: int, part: Array) -> None:
@@ -123,18 +125,18 @@ class Stalls:
             group.open = carried + len(rows)
             return
         first, group.open = int(np.argmin(rows)), int(np.argmin(rows[::-1]))
-        self._keep(group, start - carried, carried + first, part)
-        inner = rows[first : len(rows) - group.open]
         shortest = self._shortest(group, part)
+        self._keep(group, start - carried, carried + first, shortest)
+        inner = rows[first : len(rows) - group.open]
         if not _has_run_of(inner, shortest):
             return
         edges = np.flatnonzero(inner[1:] != inner[:-1]) + 1
         begins, ends = edges[::2], edges[1::2]
         for i in np.flatnonzero(ends - begins >= shortest).tolist():
-            self._keep(group, start + first + int(begins[i]), int(ends[i] - begins[i]), part)
+            self._keep(group, start + first + int(begins[i]), int(ends[i] - begins[i]), shortest)
 
-    def _keep(self, group: Group, first: int, length: int, part: Array, shift: int = 0) -> None:
-        if length < self._shortest(group, part):
+    def _keep(self, group: Group, first: int, length: int, shortest: float, shift: int = 0) -> None:
+        if length < shortest:
             return
         if len(group.runs) < KEPT:
             group.runs.append(Run(first + shift, length))
@@ -152,6 +154,14 @@ class Stalls:
             return np.inf
         each = float(np.sum(np.log(np.maximum(witnesses, LEAST_PART))))
         return max(float(SHORTEST), np.floor((np.log(CHANCE) - np.log(max(self._seen, 1))) / each) + 1.0)
+
+
+def _quantile(ascending: NDArray[np.uint8], share: float) -> float:
+    """The quantile of some ascending numbers, (n,), interpolated linearly between two of them."""
+    at = share * (len(ascending) - 1)
+    below = int(at)
+    low, high = int(ascending[below]), int(ascending[min(below + 1, len(ascending) - 1)])
+    return low + (high - low) * (at - below)
 
 
 def _has_run(same: Mask, zeros: NDArray[np.int64]) -> NDArray[np.bool_]:
