@@ -2,14 +2,14 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal imports misfit access acceptance
+VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal thermometers imports misfit access acceptance
 FOREIGN := basil edie instro ixcom visa
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
 
 .DEFAULT_GOAL := help
-.PHONY: help run test browser clients bench bench-against profile chaos soak format check validate rights pictures newest-form lock audit images clean foreign
+.PHONY: help run test browser screenshots figures clients bench bench-against profile chaos soak format check validate rights pictures newest-form lock audit images clean foreign
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -35,6 +35,12 @@ $(VENV)/.browser: .ci/browser.lock $(VENV)/.ready
 browser: $(VENV)/.browser  ## the pages in a real Chromium, installed first where it is missing
 	@$(BIN)/python -m tests.browser.chromium; case $$? in 0) ;; 3) exit 0;; *) exit 1;; esac; \
 	$(BIN)/python -m pytest tests/browser --browser -n 2 --dist loadfile
+
+screenshots: $(VENV)/.browser  ## take the pictures of the pages in docs/pictures/pages anew
+	@$(BIN)/python -m pytest -p no:xdist tests/browser/test_pictures.py --browser --pictures docs/pictures/pages
+
+figures: $(VENV)/.browser  ## measure the pages in Chromium: stop, first paint, live charts over MINUTES (20), the feed
+	@$(BIN)/python -m tests.browser.figures --minutes $(or $(MINUTES),20)
 
 chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books; press stop while something is in its way
 	@kept=0; $(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both || kept=1; $(BIN)/python -m tests.chaos.stop_matrix --runs 5 || kept=1; exit $$kept

@@ -104,6 +104,14 @@ class WorkProcesses:
             return self._pool.submit(_work, name, arguments)
 
 
+@dataclass(frozen=True)
+class WorkApart:
+    """The processes of a service: for analyses, and for printed reports."""
+
+    analyses: WorkProcesses
+    printing: WorkProcesses
+
+
 _run: list[Run] = []
 
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from threading import Event
 
+from bench_service.bench.driven import ShuttingDown
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.tap import LiveTap
 from bench_service.bench.live.values import LiveBoard
 from bench_service.bench.make_safe import RoadEnd, over_new_link, whole_road
 from bench_service.bench.processes import ProcessIdentity
-from bench_service.bench.session import BenchSession, ShuttingDown
+from bench_service.bench.session import BenchSession
 from bench_service.evidence.catalogue import AnyProcedure
 from bench_service.evidence.job_analysis import analysed, recordings_of
 from bench_service.evidence.spread_processes import SpreadProcesses

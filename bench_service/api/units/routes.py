@@ -2,10 +2,13 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path
+from fastapi import APIRouter, Path, Response
 
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.http.errors import problems
+from bench_service.api.http.printed import PDF, PRINTED, printed
+from bench_service.api.units.calibration_schemas import CalibrationApproval, CalibrationRejection
+from bench_service.api.units.calibrations import DeciderOf
 from bench_service.api.units.schemas import (
     CorrectionPage,
     CorrectionView,
@@ -31,6 +34,12 @@ def list_units(service: Service) -> list[UnitView]:
 def read_unit(serial: str, service: Service) -> UnitView:
     """Read one unit by its serial."""
     return UnitView.of(service.stores.units.unit(serial))
+
+
+@router.get("/{serial}/report.pdf", response_class=Response, responses={**problems(404), **PDF})
+async def read_printed_unit(serial: Serial, service: Service) -> Response:
+    """Read a unit's report as PDF/A-3: record, calibrations with their history, latest results."""
+    return printed(await PRINTED.run(service.reports.of_unit, serial), f"{serial}.pdf")
 
 
 @router.put("/{serial}", responses=problems(413, 507))
@@ -71,3 +80,37 @@ def choose_correction(serial: str, correction_id: str, service: Service, key: Id
     """Make a correction set the one that new jobs use; jobs that began before keep theirs."""
     asked = None if key is None else Idempotency(f"corrections:{key}", fingerprint([serial, correction_id]))
     return CorrectionView.of(service.stores.corrections.make_current(serial, correction_id, asked))
+
+
+@router.post("/{serial}/corrections/{correction_id}/approve", responses=problems(404, 409, 413, 507))
+def approve_correction(
+    serial: str,
+    correction_id: str,
+    body: CalibrationApproval,
+    service: Service,
+    decider: DeciderOf,
+    key: IdempotencyKey = None,
+) -> CorrectionView:
+    """Approve a correction set, and say until when it is valid."""
+    by = decider(body.by, body.remark)
+    asked = None if key is None else _asked("approve", key, serial, correction_id, body)
+    return CorrectionView.of(service.stores.corrections.approve(serial, correction_id, by, body.valid_until, asked))
+
+
+@router.post("/{serial}/corrections/{correction_id}/reject", responses=problems(404, 409, 413, 507))
+def reject_correction(
+    serial: str,
+    correction_id: str,
+    body: CalibrationRejection,
+    service: Service,
+    decider: DeciderOf,
+    key: IdempotencyKey = None,
+) -> CorrectionView:
+    """Reject a correction set: no new job uses it, also where it is current."""
+    by = decider(body.by, body.remark)
+    asked = None if key is None else _asked("reject", key, serial, correction_id, body)
+    return CorrectionView.of(service.stores.corrections.reject(serial, correction_id, by, asked))
+
+
+def _asked(act: str, key: str, *about: object) -> Idempotency:
+    return Idempotency(f"corrections-{act}:{key}", fingerprint(list(about)))

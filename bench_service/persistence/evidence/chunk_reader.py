@@ -13,6 +13,7 @@ from sqlalchemy import select
 from bench_service.formats.chunk import UnreadableChunk, decode_chunk
 from bench_service.model.errors import DamagedRecording
 from bench_service.persistence.database import Database, connect
+from bench_service.persistence.evidence.raw_places import payload_elsewhere
 from bench_service.persistence.tables.evidence import ChunkRow
 from procedures.core.recording import RawArray
 
@@ -51,6 +52,8 @@ class ChunkReader:
         if row is None:
             raise self._failure(number, "is missing")
         payload, sha256 = row
+        if not payload:
+            payload = payload_elsewhere(self.database, self.recording_id, number, sha256)
         if hashlib.sha256(payload).hexdigest() != sha256:
             raise self._failure(number, "is damaged: its bytes do not have the hash they were stored with")
         try:
