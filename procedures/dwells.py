@@ -11,7 +11,7 @@ from procedures.core.recording import TRIADS
 from procedures.core.report import Table
 from procedures.core.stop_rule import ChannelTarget, StopRule
 from procedures.core.unit import Unit
-from procedures.procedure import Parameters
+from procedures.parameters import Parameters
 
 
 class StopAt(Parameters):

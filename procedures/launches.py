@@ -10,7 +10,8 @@ from typing import Literal, TypeVar
 
 from pydantic import Field
 
-from procedures.analysis.launch.analysis import INSPECTION, analyse_launch
+from procedures.analysis.launch.analysis import INSPECTION
+from procedures.analysis.launch.analysis import analyse_launches as all_launches
 from procedures.analysis.launch.prediction import predicted_noise
 from procedures.analysis.launch.results import ChannelNoise, LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
@@ -22,7 +23,7 @@ from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import TRIADS, Recording
 from procedures.core.unit import Unit
-from procedures.procedure import Outcome, Parameters
+from procedures.procedure import JudgedParameters, Outcome, Parameters
 
 SOURCE = "thesis 4.3, 5.6"
 LAUNCH = INSPECTION
@@ -52,7 +53,7 @@ class NoiseLimits(Parameters):
     vibration_m_s2: float | None = Field(None, gt=0.0, description="the same by the accelerometers")
 
 
-class NoiseParameters(Parameters):
+class NoiseParameters(JudgedParameters):
     """Steps of the analysis, each can be switched; what it changes is in the result's table of steps."""
 
     cell_s: float = Field(1.0, gt=0.0, le=3600.0, description="cell whose means the slow part works on")
@@ -122,8 +123,8 @@ def analyse_launches(
     settings = params.settings()
     if params.band_launch > len(recordings):
         raise BadParameter("band_launch", params.band_launch, f"1 … {len(recordings)}, the launches that there are")
-    found = (analyse_launch(r, _label(r, i), settings) for i, r in enumerate(recordings, start=1))
-    launches = tuple(_matched(launch, unit) for launch in found)
+    labels = [_label(r, i) for i, r in enumerate(recordings, start=1)]
+    launches = tuple(_matched(launch, unit) for launch in all_launches(recordings, labels, settings))
     names = {tuple((c.channel, c.rate_unit) for c in launch.channels) for launch in launches}
     if len(names) > 1:
         raise UnfitRecording("the recordings have different channels: analyse them one by one")
@@ -214,7 +215,7 @@ def noise_checks(params: NoiseParameters, unit: Unit, duration_s: float, launche
     for triad, process, name, size, field in LIMITED:
         record = unit.triad(triad)
         limit = Limit(name, maximum=getattr(params.noise_limits, field), source=SOURCE)
-        for channel, noise in zip(TRIADS[triad], record.noise if record else (), strict=False):
+        for channel, noise in zip(TRIADS[triad], record.observed_noise if record else (), strict=False):
             of_process = [p for p in predicted_noise(channel, noise, duration_s, launches) if p.process == process]
             check_name = f"{channel} {process.replace('_', ' ')}"
             for p in of_process:

@@ -1,6 +1,7 @@
 """Routes of samples as people's tools read them: of one recording, and of a whole job as one zip."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated, Any
 
@@ -17,6 +18,7 @@ from bench_service.evidence.samples import treatment_of
 from bench_service.formats.chunk import RAW_BYTES
 from bench_service.formats.export import Extract, extract
 from bench_service.formats.samples_out.archive import archived
+from bench_service.formats.samples_out.mcap_file import BEGAN
 from bench_service.formats.samples_out.sheet import LARGEST_FACTOR, Sheet, Treatment, physical_sheet, raw_sheet
 from bench_service.formats.samples_out.sheet_files import SheetFormat, written
 from bench_service.model.errors import NotFound
@@ -76,7 +78,7 @@ async def read_samples(
         stored = service.stores.recordings.get(recording_id)
         treatment = treatment_of(service.stores, stored.info.unit, corrected_by, decimate)
         part = extract(stored.info, stored.dtype, names, start_s, stop_s)
-        return written(_sheet(service, part, values, treatment), form)
+        return written(_dated(stored, _sheet(service, part, values, treatment)), form)
 
     return await _admitted(begun, form, "application/octet-stream", f"{recording_id}.{form.value}")
 
@@ -99,7 +101,8 @@ async def read_samples_of_job(
             raise NotFound("recording", job_id, "the job has no complete recording")
         parts = [extract(one.info, one.dtype) for one in stored]
         treatments = [treatment_of(service.stores, part.info.unit, corrected_by, decimate) for part in parts]
-        made = [_sheet(service, part, values, how) for part, how in zip(parts, treatments, strict=True)]
+        asked = zip(stored, parts, treatments, strict=True)
+        made = [_dated(one, _sheet(service, part, values, how)) for one, part, how in asked]
         files = [
             (f"{number:03d}-{one.info.id}.{form.value}", written(sheet, form), _facts(one, sheet))
             for number, (one, sheet) in enumerate(zip(stored, made, strict=True), start=1)
@@ -120,6 +123,13 @@ def _sheet(service: BenchService, part: Extract, values: Values, treatment: Trea
     if treatment != Treatment():
         raise BadParameter("values", values.value, "physical: raw samples are neither corrected nor decimated")
     return raw_sheet(part, blocks)
+
+
+def _dated(one: StoredRecording, sheet: Sheet) -> Sheet:
+    """The sheet with the moment at which the service began to record, where that is the time of a real bench."""
+    if one.job_id is None or one.info.simulated:
+        return sheet
+    return replace(sheet, about={**sheet.about, BEGAN: one.created_at.isoformat()})
 
 
 def _facts(one: StoredRecording, sheet: Sheet) -> dict[str, Any]:

@@ -3,14 +3,15 @@
 from typing import Any
 
 from bench_service.evidence.work_processes import Run
+from bench_service.formats.printed.drawing import drawn_here
 from bench_service.pages import figures
 
 
 def open_drawing() -> Run:
     """Prepare a drawing process, see `WorkProcesses`: each piece of work is a figure, and gives its SVG document."""
-    figures.drawn_here(figures.SMALLEST)  # load matplotlib before the first one is waited for
+    drawn_here(figures.SMALLEST)  # load matplotlib before the first one is waited for
 
     def run(_: str, arguments: tuple[Any, ...]) -> str:
-        return figures.drawn_here(*arguments)
+        return drawn_here(*arguments)
 
     return run

@@ -2,7 +2,7 @@
 
 import re
 from datetime import UTC, datetime
-from math import floor, isfinite, log10
+from math import isfinite
 from pathlib import Path
 from typing import Any, cast
 
@@ -11,6 +11,7 @@ from fastapi.templating import Jinja2Templates
 from markupsafe import Markup, escape
 
 from bench_service.access.identity import Identity, Proof
+from bench_service.formats.printed import digits
 from bench_service.model.errors import ServiceError
 from bench_service.pages.languages import (
     LANGUAGE,
@@ -22,9 +23,6 @@ from bench_service.pages.languages import (
 )
 from bench_service.pages.static_files import asset, module
 from bench_service.service import BenchService
-
-LEAST_DIGITS = 6
-"""Significant digits of a number whose uncertainty is not known."""
 
 
 def service_of(request: Request) -> BenchService:
@@ -53,7 +51,7 @@ def number(value: Any) -> str:
         return "–"
     if isinstance(value, bool):
         return translated("yes") if value else translated("no")
-    return f"{value:.{LEAST_DIGITS}g}" if isinstance(value, float) else str(value)
+    return f"{value:.{digits.LEAST_DIGITS}g}" if isinstance(value, float) else str(value)
 
 
 def who(request: Request) -> dict[str, Any]:
@@ -69,28 +67,20 @@ def who(request: Request) -> dict[str, Any]:
 
 def measured(value: Any, uncertainty: Any) -> str:
     """Format a value to the last digit that its standard uncertainty bears: two significant digits of it."""
-    places = _places(uncertainty)
-    if places is None or not isinstance(value, int | float) or not isfinite(value):
+    if not _plain(value) or not _plain(uncertainty) or digits.places(uncertainty) is None:
         return number(value)
-    if abs(value) >= 1e9 or places > 12:
-        digits = max(1, floor(log10(abs(value))) + 1 + places) if value else 1
-        return f"{value:.{min(digits - 1, 15)}e}"
-    return f"{round(value, places):.{max(places, 0)}f}"
+    return digits.to_uncertainty(value, uncertainty)
 
 
 def doubt(uncertainty: Any) -> str:
     """Format a standard uncertainty: two significant digits."""
-    places = _places(uncertainty)
-    if places is None:
+    if not _plain(uncertainty) or digits.places(uncertainty) is None:
         return number(uncertainty)
-    return f"{uncertainty:.1e}" if places > 12 else f"{round(uncertainty, places):.{max(places, 0)}f}"
+    return digits.two_digits(uncertainty)
 
 
-def _places(uncertainty: Any) -> int | None:
-    """Decimal places of the second significant digit; None where there is no uncertainty to follow."""
-    if not isinstance(uncertainty, int | float) or not isfinite(uncertainty) or uncertainty <= 0.0:
-        return None
-    return 1 - floor(log10(uncertainty))
+def _plain(value: Any) -> bool:
+    return isinstance(value, int | float) and isfinite(value)
 
 
 def moment(value: datetime | str | None) -> Markup | str:

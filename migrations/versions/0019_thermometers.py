@@ -1,13 +1,13 @@
 """approval and validity of correction sets, and what people decided about them
 
-Revision: 0019, after 0012
+Revision: 0019, after 0016
 """
 
 import sqlalchemy as sa
 from alembic import op
 
 revision = "0019"
-down_revision = "0012"
+down_revision = "0016"
 branch_labels = None
 depends_on = None
 

@@ -114,6 +114,7 @@ def resolve(params: Params, context: Context) -> Params:
     """Dwell from the unit; site and table accuracy from the bench. Refuses a correction that the unit does not have."""
     full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
     require_correctable(full.thermal_correction, full.dwell_s, context.unit)
+    full.require_sources(context, full.thermal_correction == "current")
     return full if full.stop_at is None else full.model_copy(update={"stop_at": full.stop_at.resolved(context.unit)})
 
 
@@ -216,6 +217,7 @@ def report(result: Result) -> Report:
     tables = [pictures.triad_table(t) for t in result.triads]
     tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
     tables += [pictures.sample_table(result.triads)]
+    tables += [pictures.budget_table(t.calibration.triad, t.budgets) for t in result.triads if t.budgets]
     figures = [f for t in result.triads for f in pictures.triad_figures(t)]
     stations = [pictures.station_table(m) for m in magnitudes]
     thermal = [] if result.thermal is None else pictures.thermal_tables(result.thermal, magnitudes[0].labels)

@@ -104,7 +104,7 @@ def predict(params: Params, context: Context) -> Prediction:
         if record is None:
             warnings.append(f"nothing is known of the {triad} triad's noise: no uncertainty can be predicted")
             continue
-        for name, noise in zip(names, record.noise, strict=True):
+        for name, noise in zip(names, record.observed_noise, strict=True):
             found += [
                 PredictedUncertainty(
                     f"{name}.{p.process}",
@@ -137,7 +137,10 @@ def report(result: Result) -> Report:
 
 
 def learns(result: Result, unit: Unit, origin: str) -> Unit:
-    """Update the unit's record with the noise and the averaging time found, for later previews and dwells."""
+    """Update the unit's record with the noise and the averaging time found, for later previews and dwells.
+
+    A process that no launch shows enters with the mean square that its upper limit leaves likely, and is named.
+    """
     records: dict[str, TriadRecord | None] = {"gyro": unit.gyro, "accelerometer": unit.accelerometer}
     known = {
         name: noise
@@ -146,10 +149,12 @@ def learns(result: Result, unit: Unit, origin: str) -> Unit:
         for name, noise in zip(names, record.noise, strict=True)
     }
     noise = {s.channel: s.noise_over(known.get(s.channel)) for s in result.channels}
+    absent = {s.channel: s.not_observed for s in result.channels}
     for triad, (x, y, z) in TRIADS.items():
         if all(name in noise for name in (x, y, z)):
             old = records[triad] or TriadRecord((noise[x], noise[y], noise[z]))
-            records[triad] = replace(old, noise=(noise[x], noise[y], noise[z]), noise_origin=origin)
+            found = {"noise": (noise[x], noise[y], noise[z]), "not_observed": (absent[x], absent[y], absent[z])}
+            records[triad] = replace(old, noise_origin=origin, **found)
     dwell = unit.averaging_time_s
     if result.averaging_time_s is not None:
         dwell = DWELL_STEP_S * ceil(result.averaging_time_s / DWELL_STEP_S)

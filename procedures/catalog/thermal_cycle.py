@@ -14,11 +14,12 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis.calibration.reference import site_with
+from procedures.analysis.fitness.watched import each_watched
 from procedures.analysis.thermal.cycle.analysis import KnownOfUnit, analyse_cycle
 from procedures.analysis.thermal.cycle.checks import CycleLimits, cycle_checks, planned_cycle_checks
 from procedures.analysis.thermal.cycle.results import ThermalCycle
 from procedures.analysis.thermal.cycle.runs import CycleSettings
-from procedures.analysis.thermal.cycle.series import read_cycle
+from procedures.analysis.thermal.cycle.series import run_of
 from procedures.analysis.thermal.regime import RegimeSettings
 from procedures.analysis.turns.plan import UPRIGHT
 from procedures.bench import Bench
@@ -32,7 +33,7 @@ from procedures.core.report import Report
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
 from procedures.core.thermal_correction import Form
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
-from procedures.procedure import STATIONS, Context, Outcome, Parameters, Prediction, Procedure
+from procedures.procedure import STATIONS, Context, JudgedParameters, Outcome, Prediction, Procedure
 from procedures.reports import thermal_figures, thermal_tables
 from procedures.thermal_parameters import DEFAULT_LEGS, Leg, Limits, Regime, Soak
 
@@ -40,7 +41,7 @@ LEAST_OFF_S = 3.0 * units.HOUR
 """Least time switched off between runs, three hours (thesis 4.2.1)."""
 
 
-class Params(Parameters):
+class Params(JudgedParameters):
     """Profile, analysis and limits of the cycle."""
 
     legs: tuple[Leg, ...] = Field(DEFAULT_LEGS, min_length=1, max_length=100)
@@ -164,7 +165,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     params = resolve(params, context)
     _require_correction(params, context)
     site = site_with(context.bench.site, None, params.gravity_m_s2, None, None)
-    series = [(r.info.id, read_cycle(r, _up(r, context))) for r in recordings]
+    series = each_watched(run_of, recordings, lambda _, recording: (recording, _up(recording, context)))
     unit = context.unit
     calibration = unit.calibration("accelerometer")
     known = KnownOfUnit(

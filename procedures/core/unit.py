@@ -1,6 +1,6 @@
 """Record of a unit before a job: its channels, its noise, its stability from launch to launch."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -30,6 +30,8 @@ class TriadRecord:
     """Standard deviation of the scale factor from run to run, relative."""
     noise_origin: str = "data sheet"
     """Origin of the coefficients: a data sheet, or the result that found them."""
+    not_observed: tuple[tuple[str, ...], ...] = ((), (), ())
+    """Processes of x, y, z that no launch showed: their coefficients come from upper limits, and are no finding."""
     dither_frequency_hz: tuple[float, float, float] | None = None
     """Frequencies of the mechanical dithers of x, y, z, by the data sheet; 0: no dither. None: not declared."""
 
@@ -37,6 +39,14 @@ class TriadRecord:
         for name, value in zip("xyz", self.dither_frequency_hz or (), strict=False):
             if not 0.0 <= value <= 1e5:
                 raise BadParameter(f"dither_frequency_hz.{name}", value, "within 0 … 100 000 Hz")
+
+    @property
+    def observed_noise(self) -> tuple[NoiseCoefficients, ...]:
+        """The noise that was declared or found, x, y, z: zero for what no launch showed."""
+        return tuple(
+            replace(noise, **dict.fromkeys(absent, 0.0))
+            for noise, absent in zip(self.noise, self.not_observed, strict=True)
+        )
 
     def launch_covariance(self, outputs: Array) -> Array:
         """Covariance by which outputs K·v (n, 3) of one launch depart from the unit's mean, per channel, (3, n, n).

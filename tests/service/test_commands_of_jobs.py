@@ -235,10 +235,21 @@ def test_a_calibration_is_entered_from_a_file_and_exported(bench: Bench, tmp_pat
     (tmp_path / "lab.key.pem").write_bytes(pair.key)
     (tmp_path / "lab.cert.pem").write_bytes(pair.certificate)
     key, made = tmp_path / "lab.key.pem", tmp_path / "c.xml"
-    signed = bench("certificate", "make", "SIM-0001", known, "--laboratory", laboratory, "--key", key, "-o", made)
+    make = ("certificate", "make", "SIM-0001", known, "--laboratory", laboratory, "--key", key, "-o", made)
+    signed = bench(*make, "--pdf", tmp_path / "c.pdf")
     assert signed.code == 0, signed.err
     root, _ = verified(made.read_bytes(), pair.certificate)
     assert attached(root)["triads"][0]["calibration"] == known
+    for file in (made, tmp_path / "c.pdf"):
+        checked = bench("certificate", "check", file, "--certificate", tmp_path / "lab.cert.pem")
+        assert checked.code == 0, checked.err
+        assert "valid, unchanged, signed by CN=Lab" in checked.out
+        assert "entered from passport 17: there are no raw data" in checked.out
+    one_line(bench("certificate", "check", laboratory, "--certificate", tmp_path / "lab.cert.pem"), "no XML")
+    (tmp_path / "no.pdf").write_bytes(b"%PDF-1.7\n")
+    one_line(bench("certificate", "check", tmp_path / "no.pdf", "--certificate", tmp_path / "lab.cert.pem"), "PDF")
+    assert bench("calibration", "reject", "SIM-0001", known, "--remark", "wrong unit").code == 0
+    one_line(bench(*make), "no certificate is made of it: calibration")
     refused = bench("calibration", "export", "SIM-0001", known, "--format", "excel")
     assert refused.code != 0
     assert "ardupilot" in refused.err
@@ -257,6 +268,40 @@ def test_samples_go_out_in_si_and_a_job_as_a_zip(bench: Bench, address: str, tmp
     assert (tmp_path / "s.h5").read_bytes().startswith(b"\x89HDF")
     assert bench("export", job, "-o", tmp_path / "job.zip", "--decimate", "100").code == 0
     assert (tmp_path / "job.zip").read_bytes().startswith(b"PK")
+    result = httpx.get(f"{address}/api/v1/jobs/{job}").json()["result"]
+    for named in ((result,), ("--unit", "SIM-0001")):
+        assert bench("report", *named, "-o", tmp_path / "report.pdf").code == 0
+        assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF-")
+    one_line(bench("report", "-o", tmp_path / "report.pdf"), "exactly one of")
+
+
+def test_a_certificate_of_a_job_is_made_and_recomputed(bench: Bench, address: str, tmp_path: Path) -> None:
+    """The short plan fails its limits: without --failed there is no certificate."""
+    terms = {"procedure": "calibration_12_orientations", "unit": "SIM-0001", "parameters": {"dwell_s": 5.0}}
+    job = httpx.post(f"{address}/api/v1/jobs", json=terms).json()["id"]
+    ended(address, job)
+    result = httpx.get(f"{address}/api/v1/jobs/{job}").json()["result"]
+    calibrations = httpx.get(f"{address}/api/v1/units/SIM-0001/calibrations").json()["items"]
+    gyro = next(c["id"] for c in calibrations if c["result"] == result and c["triad"] == "gyro")
+    place = 'name = "A"\ncountry = "UA"\ncity = "Kyiv"\n'
+    people = '[[people]]\nname = "Ann"\nrole = "head"\n'
+    (tmp_path / "lab.toml").write_text(f'identifier = "K-1"\n[laboratory]\n{place}[customer]\n{place}{people}')
+    pair = new_key("Lab")
+    (tmp_path / "lab.key.pem").write_bytes(pair.key)
+    (tmp_path / "lab.cert.pem").write_bytes(pair.certificate)
+    files = ("--laboratory", tmp_path / "lab.toml", "--key", tmp_path / "lab.key.pem", "-o", tmp_path / "c.xml")
+    one_line(bench("certificate", "make", "SIM-0001", gyro, *files), "is fail; with --failed a certificate states")
+    made = bench("certificate", "make", "SIM-0001", gyro, *files, "--failed", "--pdf", tmp_path / "c.pdf")
+    assert made.code == 0, made.err
+    checked = bench("certificate", "check", tmp_path / "c.pdf", "--certificate", tmp_path / "lab.cert.pem")
+    assert checked.code == 0, checked.err
+    for triad in ("gyro", "accelerometer"):
+        assert f"{triad} triad: 12 recordings have the hashes of the certificate, and their analysis" in checked.out
+    assert "the same numbers to the last digit" in checked.out
+    short = bench(
+        "certificate", "check", tmp_path / "c.xml", "--certificate", tmp_path / "lab.cert.pem", "--no-recompute"
+    )
+    assert "not analysed again" in short.out
 
 
 def ended(address: str, job: str) -> None:

@@ -73,12 +73,31 @@ def read(form: SheetFormat, data: bytes, folder: Path) -> pd.DataFrame:
     return readers[form]()
 
 
-@pytest.mark.parametrize("form", list(SheetFormat))
+@pytest.mark.parametrize("form", [f for f in SheetFormat if f is not SheetFormat.MCAP])
 def test_each_reader_finds_time_and_si_values_under_names_with_units(form: SheetFormat, tmp_path: Path) -> None:
     found = read(form, b"".join(written(sheet(start=100, stop=900), form)), tmp_path)
     assert list(found.columns) == NAMES
     np.testing.assert_allclose(found["time_s"], np.arange(100, 900) / RATE, rtol=1e-15)
     np.testing.assert_allclose(found[NAMES[1:]], values()[100:900], rtol=1e-14)
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet", "arrow", "feather"])
+def test_polars_and_duckdb_read_the_same_without_an_option(form: str, tmp_path: Path) -> None:
+    """Of the Arrow formats duckdb reads what polars or pyarrow opened: it has no reader of their files."""
+    import duckdb
+    import polars as pl
+
+    file = tmp_path / f"samples.{form}"
+    file.write_bytes(b"".join(written(sheet(), SheetFormat(form))))
+    by_polars = {"csv": pl.read_csv, "parquet": pl.read_parquet, "arrow": pl.read_ipc_stream, "feather": pl.read_ipc}[
+        form
+    ](file)
+    source = f"'{file}'" if form in ("csv", "parquet") else "by_polars"
+    by_duckdb = duckdb.sql(f"SELECT * FROM {source}").fetchnumpy()
+    assert by_polars.columns == list(by_duckdb) == NAMES
+    for name, column in zip(NAMES[1:], values().T, strict=True):
+        np.testing.assert_allclose(by_polars[name].to_numpy(), column, rtol=1e-14)
+        np.testing.assert_allclose(np.asarray(by_duckdb[name]), column, rtol=1e-14)
 
 
 def test_units_and_origin_travel_in_hdf5_and_matlab(tmp_path: Path) -> None:

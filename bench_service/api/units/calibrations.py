@@ -4,9 +4,12 @@ from collections.abc import Callable
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, Query, Response
+from pydantic import Field
 
 from bench_service.api.http.dependencies import After, ClientName, IdempotencyKey, Limit, ProvenName, Service
 from bench_service.api.http.errors import made, problems
+from bench_service.api.http.fields import Request
+from bench_service.api.http.printed import PDF, PRINTED, printed
 from bench_service.api.units.calibration_schemas import (
     CalibrationApproval,
     CalibrationChoice,
@@ -74,6 +77,22 @@ def enter_calibration(
     stored = service.stores.calibrations.add(calibration, by, body.choose, _key("enter", key, serial, body))
     response.headers["Location"] = f"/api/v1/units/{serial}/calibrations/{stored.id}"
     return CalibrationView.of(stored)
+
+
+class CertificateText(Request):
+    """A digital calibration certificate to be printed."""
+
+    certificate: str = Field(min_length=1, max_length=900_000, description="The XML, with or without its signature")
+
+
+@router.post("/certificate.pdf", response_class=Response, responses={**problems(404, 413, 507), **PDF})
+async def print_certificate(serial: Serial, body: CertificateText, service: Service) -> Response:
+    """Print a certificate of the unit's calibrations as PDF/A-3, with the XML inside byte for byte.
+
+    Refused where its numbers are not those stored here.
+    """
+    data = await PRINTED.run(service.reports.of_certificate, serial, body.certificate)
+    return printed(data, f"{serial}-certificate.pdf")
 
 
 @router.post("/choose-by-rule", responses=problems(404, 409, 413, 507))

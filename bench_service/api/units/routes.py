@@ -2,10 +2,11 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path
+from fastapi import APIRouter, Path, Response
 
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.http.errors import problems
+from bench_service.api.http.printed import PDF, PRINTED, printed
 from bench_service.api.units.calibration_schemas import CalibrationApproval, CalibrationRejection
 from bench_service.api.units.calibrations import DeciderOf
 from bench_service.api.units.schemas import (
@@ -33,6 +34,12 @@ def list_units(service: Service) -> list[UnitView]:
 def read_unit(serial: str, service: Service) -> UnitView:
     """Read one unit by its serial."""
     return UnitView.of(service.stores.units.unit(serial))
+
+
+@router.get("/{serial}/report.pdf", response_class=Response, responses={**problems(404), **PDF})
+async def read_printed_unit(serial: Serial, service: Service) -> Response:
+    """Read a unit's report as PDF/A-3: record, calibrations with their history, latest results."""
+    return printed(await PRINTED.run(service.reports.of_unit, serial), f"{serial}.pdf")
 
 
 @router.put("/{serial}", responses=problems(413, 507))

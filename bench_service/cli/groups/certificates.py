@@ -6,18 +6,26 @@ The key stays with whoever signs: it is read by this command and never sent to a
 import json
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bench_service.cli.asking.client import answer, connect, segment
+from bench_service.cli.asking.client import answer, call, connect, segment
 from bench_service.cli.files import check_folder, text_of, whole_file
 from bench_service.cli.options import AsJson, Server, console
 from bench_service.cli.refusal import Refused
+from bench_service.settings import Settings
+
+if TYPE_CHECKING:
+    from bench_service.formats.certificate.laboratory import Laboratory
+    from bench_service.formats.certificate.recomputed import Repeated
+    from bench_service.formats.certificate.signature import KeyPair
 
 certificate = typer.Typer(no_args_is_help=True, help="Certificates of calibrations: DCC 3.3.0, signed.")
 
 KEY_ENDING, CERTIFICATE_ENDING = ".key.pem", ".cert.pem"
+PRINTED_XML = "certificate.xml"
+"""Name of the certificate inside its printed form."""
 
 
 @certificate.command("key")
@@ -52,56 +60,80 @@ def make(
     calibration_id: str,
     laboratory: Annotated[Path, typer.Option(help="TOML: identifier, laboratory, customer, people, equipment")],
     key_file: Annotated[Path, typer.Option("--key", help="The laboratory's lab.key.pem; lab.cert.pem is beside it")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="File to write")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File to write, .xml")],
+    pdf: Annotated[Path | None, typer.Option(help="Print it to this file too: PDF/A-3 with the XML inside")] = None,
+    failed: Annotated[bool, typer.Option("--failed", help="Also of a calibration that failed; it says so")] = False,
     other: Annotated[str | None, typer.Option(help="Calibration of the other triad")] = None,
     server: Server = None,
 ) -> None:
     """Make the signed certificate of a calibration, with our JSON of it attached."""
-    from bench_service.formats.certificate.document import certificate as made
     from bench_service.formats.certificate.errors import CertificateRefused
     from bench_service.formats.certificate.laboratory import laboratory_of
-    from bench_service.formats.certificate.rules import faults
-    from bench_service.formats.certificate.signature import KeyPair, signed
-    from bench_service.telemetry.code_version import code_version
+    from bench_service.formats.certificate.signature import KeyPair
 
-    check_folder(output)
+    for file in filter(None, (output, pdf)):
+        check_folder(file)
     public = key_file.with_name(key_file.name.removesuffix(KEY_ENDING) + CERTIFICATE_ENDING)
+    printed: bytes | None = None
     try:
         facts = laboratory_of(text_of(laboratory))
         pair = KeyPair(key_file.read_bytes(), public.read_bytes())
         query = {"format": "json"} if other is None else {"format": "json", "other": other}
-        path = f"/api/v1/units/{segment(unit)}/calibrations/{segment(calibration_id)}/export"
+        path = f"/api/v1/units/{segment(unit)}/calibrations"
         with connect(context.obj, server, drive=False) as client:
-            text = answer(client, "GET", path, params=query).text
-        document: dict[str, Any] = json.loads(text)
-        root = made(document, text, facts, code_version())
-        wrong = faults(root)
-        if wrong:
-            raise Refused(f"this calibration gives no certificate: {'; '.join(wrong)}")
-        data = signed(root, pair)
+            text = answer(client, "GET", f"{path}/{segment(calibration_id)}/export", params=query).text
+            data = _signed(text, facts, pair, failed)
+            if pdf is not None:
+                body = {"certificate": data.decode()}
+                printed = answer(client, "POST", f"{path}/certificate.pdf", json=body).content
     except CertificateRefused as error:
         raise Refused(str(error)) from error
     except OSError as error:
         raise Refused(f"{error.filename} cannot be read: {error.strerror}") from error
-    with whole_file(output) as sink:
-        sink.write(data)
-    console.print(f"{output}: {len(data)} bytes", soft_wrap=True)
+    for file, content in ((output, data), (pdf, printed)):
+        if file is not None and content is not None:
+            with whole_file(file) as sink:
+                sink.write(content)
+            console.print(f"{file}: {len(content)} bytes", soft_wrap=True)
+
+
+def _signed(text: str, facts: "Laboratory", pair: "KeyPair", failed: bool) -> bytes:
+    """The signed certificate of an exported calibration. Raises `CertificateRefused`, `Refused`."""
+    from bench_service.formats.certificate.document import certificate as made
+    from bench_service.formats.certificate.recomputed import require_issuable
+    from bench_service.formats.certificate.rules import faults
+    from bench_service.formats.certificate.signature import signed
+    from bench_service.telemetry.code_version import code_version
+
+    document: dict[str, Any] = json.loads(text)
+    require_issuable(document, failed)
+    root = made(document, text, facts, code_version())
+    wrong = faults(root)
+    if wrong:
+        raise Refused(f"this calibration gives no certificate: {'; '.join(wrong)}")
+    return signed(root, pair)
 
 
 @certificate.command("check")
 def check(
-    file: Annotated[Path, typer.Argument(help="The certificate")],
+    context: typer.Context,
+    file: Annotated[Path, typer.Argument(help="The certificate: .xml, or .pdf with the XML inside")],
     pinned: Annotated[Path, typer.Option("--certificate", help="The laboratory's lab.cert.pem, got from itself")],
     schema: Annotated[Path | None, typer.Option(help="Folder of the schema, with v3.3.0/dcc.xsd")] = None,
+    recompute: Annotated[
+        bool | None,
+        typer.Option(help="Analyse the raw data again; without it, where a service or a database here has them"),
+    ] = None,
+    server: Server = None,
     as_json: AsJson = False,
 ) -> None:
-    """Check signature, structure and numbers of a certificate; with --schema its schema too."""
+    """Check signature, structure and numbers of a certificate, and whether its raw data still give them."""
     from bench_service.formats.certificate.errors import CertificateRefused
     from bench_service.formats.certificate.rules import attached, faults, schema_faults
     from bench_service.formats.certificate.signature import parsed, verified
 
     try:
-        data = file.read_bytes()
+        data = _xml_of(file)
         root, signer = verified(data, pinned.read_bytes())
         wrong = faults(root) + ([] if schema is None else schema_faults(parsed(data), schema))
         if wrong:
@@ -111,19 +143,69 @@ def check(
         raise Refused(f"{file}: {error}") from error
     except OSError as error:
         raise Refused(f"{error.filename} cannot be read: {error.strerror}") from error
+    wanted = _here(context.obj, server) if recompute is None else recompute
+    repeated = _repeated(context.obj, server, document) if wanted else None
+    same = None if repeated is None else all(one.same for one in repeated)
     facts = {
         "valid": True,
         "signed_by": signer,
         "unit": document["unit"],
         "calibrations": [triad["calibration"] for triad in document["triads"]],
         "schema_checked": schema is not None,
-        "raw_data_checked": False,
+        "raw_data_checked": repeated is not None,
+        "recomputed_same": same,
+        "recomputed": {one.triad: one.sentence for one in repeated or ()},
     }
     if as_json:
         print(json.dumps(facts, indent=2))
-        return
-    console.print(f"{file}: valid, unchanged, signed by {signer}", soft_wrap=True)
-    calibrations = ", ".join(triad["calibration"] for triad in document["triads"])
-    console.print(f"unit {facts['unit']}, calibrations {calibrations}", soft_wrap=True)
-    console.print("schema: " + ("valid" if schema else "not checked, see --schema"), soft_wrap=True)
-    console.print("raw data: not analysed again; their hashes are in the certificate", soft_wrap=True)
+    else:
+        _say(file, facts)
+    if same is False:
+        raise Refused(f"{file} is signed by {signer} and unchanged, but its raw data do not give its numbers any more")
+
+
+def _xml_of(file: Path) -> bytes:
+    """The XML of a certificate, from the file or from inside a PDF. Raises `Refused`, `OSError`."""
+    from bench_service.formats.printed.attached import BEGINS, UnreadablePdf, attached_files
+
+    data = file.read_bytes()
+    if not data.startswith(BEGINS):
+        return data
+    try:
+        found = attached_files(data).get(PRINTED_XML)
+    except UnreadablePdf as error:
+        raise Refused(f"{file}: {error}") from error
+    if found is None:
+        raise Refused(f"{file}: the PDF has no {PRINTED_XML} inside, so it is no printed certificate")
+    return found
+
+
+def _here(settings: Settings, server: str | None) -> bool:
+    """Whether a service is named, or a database is here: a check makes none."""
+    kind, separator, path = settings.database_url.partition("sqlite:///")
+    return server is not None or not separator or bool(kind) or Path(path).is_file()
+
+
+def _repeated(settings: Settings, server: str | None, document: dict[str, Any]) -> "list[Repeated]":
+    """Have the service analyse the raw data again. Raises `Refused`."""
+    from bench_service.formats.certificate.recomputed import compared, results_of
+
+    with connect(settings, server, drive=False) as client:
+        answers = {
+            result: call(client, "POST", f"/api/v1/results/{segment(result)}/recomputation", ("recordings",))
+            for result in results_of(document)
+        }
+    return compared(document, answers)
+
+
+def _say(file: Path, facts: dict[str, Any]) -> None:
+    lines = [
+        f"{file}: valid, unchanged, signed by {facts['signed_by']}",
+        f"unit {facts['unit']}, calibrations {', '.join(facts['calibrations'])}",
+        "schema: " + ("valid" if facts["schema_checked"] else "not checked, see --schema"),
+        *(f"raw data of the {triad} triad: {sentence}" for triad, sentence in facts["recomputed"].items()),
+    ]
+    if not facts["raw_data_checked"]:
+        lines.append("raw data: not analysed again, see --recompute and --server; their hashes are in the certificate")
+    for line in lines:
+        console.print(line, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""Sheets as files: CSV, Parquet, Arrow (stream and file), NumPy, HDF5 and MATLAB 5, with memory that does not grow.
+"""Sheets as files: CSV, Parquet, Arrow (stream and file), NumPy, HDF5, MATLAB 5 and MCAP, in memory that is bounded.
 
 HDF5 and the Arrow file are written to a temporary file first, for they are complete only at their end. MATLAB 5 has no
 place for a column that grows: the whole is held in memory and therefore bounded.
@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pyarrow import csv
 
+from bench_service.formats.samples_out.mcap_file import mcap
 from bench_service.formats.samples_out.sheet import Sheet
 from procedures.core.errors import BadParameter
 
@@ -34,6 +35,7 @@ class SheetFormat(StrEnum):
     NPY = "npy"
     HDF5 = "h5"
     MATLAB = "mat"
+    MCAP = "mcap"
 
 
 def written(sheet: Sheet, form: SheetFormat) -> Iterator[bytes]:
@@ -49,6 +51,7 @@ def written(sheet: Sheet, form: SheetFormat) -> Iterator[bytes]:
         SheetFormat.NPY: _npy,
         SheetFormat.HDF5: _hdf5,
         SheetFormat.MATLAB: _matlab,
+        SheetFormat.MCAP: mcap,
     }
     return writers[form](sheet)
 

@@ -1,10 +1,11 @@
 """Analysis of a triad's multiposition calibration, from recordings to summary: means, fit, magnitudes, cross-check."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from procedures.analysis.calibration.budget import budgets, noise_parts, observed_part, thermal_parts
 from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.left_out import left_out_magnitudes
 from procedures.analysis.calibration.multiposition import TriadFit, fit_triad
@@ -74,9 +75,9 @@ def analyse_means(
     record: TriadRecord | None,
     with_scalar: bool = False,
     weighting: Weighting = "noise_and_table",
-    more: Array | None = None,
+    more: Mapping[str, Array] | None = None,
 ) -> tuple[TriadSummary, TriadFit]:
-    """Calibrate one triad from its station means; `more` is their covariance from causes other than noise, (3, n, n).
+    """Calibrate one triad from its station means; `more`: covariances (3, n, n) from causes other than noise, by name.
 
     Raises `UnfitRecording`, `Undetermined`.
     """
@@ -95,20 +96,23 @@ def analyse_inputs(
     record: TriadRecord | None,
     with_scalar: bool = False,
     weighting: Weighting = "noise_and_table",
-    more: Array | None = None,
+    more: Mapping[str, Array] | None = None,
 ) -> tuple[TriadSummary, TriadFit]:
     """Calibrate one triad from its station means at known input vectors (n, 3) of one magnitude, `reference` [SI].
 
     `table`: the flaws of what set them; `more` as in `analyse_means`. Raises `UnfitRecording`, `Undetermined`.
     """
     noise, known = noise_of_means(means, record)
-    noise = noise if more is None else noise + more
+    noise = noise + sum((more or {}).values())
     unit = INPUT_UNITS[means.triad]
     fit = fit_triad(means.triad, means.output_unit, unit, vectors, means.outputs, noise, table, known, weighting)
     scalar = _scalar(means, reference, noise, known, fit) if with_scalar else None
     after = magnitudes(means.outputs, fit.calibration(), reference, means.labels, fit.magnitude_sd)
     others = left_out_magnitudes(fit, vectors, means.outputs, reference, means.labels)
-    return triad_summary(fit, after, means.labels, scalar, _slow(means, noise, fit, known), others), fit
+    summary = triad_summary(fit, after, means.labels, scalar, _slow(means, noise, fit, known), others)
+    parts = noise_parts(record, means.windows, means.output_unit) if known and record else [observed_part(fit)]
+    parts += thermal_parts(more or {}, means.output_unit) if known else []
+    return replace(summary, budgets=budgets(fit, parts, table)), fit
 
 
 def _slow(means: StationMeans, noise: Array, fit: TriadFit, known: bool) -> float:
@@ -151,7 +155,8 @@ def analyse_accelerometers(
     if correction is None:
         return analyse_means(means, site, uncertainty, record, *how)[0], None, ()
     brought = bring_to_reference(recordings, means, correction, settings.lag_s)
-    summary, fit = analyse_means(brought.means, site, uncertainty, record, *how, brought.covariance)
+    more = {"thermal correction": brought.of_correction, "thermometers": brought.of_sensors}
+    summary, fit = analyse_means(brought.means, site, uncertainty, record, *how, more)
     return summary, thermal_share(brought, correction, fit), thermal_warnings(brought, correction)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from procedures.analysis.thermal.cycle.results import GyroNoise, ThermalCycle
 from procedures.core import units
-from procedures.core.limits import Check, Limit, PlannedCheck, check
+from procedures.core.limits import Check, Limit, PlannedCheck, check, significance
 from procedures.core.recording import AXES
 
 THESIS = "thesis 4.3, 5.6"
@@ -49,12 +49,12 @@ def cycle_checks(cycle: ThermalCycle, limits: CycleLimits, *, correct_gyros: boo
         limit = Limit("1", maximum=limits.allan_rise, source="thesis fig. 4.15: no positive slope")
         found.append(check(f"accelerometer_{name} rise of the Allan deviation", steepest, limit, note="worst run"))
     # Bonferroni: three gyros, one chance.
-    limit = Limit("1", minimum=limits.level / len(AXES), source="thesis table 4.6: no correlation")
+    level, source = limits.level / len(AXES), "thesis table 4.6: no correlation"
     left = {g.axis: g.p_after for g in cycle.gyros_corrected if correct_gyros and g.p_after is not None}
     for g in cycle.gyros:
         note = f"after correction, in runs that it has not seen; before: {g.p_value:.2g}" if g.axis in left else ""
         value = left.get(g.axis, g.p_value)
-        found.append(check(f"gyro_{g.axis} independence of temperature, p-value", value, limit, note=note))
+        found.append(significance(f"gyro_{g.axis} independence of temperature, p-value", value, level, note, source))
     for name in AXES:
         noises = [g for g in cycle.gyro_noise if g.axis == name]
         found.append(_noise(f"gyro_{name} random walk in the cycle", noises, 1, limits.gyro_random_walk_deg_sqrt_h))

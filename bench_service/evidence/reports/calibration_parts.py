@@ -1,0 +1,93 @@
+"""Calibrations in a printed report: as found and as left, expanded uncertainties, unrounded values, trends."""
+
+from collections.abc import Iterator, Sequence
+
+from bench_service.formats.printed.digits import to_uncertainty, two_digits
+from bench_service.formats.printed.document import Block, Facts, PrintedTable
+from bench_service.model.calibrations import StoredCalibration
+from procedures.core.imu_model import COEFFICIENT_NAMES
+from procedures.core.report import Figure, Series
+from procedures.core.units import DISPLAY
+
+FACTOR = 2.0
+"""Coverage factor of expanded uncertainties: 95.45 % of a normal distribution."""
+EXPANDED = "U is the expanded uncertainty, k = 2 (95.45 % of a normal distribution); values have its second digit."
+FIGURES = 30
+"""Newest calibrations that a trend shows."""
+
+
+def coefficients(one: StoredCalibration, found: StoredCalibration | None) -> Iterator[Block]:
+    """A calibration as left: values to their uncertainty beside those as found, then all values unrounded."""
+    yield Facts(tuple(facts(one)))
+    before = {} if found is None else {c.name: c for c in found.coefficients}
+    rows: list[tuple[str, ...]] = []
+    for c in one.coefficients:
+        unit, size = DISPLAY.get(c.unit, (c.unit, 1.0))
+        value, expanded = c.value / size, FACTOR * c.standard_uncertainty / size
+        old = before.get(c.name)
+        same = old is not None and old.unit == c.unit
+        rows.append(
+            (
+                c.name,
+                unit,
+                to_uncertainty(value, expanded),
+                two_digits(expanded),
+                to_uncertainty(old.value / size, expanded) if old is not None and same else "–",
+                to_uncertainty((c.value - old.value) / size, expanded) if old is not None and same else "–",
+            )
+        )
+    columns = ("coefficient", "unit", "as left", "U (k = 2)", "as found", "change")
+    yield PrintedTable(f"{one.triad} triad, U = b + K·v", columns, tuple(rows), (2, 3, 4, 5), EXPANDED)
+    exact = tuple((c.name, c.unit, repr(c.value), repr(c.standard_uncertainty)) for c in one.coefficients)
+    yield PrintedTable(
+        f"{one.triad} triad, as stored in SI, to the last digit",
+        ("coefficient", "unit", "value", "standard uncertainty"),
+        exact,
+        (2, 3),
+        "The whole covariance is in the attached document.",
+    )
+
+
+def facts(one: StoredCalibration) -> Iterator[tuple[str, str]]:
+    """Rows on a calibration's origin, use, approval and validity."""
+    yield "calibration", one.id
+    yield "method", one.method
+    yield "origin", one.origin or (f"result {one.result_id}" if one.result_id else "not known")
+    yield "in use", ("yes, by rule" if one.by_rule else "yes, chosen") if one.current else "no"
+    yield "approval", one.approval.value
+    ends = one.valid_until.isoformat(timespec="seconds") if one.valid_until else "no end is set"
+    yield "valid until", ends
+    for decision in one.decisions:
+        who = decision.by or "the rule"
+        known = "" if decision.proven or not decision.by else " (name as given)"
+        remark = f": {decision.remark}" if decision.remark else ""
+        yield decision.act.value, f"{decision.at.isoformat(timespec='seconds')} by {who}{known}{remark}"
+
+
+def trends(history: Sequence[StoredCalibration], triad: str) -> Iterator[Figure]:
+    """Biases and diagonal of K of a triad over its calibrations, oldest first, with expanded uncertainties."""
+    shown = [c for c in reversed(history) if c.triad == triad and c.value.output_unit != "count"][-FIGURES:]
+    if len(shown) < 2:
+        return
+    x = tuple(float(k) for k in range(1, len(shown) + 1))
+    first, last = (c.made_at.date().isoformat() for c in (shown[0], shown[-1]))
+    for title, names, about in (
+        ("Bias", ("b_x", "b_y", "b_z"), 0.0),
+        ("Scale factor less one", ("K11", "K22", "K33"), 1.0),
+    ):
+        places = [COEFFICIENT_NAMES.index(name) for name in names]
+        unit, size = ("ppm", 1e-6) if about else DISPLAY.get(shown[0].coefficients[0].unit, ("", 1.0))
+        series = tuple(
+            Series(
+                name,
+                x,
+                tuple((c.coefficients[i].value - about) / size for c in shown),
+                tuple(FACTOR * c.coefficients[i].standard_uncertainty / size for c in shown),
+                "line_points",
+            )
+            for name, i in zip(names, places, strict=True)
+        )
+        note = f"{len(shown)} calibrations from {first} to {last}; bars are expanded uncertainties, k = 2."
+        yield Figure(
+            f"{title} of the {triad} triad", "calibration, oldest first", f"{title}, {unit}", series, note=note
+        )

@@ -1,0 +1,166 @@
+"""The printed report of a result, whatever its procedure or method."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.reports import calibration_parts, context_parts
+from bench_service.evidence.stores import EvidenceStores
+from bench_service.formats.printed.digits import to_uncertainty, two_digits
+from bench_service.formats.printed.document import (
+    Block,
+    Facts,
+    Heading,
+    Paragraph,
+    PrintedDocument,
+    PrintedTable,
+    blocks_of,
+)
+from bench_service.model.calibrations import StoredCalibration
+from bench_service.model.job import Job
+from bench_service.model.records import StoredResult
+
+SIMULATED = "SIMULATED: the data come from a simulated bench and no real unit."
+SIMPLE = "Simple acceptance: a value is compared with its limit, its uncertainty is not taken off."
+
+
+@dataclass(frozen=True)
+class ResultReport:
+    """A result with everything that its report is made of."""
+
+    result: StoredResult
+    job: Job | None
+    calibrations: tuple[StoredCalibration, ...]
+    """Calibrations that the result gave."""
+    found: dict[str, StoredCalibration]
+    """Triad -> the calibration that was in use when the job began."""
+
+
+def gathered(stores: EvidenceStores, result: StoredResult, job: Job | None) -> ResultReport:
+    """Gather what a result's report needs."""
+    unit = result.context.get("unit") or {}
+    before = stores.calibrations.several(unit.get("calibration_ids") or ())
+    given = stores.calibrations.of_results([result.id])
+    return ResultReport(result, job, tuple(given), {c.triad: c for c in before})
+
+
+def result_report(stores: EvidenceStores, catalogue: Catalogue, of: ResultReport) -> PrintedDocument:
+    """The report of a result: identity, mounting, instruments, conditions, results, plots, verdict, people, hashes."""
+    result = of.result
+    blocks = [*_head(of), *context_parts.identity(result.context, result.unit or "none")]
+    if result.context:
+        blocks += [*context_parts.mounting(result.context), *context_parts.instruments(result.context)]
+    recordings = [stores.recordings.get(known) for known, _ in result.recordings]
+    blocks += context_parts.conditions(result.context, recordings)
+    blocks += _calibrations(stores, of)
+    report = catalogue.report(result)
+    sections = blocks_of(report)
+    if sections:
+        blocks += [Heading("Results in detail"), *([Paragraph(report.summary)] if report.summary else []), *sections]
+    blocks += [*_people(of), *context_parts.hashes(result.recordings), *_lineage(result)]
+    return PrintedDocument(
+        title=result.name.replace("_", " "),
+        subject=f"unit {result.unit}" if result.unit else "without a unit",
+        verdict=result.verdict.value.upper(),
+        identifier=f"result {result.id}",
+        at=result.created_at,
+        blocks=tuple(blocks),
+    )
+
+
+def _head(of: ResultReport) -> Iterator[Block]:
+    """The marks that must be seen first, and the verdict."""
+    result = of.result
+    if result.simulated:
+        yield Paragraph(SIMULATED, warning=True)
+    for one in of.calibrations:
+        if one.approval.value == "rejected":
+            yield Paragraph(f"NOT FOR USE: calibration {one.id} of the {one.triad} triad was rejected.", warning=True)
+    yield from verdict_blocks(result)
+
+
+def verdict_blocks(result: StoredResult) -> Iterator[Block]:
+    """The verdict with its decision rule, its checks and the warnings."""
+    yield Heading("Verdict")
+    yield Paragraph(f"{result.verdict.value.upper()}. {_rule(result.document)}")
+    checks = result.document.get("checks", [])
+    if checks:
+        yield _checks(checks)
+    for warning in result.document.get("warnings", []):
+        yield Paragraph(warning, warning=True)
+
+
+def _rule(document: dict[str, Any]) -> str:
+    """The decision rule: the document's own sentence where it has one."""
+    stated = document.get("decision_rule")
+    return stated if isinstance(stated, str) and stated else SIMPLE
+
+
+def _checks(checks: list[dict[str, Any]]) -> PrintedTable:
+    rows: list[tuple[str, ...]] = []
+    for c in sorted(checks, key=lambda c: c["passed"]):
+        limit, sd = c["limit"], c.get("standard_uncertainty")
+        expanded = None if sd is None else calibration_parts.FACTOR * sd
+        bounds = [
+            f"{sign} {limit[end]:g}" for end, sign in (("minimum", "≥"), ("maximum", "≤")) if limit[end] is not None
+        ]
+        rows.append(
+            (
+                "pass" if c["passed"] else "FAIL",
+                c["name"],
+                to_uncertainty(c["value"], expanded),
+                "–" if expanded is None else two_digits(expanded),
+                " and ".join(bounds),
+                limit["unit"],
+                c.get("note", ""),
+            )
+        )
+    columns = ("", "check", "value", "U (k = 2)", "limit", "unit", "note")
+    return PrintedTable("Checks", columns, tuple(rows), (2, 3), calibration_parts.EXPANDED)
+
+
+def _calibrations(stores: EvidenceStores, of: ResultReport) -> Iterator[Block]:
+    """Coefficients as found and as left, and their trend up to this result."""
+    for one in of.calibrations:
+        yield Heading(f"Calibration of the {one.triad} triad, as found and as left")
+        yield from calibration_parts.coefficients(one, of.found.get(one.triad))
+        history = stores.calibrations.list(one.unit, triad=one.triad, limit=200).items
+        older = [c for c in history if c.made_at <= one.made_at and c.simulated == one.simulated]
+        yield from calibration_parts.trends(older, one.triad)
+    if not of.calibrations and of.found:
+        yield Heading("Calibrations in use")
+        yield Paragraph("The result left the unit's calibrations as it found them.")
+        for one in of.found.values():
+            yield Facts((("triad", one.triad), *calibration_parts.facts(one)))
+
+
+def _people(of: ResultReport) -> Iterator[Block]:
+    yield Heading("Who and when")
+    job, rows = of.job, [("result", of.result.created_at.isoformat(timespec="seconds"))]
+    if job is not None:
+        rows = [
+            ("requested by", job.requested_by or "no name was given"),
+            ("requested", job.created_at.isoformat(timespec="seconds")),
+            ("begun", job.started_at.isoformat(timespec="seconds") if job.started_at else "–"),
+            ("ended", job.finished_at.isoformat(timespec="seconds") if job.finished_at else "–"),
+            ("job", job.id),
+            ("bench", job.bench),
+            *rows,
+        ]
+    yield Facts(tuple(rows))
+
+
+def _lineage(result: StoredResult) -> Iterator[Block]:
+    yield Heading("Lineage")
+    rows = [
+        ("result", result.id),
+        ("made by", f"{result.name} {result.version}"),
+        ("code", result.code_version),
+        ("calibrations used", ", ".join(result.calibrations) or "none"),
+        ("corrections used", ", ".join(result.corrections) or "none"),
+    ]
+    if result.seed is not None:
+        rows.append(("seed", str(result.seed)))
+    yield Facts(tuple(rows))
+    yield Paragraph("Parameters, and every number unrounded, are in the attached result.json.")

@@ -1,0 +1,65 @@
+"""Printed reports for whoever asks: of a result, of a unit, of a certificate, each as the bytes of a PDF/A-3."""
+
+import base64
+from collections.abc import Callable
+from dataclasses import replace
+
+from pydantic_core import to_json
+
+from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.reports.result_report import gathered, result_report
+from bench_service.evidence.reports.unit_report import unit_report
+from bench_service.evidence.stores import EvidenceStores
+from bench_service.evidence.work_processes import WorkProcesses
+from bench_service.formats.printed.document import Attachment, PrintedDocument
+from bench_service.model.job import Job
+from bench_service.model.records import StoredResult
+
+RESULT = "result.json"
+
+
+class ReportService:
+    """Makes printed reports from what is stored."""
+
+    def __init__(
+        self,
+        stores: EvidenceStores,
+        catalogue: Catalogue,
+        read_job: Callable[[str], Job],
+        processes: WorkProcesses | None = None,
+    ) -> None:
+        """Set up with `processes`, where reports are typeset; None: here, in the caller's thread."""
+        self._stores = stores
+        self._catalogue = catalogue
+        self._read_job = read_job
+        self._processes = processes
+
+    def of_result(self, result_id: str) -> bytes:
+        """The report of a result, with its document attached. Raises `NotFound`."""
+        result = self._stores.results.get(result_id)
+        job = None if result.job_id is None else self._read_job(result.job_id)
+        document = result_report(self._stores, self._catalogue, gathered(self._stores, result, job))
+        return self._typeset(replace(document, attachments=(_attached(result),)))
+
+    def of_unit(self, serial: str) -> bytes:
+        """The report of a unit. Raises `NotFound`."""
+        return self._typeset(unit_report(self._stores, serial))
+
+    def of_certificate(self, serial: str, xml: str) -> bytes:
+        """The printed form of a unit's certificate, which is attached byte for byte. Raises `BadParameter`."""
+        from bench_service.evidence.reports.certificate_report import certificate_report  # with scipy and signxml
+
+        return self._typeset(certificate_report(self._stores, self._catalogue, serial, xml.encode()))
+
+    def _typeset(self, document: PrintedDocument) -> bytes:
+        if self._processes is not None:
+            return base64.b64decode(self._processes.result("print", document))
+        from bench_service.formats.printed.typesetting import typeset
+
+        return typeset(document)
+
+
+def _attached(result: StoredResult) -> Attachment:
+    """The whole stored result as a file."""
+    data = to_json(result, indent=1) + b"\n"
+    return Attachment(RESULT, "application/json", data, "Data", "the result with every number unrounded")

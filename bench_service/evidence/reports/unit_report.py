@@ -1,0 +1,116 @@
+"""The printed report of a unit: its record, its calibrations with their history, and its latest results."""
+
+from collections.abc import Iterator
+from datetime import datetime
+
+from bench_service.evidence.reports import calibration_parts
+from bench_service.evidence.stores import EvidenceStores
+from bench_service.formats.printed.document import Block, Facts, Heading, Paragraph, PrintedDocument, PrintedTable
+from bench_service.model.calibrations import StoredCalibration
+from bench_service.model.records import StoredResult
+from procedures.core.recording import TRIADS
+from procedures.core.unit import Unit
+from procedures.core.units import NOISE_DISPLAY
+
+RESULTS = 20
+"""Newest results that the report lists."""
+
+
+def unit_report(stores: EvidenceStores, serial: str) -> PrintedDocument:
+    """The report of a unit as it is known now. Raises `NotFound`."""
+    unit = stores.units.unit(serial)
+    history = stores.calibrations.list(serial, limit=200).items
+    results = stores.results.list(unit=serial, limit=RESULTS).items
+    blocks: list[Block] = [*_identity(unit), *_noise(unit), *_calibrations(history), *_results(results)]
+    moments = (
+        [c.made_at for c in history] + [d.at for c in history for d in c.decisions] + [r.created_at for r in results]
+    )
+    newest = max(moments, default=datetime.fromisoformat("1970-01-01T00:00:00+00:00"))
+    return PrintedDocument("Unit", f"unit {serial}", "", f"unit {serial}", newest, tuple(blocks))
+
+
+def _identity(unit: Unit) -> Iterator[Block]:
+    yield Heading("Identity")
+    declared = unit.declaration
+    rows = [("serial", unit.serial)]
+    if declared is not None:
+        rows += [
+            ("model", declared.model or "–"),
+            ("part", declared.part or "–"),
+            ("firmware", declared.firmware or "–"),
+        ]
+    rows.append(("sample rate", f"{unit.sample_rate_hz:g} Hz"))
+    rows.append(("channels", ", ".join(c.name for c in unit.channels)))
+    yield Facts(tuple(rows))
+    for withheld in unit.withheld:
+        yield Paragraph(withheld.why, warning=True)
+    stated = [
+        (c.state, c.day, c.certificate, c.triad, ", ".join(f"{b:.6g}" for b in c.bias))
+        for c in (declared.coefficients if declared is not None else ())
+    ]
+    if stated:
+        columns = ("state", "day", "certificate", "triad", "bias")
+        yield PrintedTable("Coefficients by former certificates", columns, tuple(stated))
+
+
+def _noise(unit: Unit) -> Iterator[Block]:
+    yield Heading("Noise")
+    rows: list[tuple[str, ...]] = []
+    columns: tuple[str, ...] = ()
+    for triad, rate_unit in (("gyro", "rad/s"), ("accelerometer", "m/s^2")):
+        record = unit.triad(triad)
+        if record is None:
+            continue
+        columns = ("channel", *(name.replace("_", " ") for name in NOISE_DISPLAY[rate_unit]), "origin")
+        for name, noise in zip(TRIADS[triad], record.noise, strict=True):
+            cells = [
+                f"{getattr(noise, process) / size:.4g} {label}"
+                for process, (label, size) in NOISE_DISPLAY[rate_unit].items()
+            ]
+            rows.append((name, *cells, record.noise_origin))
+    if rows:
+        yield PrintedTable("", columns, tuple(rows))
+    else:
+        yield Paragraph("Nothing is known of the unit's noise.")
+
+
+def _calibrations(history: tuple[StoredCalibration, ...]) -> Iterator[Block]:
+    """The calibration in use of each triad beside the one before it, then the history and its trends."""
+    if any(c.simulated for c in history):
+        yield Paragraph("SIMULATED: calibrations of this unit come from a simulated bench.", warning=True)
+    for triad in TRIADS:
+        of_triad = [c for c in history if c.triad == triad]
+        current = next((c for c in of_triad if c.current), None)
+        yield Heading(f"Calibration of the {triad} triad")
+        if current is None:
+            yield Paragraph("None is in use.")
+        else:
+            older = [c for c in of_triad if c.made_at < current.made_at]
+            yield from calibration_parts.coefficients(current, older[0] if older else None)
+        yield from calibration_parts.trends(of_triad, triad)
+    if history:
+        rows = tuple(
+            (
+                c.made_at.date().isoformat(),
+                c.triad,
+                c.id,
+                c.method,
+                "in use" if c.current else "",
+                c.verdict.value if c.verdict else "entered",
+                c.approval.value,
+            )
+            for c in history
+        )
+        columns = ("day", "triad", "calibration", "method", "", "verdict", "approval")
+        yield PrintedTable("History, newest first", columns, rows)
+
+
+def _results(results: tuple[StoredResult, ...]) -> Iterator[Block]:
+    yield Heading("Latest results")
+    rows = tuple(
+        (r.created_at.isoformat(timespec="seconds"), f"{r.name} {r.version}", r.id, r.verdict.value) for r in results
+    )
+    if rows:
+        yield PrintedTable("", ("at", "procedure or method", "result", "verdict"), rows)
+    else:
+        yield Paragraph("None.")
