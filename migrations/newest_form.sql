@@ -1,4 +1,4 @@
--- revision 0012
+-- revision 0017
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -224,7 +224,7 @@ CREATE TABLE jobs (
 	started_at DATETIME, 
 	finished_at DATETIME, 
 	result_id VARCHAR, 
-	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, mounting VARCHAR, 
+	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, mounting VARCHAR, number INTEGER, 
 	CONSTRAINT pk_jobs PRIMARY KEY (id)
 );
 
@@ -411,6 +411,8 @@ CREATE INDEX ix_jobs_bench_state_priority_queued_at_id ON jobs (bench, state, pr
 
 CREATE INDEX ix_jobs_finished_at_id ON jobs (finished_at, id);
 
+CREATE UNIQUE INDEX ix_jobs_number ON jobs (number);
+
 CREATE INDEX ix_jobs_procedure_id ON jobs (procedure, id);
 
 CREATE INDEX ix_jobs_state_id ON jobs (state, id);
@@ -457,5 +459,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0012');
+INSERT INTO "alembic_version" VALUES ('0017');
 

@@ -11,6 +11,7 @@ from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.orm import InstrumentedAttribute
 from sqlalchemy.sql.functions import FunctionElement
 
+from bench_service.model.job import job_number
 from bench_service.model.search import LabelSought, Search
 from bench_service.persistence.tables.evidence import RecordingRow, ResultRow
 from bench_service.persistence.tables.jobs import JobRow
@@ -43,7 +44,8 @@ def find_jobs(query: S, search: Search) -> S:
     if search.text is None:
         return query
     named = (JobRow.id, JobRow.procedure, JobRow.unit, JobRow.bench, JobRow.requested_by)
-    return query.where(or_(*(_holds(column, search.text) for column in named), _label_holds(search.text)))
+    texts = [_holds(column, search.text) for column in named]
+    return query.where(or_(*texts, _label_holds(search.text), *_numbered(search.text)))
 
 
 def find_recordings(query: S, search: Search) -> S:
@@ -58,7 +60,7 @@ def find_recordings(query: S, search: Search) -> S:
     station = RecordingRow.station["label"].as_string()
     files = ImportedNames(RecordingRow.source).table_valued("name")
     named = (RecordingRow.id, RecordingRow.unit, RecordingRow.bench, RecordingRow.job_id, station)
-    in_job = exists().where(job, _label_holds(search.text))
+    in_job = exists().where(job, or_(_label_holds(search.text), *_numbered(search.text)))
     in_file = exists(select(files.c.name).where(_holds(files.c.name, search.text)))
     return query.where(or_(*(_holds(column, search.text) for column in named), in_job, in_file))
 
@@ -73,7 +75,7 @@ def find_results(query: S, search: Search) -> S:
     if search.text is None:
         return query
     named = (ResultRow.id, ResultRow.name, ResultRow.unit, ResultRow.job_id)
-    in_job = exists().where(job, _label_holds(search.text))
+    in_job = exists().where(job, or_(_label_holds(search.text), *_numbered(search.text)))
     return query.where(or_(*(_holds(column, search.text) for column in named), in_job))
 
 
@@ -104,6 +106,12 @@ def _has_label(label: LabelSought) -> ColumnElement[bool]:
 def _label_holds(text: str) -> ColumnElement[bool]:
     pairs = JsonPairs(JobRow.labels).table_valued("key", "value")
     return exists(select(pairs.c.key).where(or_(_holds(pairs.c.key, text), _holds(pairs.c.value, text))))
+
+
+def _numbered(text: str) -> list[ColumnElement[bool]]:
+    """Condition that a job has the number that the text is, where it is one."""
+    number = job_number(text)
+    return [] if number is None else [JobRow.number == number]
 
 
 def _holds(column: Any, text: str) -> ColumnElement[bool]:

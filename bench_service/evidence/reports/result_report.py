@@ -144,7 +144,7 @@ def _people(of: ResultReport) -> Iterator[Block]:
             ("requested", job.created_at.isoformat(timespec="seconds")),
             ("begun", job.started_at.isoformat(timespec="seconds") if job.started_at else "–"),
             ("ended", job.finished_at.isoformat(timespec="seconds") if job.finished_at else "–"),
-            ("job", job.id),
+            ("job", f"#{job.number}, {job.id}"),
             ("bench", job.bench),
             *rows,
         ]

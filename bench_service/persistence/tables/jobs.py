@@ -17,6 +17,7 @@ class JobRow(Table):
         Index("ix_jobs_unit_id", "unit", "id"),
         Index("ix_jobs_bench_state_priority_queued_at_id", "bench", "state", "priority", "queued_at", "id"),
         Index("ix_jobs_finished_at_id", "finished_at", "id"),
+        Index("ix_jobs_number", "number", unique=True),
     )
 
     id: Mapped[str] = mapped_column(Id, primary_key=True)
@@ -55,6 +56,8 @@ class JobRow(Table):
     finished_at: Mapped[datetime | None]
     result_id: Mapped[str | None] = mapped_column(Id)
     failure: Mapped[dict[str, Any] | None] = mapped_column(Document)
+    number: Mapped[int] = mapped_column(nullable=True)
+    """Short number, never NULL; to declare that in an existing table, SQLite would have to copy it."""
 
 
 class EventRow(Table):
