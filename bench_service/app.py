@@ -14,6 +14,8 @@ from threadpoolctl import threadpool_limits
 from bench_service.api import (
     audit,
     audit_chain,
+    batches,
+    console,
     database,
     health,
     metrics,
@@ -23,6 +25,7 @@ from bench_service.api import (
     reservations,
     results,
     samples,
+    storage,
     trends,
 )
 from bench_service.api.access import guard, identify
@@ -35,34 +38,29 @@ from bench_service.api.feed import routes as feed
 from bench_service.api.http import bodies, door, endings, errors, headers, queries, request_id, transfer
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs import routes as jobs
+from bench_service.api.manual import routes as manual
 from bench_service.api.openapi import document
 from bench_service.api.units import calibrations
 from bench_service.api.units import routes as units
 from bench_service.bench.devices import BenchDevices
 from bench_service.bench.directory import BenchDirectory
-from bench_service.bench.driver import BenchDriver
-from bench_service.bench.live.values import Heartbeat, LiveBoard
+from bench_service.bench.live.values import LiveBoard
 from bench_service.bench.prompts import AskedOperator
 from bench_service.bench.safety import SafetyService
 from bench_service.bench.stop.elsewhere import StopAddresses
 from bench_service.bench.stop.road import StopRoads
 from bench_service.bench_files import BenchFiles
-from bench_service.campaigns.stores import Stores
-from bench_service.collector import no_collection
 from bench_service.drivers.composition import devices_of, driver_of, own_devices
 from bench_service.drivers.simulated import drawn_unit
+from bench_service.driving import driving
 from bench_service.evidence.catalogue import Catalogue
 from bench_service.evidence.reports.printing_process import open_printing
 from bench_service.evidence.work_processes import WorkApart, WorkProcesses
-from bench_service.jobs.dispatcher import Dispatcher, JobEngine
 from bench_service.jobs.events.hub import EventHub
-from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.planning import Planner
-from bench_service.jobs.runner import JobRunner
-from bench_service.jobs.worker import Worker
-from bench_service.notifications.opening import begin_notifier
 from bench_service.pages import (
     access_pages,
+    bench_pages,
     campaign_pages,
     console_pages,
     docs,
@@ -75,17 +73,17 @@ from bench_service.pages import (
 from bench_service.pages import routes as pages
 from bench_service.pages.drawing_process import open_drawing
 from bench_service.pages.errors import ErrorPages
-from bench_service.persistence import BenchLease, Database, acquire_lease, engine_database, lease_holder, open_stores
+from bench_service.persistence import Database, lease_holder, open_stores
 from bench_service.persistence.bench.host_files import HostFiles
 from bench_service.persistence.bench.stop_addresses import SqlStopAddresses
-from bench_service.persistence.database import as_storage_error
 from bench_service.persistence.evidence.analysis_run import open_run
+from bench_service.persistence.evidence.batch_running import runner_maker
 from bench_service.persistence.upkeep.contents import DatabaseContents
-from bench_service.service import LEAST_FREE_BYTES, BenchService
+from bench_service.service import BenchService
 from bench_service.settings import Settings
 from bench_service.telemetry.audit_retention import begin_retention
 from bench_service.telemetry.code_version import code_version
-from bench_service.telemetry.tracing import Traces, traces_to
+from bench_service.telemetry.tracing import traces_to
 
 IMPORT_THREADS = 4
 """Maximum number of imports that are stored or wait for a reader at one time; more wait without a thread."""
@@ -96,6 +94,7 @@ ROUTERS = (
     jobs,
     recordings,
     samples,
+    batches,
     results,
     units,
     calibrations,
@@ -103,17 +102,31 @@ ROUTERS = (
     benches,
     reservations,
     mountings,
+    manual,
     campaigns,
     schedules,
     access,
     audit,
     database,
+    storage,
     audit_chain,
     health,
     metrics,
     feed,
+    *console.PARTS,
 )
-PAGES = (static_files, languages, docs, access_pages, images, stop_pages, console_pages, pages, campaign_pages)
+PAGES = (
+    static_files,
+    languages,
+    docs,
+    access_pages,
+    images,
+    stop_pages,
+    bench_pages,
+    console_pages,
+    pages,
+    campaign_pages,
+)
 
 
 def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apart: bool = False) -> BenchService:
@@ -141,7 +154,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     closing.callback(traces.close)
     worker, board = None, LiveBoard(stores.live)
     if driver is not None:
-        worker, board = _drive(settings, opened, stores, planner, driver, code, traces, files, closing)
+        worker, board = driving(settings, opened, stores, planner, driver, code, traces, files, closing)
     safety = SafetyService(
         stores.benches, partial(_devices, settings), partial(HostFiles, settings.devices_in()), stores.jobs.note
     )
@@ -161,7 +174,8 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         rescued=rescued,
         processes=processes,
         database=DatabaseContents(opened),
-        scrub_at=settings.scrub_at,
+        settings=settings,
+        runner=runner_maker(opened, settings.database_url, code, closing, apart),
     )
     if settings.audit_days is not None:
         begin_retention(stores.audit, timedelta(days=settings.audit_days), closing)
@@ -170,38 +184,6 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
     closing.callback(service.stop)
     service.register()
     return service
-
-
-def _drive(
-    settings: Settings,
-    opened: Database,
-    stores: Stores,
-    planner: Planner,
-    driver: BenchDriver,
-    code: str,
-    traces: Traces,
-    files: BenchFiles,
-    closing: ExitStack,
-) -> tuple[Worker, LiveBoard]:
-    """The worker of this process's bench, with its lease, heartbeat and stop guard. Raises `BenchBusy`."""
-    lease = acquire_lease(settings.database_url, settings.bench_id)
-    closing.callback(lease.release)
-    files.begin_driving()
-    closing.callback(files.host.end_driving)
-    board = LiveBoard(stores.live, settings.bench_id)
-    heartbeat = Heartbeat(board, stores.live)
-    heartbeat.begin()
-    closing.callback(heartbeat.end)
-    runner = InstrumentedRunner(
-        stores, planner, driver, code, lease.held, board, settings.retry_scale, traces, files.stopped
-    )
-    worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease, files))
-    guard = files.guard(runner.stop_now, worker.wake)
-    guard.begin()
-    closing.callback(guard.end)
-    closing.callback(files.keep_books(stores).end)
-    begin_notifier(settings, stores, opened.free_bytes, LEAST_FREE_BYTES, closing)
-    return worker, board
 
 
 def _roads(settings: Settings, opened: Database, closing: ExitStack) -> StopRoads:
@@ -228,21 +210,6 @@ def _devices(settings: Settings, bench_id: str) -> BenchDevices:
     return own_devices(settings) if bench_id == settings.bench_id else devices_of(settings.devices_in(), bench_id)
 
 
-def _engine(settings: Settings, runner: JobRunner) -> JobEngine:
-    """Make the job engine, imported here because that takes as long as the rest of the service."""
-    with no_collection():
-        from bench_service.jobs.engine import Engine
-
-    books = engine_database(settings.database_url, settings.bench_id)
-    return Engine(*books, settings.bench_id, runner, as_storage_error)
-
-
-def _dispatcher(
-    settings: Settings, stores: Stores, lease: BenchLease, files: BenchFiles, runner: JobRunner, engine: JobEngine
-) -> Dispatcher:
-    return Dispatcher(settings.bench_id, stores, runner, engine, lease, settings.poll_s, files.stopped)
-
-
 def create_app(
     service: BenchService,
     max_import_bytes: int,
@@ -257,7 +224,7 @@ def create_app(
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncGenerator[None]:
-        service.begin(warm_up=[figures.warm_up])
+        service.begin([figures.warm_up], answers=True)
         try:
             yield
         finally:

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from bench_service.access.book import AccessBook
 from bench_service.access.service import AccessService
@@ -14,13 +15,20 @@ from bench_service.bench.stop.road import StopRoads
 from bench_service.campaigns.service import CampaignService
 from bench_service.campaigns.stores import Stores
 from bench_service.evidence.analyses import AnalysisService
+from bench_service.evidence.batches.runner import RunnerMaker
+from bench_service.evidence.batches.service import BatchService
+from bench_service.evidence.estimates import EstimateService
 from bench_service.evidence.imports import ImportService
+from bench_service.evidence.raw_data.nightly import NightlyStorage
+from bench_service.evidence.raw_data.service import RawDataService, StorageSettings
 from bench_service.evidence.recomputation import RecomputationService
 from bench_service.evidence.reports.service import ReportService
 from bench_service.evidence.units import register
 from bench_service.evidence.upkeep import NightlyScrub, UpkeepService
 from bench_service.evidence.work_processes import WorkApart
 from bench_service.jobs.history import is_empty, missing_history
+from bench_service.jobs.manual.presence import Presence
+from bench_service.jobs.manual.service import ManualService
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue_service import QueueService
 from bench_service.jobs.service import JobService
@@ -28,6 +36,7 @@ from bench_service.jobs.stops import StopService
 from bench_service.jobs.worker import Worker
 from bench_service.model.errors import NotDriving, NotReady
 from bench_service.model.records import reasons_of
+from bench_service.settings import Settings
 from bench_service.telemetry.tracing import Traces
 from bench_service.telemetry.upkeep import DatabasePort, NoDatabase
 
@@ -54,14 +63,16 @@ class BenchService:
         rescued: Rescue | None = None,
         processes: WorkApart | None = None,
         database: DatabasePort | None = None,
-        scrub_at: str = "",
+        settings: Settings | None = None,
+        runner: RunnerMaker | None = None,
     ) -> None:
         """Set up with `driver` of this process's own bench; None: it plans and queues for benches that workers drive.
 
         `free_bytes`: room on the database's disk, where that is known. `roads`: the ways of a stop to its bench; None:
         through the database alone. `rescued`: the result of making devices safe at start. `processes`: where
         analyses are computed and reports typeset; None: in the caller's thread. `database`: the database as a whole;
-        None: not known. `scrub_at`: the time of the nightly check, "HH:MM"; empty: none.
+        None: not known. `settings`: the time of the nightly work, and the rules for raw data; None: no such work, and
+        no rules. `runner`: builds the runner of batches of analyses; None: other processes run their tasks.
         """
         self.access = AccessService(stores.access, AccessBook(stores.access))
         self.safety = safety
@@ -80,8 +91,13 @@ class BenchService:
             stores, planner.catalogue, stores.jobs.get, code_version, processes and processes.analyses
         )
         self.reports = ReportService(stores, planner.catalogue, stores.jobs.get, processes and processes.printing)
+        self.estimates = EstimateService(partial(_estimates, stores), stores.jobs.get, processes and processes.analyses)
+        self._runner = None if runner is None else runner(stores.batches, self.analyses)
+        self.batches = BatchService(stores, planner.catalogue, self._runner.wake if self._runner else lambda: None)
         self.queues = QueueService(stores, planner.benches, self._wake)
         self.jobs = JobService(stores, planner, self.queues, driver, worker, code_version, self._wake)
+        self.manual = ManualService(stores, planner.benches, self.queues, self._wake)
+        self._presence = Presence(stores.manual)
         self._roads = roads or StopRoads(None)
         self.stops = StopService(stores, planner.benches, safety, self._wake, self._roads, stores.audit)
         self.campaigns = CampaignService(stores, planner, self.analyses, self.jobs.submit, self.jobs.cancel)
@@ -92,7 +108,11 @@ class BenchService:
         self.upkeep = UpkeepService(stores, database or NoDatabase(), f"the service, {ProcessIdentity.own()}")
         self._missing = ""
         """The sentence on a history that the devices remember and the database does not; empty: there is none."""
-        self._nightly = NightlyScrub(self.upkeep, scrub_at)
+        rules = settings or Settings(scrub_at="")
+        kept = StorageSettings(rules.raw_days, rules.archive_days, rules.archive)
+        self.raw_data = RawDataService(stores, database or NoDatabase(), kept, stores.raw_data.archive_at)
+        nightly = NightlyStorage(self.raw_data, stores, f"the service, {ProcessIdentity.own()}")
+        self._nightly = NightlyScrub(self.upkeep, rules.scrub_at, nightly.run)
 
     def register(self) -> None:
         """Register the bench and its units, and discard orphaned imports."""
@@ -109,11 +129,16 @@ class BenchService:
                 log.warning("bench %s: %s", self._driver.description.id, self._missing)
             self.safety.at_start(self._driver.description.id, self._rescued)
 
-    def begin(self, warm_up: Sequence[Callable[[], object]] = ()) -> None:
+    def begin(self, warm_up: Sequence[Callable[[], object]] = (), answers: bool = False) -> None:
         """Begin to work while the service already answers. The bench's lease must be held.
 
+        `answers`: this process answers clients, which keeps leases of manual mode alive.
         `warm_up` is called while no job runs, once the engine runs and the numerics are loaded.
         """
+        if answers:
+            self._presence.begin()
+        if self._runner is not None and self._runner.resumes:
+            self._runner.begin()
         if self._worker is not None:
             self._worker.begin([lambda: self.catalogue.procedures, lambda: self.catalogue.methods, *warm_up])
             self.campaigns.conductor.begin()
@@ -157,6 +182,7 @@ class BenchService:
     def stop(self) -> None:
         """End the service: the running job is left for the next start, and the bench made safe."""
         self._nightly.end()
+        self._presence.end()
         self.campaigns.conductor.stop()
         if self._worker is not None:
             self._worker.shut_down()
@@ -169,3 +195,10 @@ class BenchService:
                 self._worker.wake()
         else:
             self._roads.wake(bench_id)
+
+
+def _estimates(stores: Stores, job_id: str) -> str:
+    """Work out a job's estimates here: only a command's own service does, its numerics are loaded for that alone."""
+    from bench_service.evidence.estimating import Estimating
+
+    return Estimating(stores, stores.jobs.get).text(job_id)

@@ -77,6 +77,12 @@ class Settings(BaseModel):
     scrub_at: str = Field("03:30", pattern=r"^(|([01][0-9]|2[0-3]):[0-5][0-9])$")
     """Time of day, on this host's clock, of the nightly check of the database by a process that drives a bench; empty:
     none."""
+    raw_days: float | None = Field(None, gt=0)
+    """Days after which the raw data of routine passes are removed, each night; None: never."""
+    archive: str | None = Field(None, min_length=1)
+    """Archive of raw data: a folder, or `s3://bucket/prefix` with the store's options; None: none."""
+    archive_days: float | None = Field(None, gt=0)
+    """Days after which raw data are moved to the archive, each night; None: only when a person asks for it."""
     stop_listen: str = Field("127.0.0.1:0", pattern=r"^(|\S+:\d{1,5})$")
     """Address at which a bench's supervisor takes stops from other hosts, `host:port`, port 0 for any; empty: none.
 

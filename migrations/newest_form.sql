@@ -1,4 +1,4 @@
--- revision 0017
+-- revision 0021
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -19,6 +19,52 @@ CREATE TABLE accounts (
 CREATE TABLE alembic_version (
 	version_num VARCHAR(32) NOT NULL, 
 	CONSTRAINT alembic_version_pkc PRIMARY KEY (version_num)
+);
+
+CREATE TABLE analysis_batches (
+	id VARCHAR NOT NULL, 
+	method VARCHAR NOT NULL, 
+	version VARCHAR NOT NULL, 
+	parameters JSON NOT NULL, 
+	calibrations JSON NOT NULL, 
+	selection JSON NOT NULL, 
+	"each" VARCHAR NOT NULL, 
+	priority INTEGER NOT NULL, 
+	requested_by VARCHAR NOT NULL, 
+	created_at DATETIME NOT NULL, 
+	total INTEGER NOT NULL, 
+	cancelled_at DATETIME, 
+	cancelled_by VARCHAR NOT NULL, 
+	ended_at DATETIME, 
+	final_counts JSON, 
+	CONSTRAINT pk_analysis_batches PRIMARY KEY (id)
+);
+
+CREATE TABLE analysis_task_recordings (
+	batch_id VARCHAR NOT NULL, 
+	number INTEGER NOT NULL, 
+	position INTEGER NOT NULL, 
+	recording_id VARCHAR NOT NULL, 
+	CONSTRAINT pk_analysis_task_recordings PRIMARY KEY (batch_id, number, position), 
+	CONSTRAINT fk_analysis_task_recordings_batch_id_analysis_tasks FOREIGN KEY(batch_id, number) REFERENCES analysis_tasks (batch_id, number), 
+	CONSTRAINT fk_analysis_task_recordings_recording_id_recordings FOREIGN KEY(recording_id) REFERENCES recordings (id)
+);
+
+CREATE TABLE analysis_tasks (
+	batch_id VARCHAR NOT NULL, 
+	number INTEGER NOT NULL, 
+	state VARCHAR NOT NULL, 
+	priority INTEGER NOT NULL, 
+	attempt INTEGER NOT NULL, 
+	worker VARCHAR NOT NULL, 
+	claimed_at DATETIME, 
+	ended_at DATETIME, 
+	not_before DATETIME, 
+	result_id VARCHAR, 
+	failure JSON, 
+	CONSTRAINT pk_analysis_tasks PRIMARY KEY (batch_id, number), 
+	CONSTRAINT fk_analysis_tasks_batch_id_analysis_batches FOREIGN KEY(batch_id) REFERENCES analysis_batches (id), 
+	CONSTRAINT fk_analysis_tasks_result_id_results FOREIGN KEY(result_id) REFERENCES results (id)
 );
 
 CREATE TABLE approvals (
@@ -72,7 +118,7 @@ CREATE TABLE bench_stops (
 	safe_by VARCHAR NOT NULL, 
 	released_at DATETIME, 
 	released_by VARCHAR NOT NULL, 
-	remark VARCHAR NOT NULL, 
+	remark VARCHAR NOT NULL, entered_at DATETIME, 
 	CONSTRAINT pk_bench_stops PRIMARY KEY (id)
 );
 
@@ -135,7 +181,7 @@ CREATE TABLE campaigns (
 	name VARCHAR NOT NULL, 
 	document JSON NOT NULL, 
 	created_at DATETIME NOT NULL, 
-	updated_at DATETIME NOT NULL, 
+	updated_at DATETIME NOT NULL, team VARCHAR DEFAULT '' NOT NULL, 
 	CONSTRAINT pk_campaigns PRIMARY KEY (name)
 );
 
@@ -161,6 +207,18 @@ CREATE TABLE coefficients (
 	CONSTRAINT fk_coefficients_calibration_id_calibrations FOREIGN KEY(calibration_id) REFERENCES calibrations (id)
 );
 
+CREATE TABLE correction_decisions (
+	id VARCHAR NOT NULL, 
+	correction_id VARCHAR NOT NULL, 
+	act VARCHAR NOT NULL, 
+	at DATETIME NOT NULL, 
+	"by" VARCHAR NOT NULL, 
+	proven BOOLEAN NOT NULL, 
+	remark VARCHAR NOT NULL, 
+	CONSTRAINT pk_correction_decisions PRIMARY KEY (id), 
+	CONSTRAINT fk_correction_decisions_correction_id_corrections FOREIGN KEY(correction_id) REFERENCES corrections (id)
+);
+
 CREATE TABLE corrections (
 	id VARCHAR NOT NULL, 
 	unit VARCHAR NOT NULL, 
@@ -169,7 +227,7 @@ CREATE TABLE corrections (
 	made_at DATETIME NOT NULL, 
 	is_current BOOLEAN NOT NULL, 
 	simulated BOOLEAN NOT NULL, 
-	document JSON NOT NULL, 
+	document JSON NOT NULL, approval VARCHAR DEFAULT 'open' NOT NULL, valid_until DATETIME, 
 	CONSTRAINT pk_corrections PRIMARY KEY (id), 
 	CONSTRAINT fk_corrections_result_id_results FOREIGN KEY(result_id) REFERENCES results (id)
 );
@@ -224,8 +282,44 @@ CREATE TABLE jobs (
 	started_at DATETIME, 
 	finished_at DATETIME, 
 	result_id VARCHAR, 
-	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, mounting VARCHAR, number INTEGER, 
+	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, mounting VARCHAR, team VARCHAR DEFAULT '' NOT NULL, number INTEGER, 
 	CONSTRAINT pk_jobs PRIMARY KEY (id)
+);
+
+CREATE TABLE manual_demands (
+	id VARCHAR NOT NULL, 
+	lease VARCHAR NOT NULL, 
+	"key" VARCHAR NOT NULL, 
+	kind VARCHAR NOT NULL, 
+	"values" JSON NOT NULL, 
+	"by" VARCHAR NOT NULL, 
+	at DATETIME NOT NULL, 
+	state VARCHAR NOT NULL, 
+	answer JSON NOT NULL, 
+	ended_at DATETIME, 
+	CONSTRAINT pk_manual_demands PRIMARY KEY (id), 
+	CONSTRAINT uq_manual_demands_lease_key UNIQUE (lease, "key")
+);
+
+CREATE TABLE manual_leases (
+	id VARCHAR NOT NULL, 
+	bench VARCHAR NOT NULL, 
+	unit VARCHAR NOT NULL, 
+	holder VARCHAR NOT NULL, 
+	proven BOOLEAN NOT NULL, 
+	reason VARCHAR NOT NULL, 
+	created_at DATETIME NOT NULL, 
+	until DATETIME NOT NULL, 
+	team VARCHAR NOT NULL, 
+	reservation VARCHAR, 
+	began_at DATETIME, 
+	process VARCHAR NOT NULL, 
+	heard INTEGER NOT NULL, 
+	end_asked VARCHAR NOT NULL, 
+	ended_at DATETIME, 
+	ended_because VARCHAR NOT NULL, 
+	safe BOOLEAN, 
+	CONSTRAINT pk_manual_leases PRIMARY KEY (id)
 );
 
 CREATE TABLE mountings (
@@ -244,6 +338,18 @@ CREATE TABLE mountings (
 	ended_at DATETIME, 
 	ended_by VARCHAR NOT NULL, 
 	CONSTRAINT pk_mountings PRIMARY KEY (id)
+);
+
+CREATE TABLE recording_holds (
+	id VARCHAR NOT NULL, 
+	recording_id VARCHAR NOT NULL, 
+	reason VARCHAR NOT NULL, 
+	"by" VARCHAR NOT NULL, 
+	held_at DATETIME NOT NULL, 
+	released_at DATETIME, 
+	released_by VARCHAR NOT NULL, 
+	CONSTRAINT pk_recording_holds PRIMARY KEY (id), 
+	CONSTRAINT fk_recording_holds_recording_id_recordings FOREIGN KEY(recording_id) REFERENCES recordings (id)
 );
 
 CREATE TABLE recordings (
@@ -266,7 +372,7 @@ CREATE TABLE recordings (
 	state VARCHAR NOT NULL, 
 	created_at DATETIME NOT NULL, 
 	source JSON NOT NULL, 
-	checkpoint JSON, launched_s FLOAT, measured JSON, 
+	checkpoint JSON, launched_s FLOAT, measured JSON, raw VARCHAR DEFAULT 'stored' NOT NULL, raw_changed_at DATETIME, archive VARCHAR, 
 	CONSTRAINT pk_recordings PRIMARY KEY (id), 
 	CONSTRAINT fk_recordings_job_id_jobs FOREIGN KEY(job_id) REFERENCES jobs (id)
 );
@@ -290,6 +396,13 @@ CREATE TABLE result_calibrations (
 	CONSTRAINT pk_result_calibrations PRIMARY KEY (result_id, position), 
 	CONSTRAINT fk_result_calibrations_calibration_id_calibrations FOREIGN KEY(calibration_id) REFERENCES calibrations (id), 
 	CONSTRAINT fk_result_calibrations_result_id_results FOREIGN KEY(result_id) REFERENCES results (id)
+);
+
+CREATE TABLE result_contents (
+	content VARCHAR NOT NULL, 
+	result_id VARCHAR NOT NULL, 
+	CONSTRAINT pk_result_contents PRIMARY KEY (content), 
+	CONSTRAINT fk_result_contents_result_id_results FOREIGN KEY(result_id) REFERENCES results (id)
 );
 
 CREATE TABLE result_corrections (
@@ -373,6 +486,16 @@ CREATE TABLE tokens (
 	CONSTRAINT pk_tokens PRIMARY KEY (id)
 );
 
+CREATE TABLE unit_notes (
+	id VARCHAR NOT NULL, 
+	unit VARCHAR NOT NULL, 
+	at DATETIME NOT NULL, 
+	"by" VARCHAR NOT NULL, 
+	proven BOOLEAN NOT NULL, 
+	text VARCHAR NOT NULL, 
+	CONSTRAINT pk_unit_notes PRIMARY KEY (id)
+);
+
 CREATE TABLE units (
 	serial VARCHAR NOT NULL, 
 	document JSON NOT NULL, 
@@ -391,6 +514,12 @@ CREATE TABLE upkeep (
 	CONSTRAINT pk_upkeep PRIMARY KEY (id)
 );
 
+CREATE INDEX ix_analysis_task_recordings_recording_id ON analysis_task_recordings (recording_id);
+
+CREATE INDEX ix_analysis_tasks_batch_id_state ON analysis_tasks (batch_id, state);
+
+CREATE INDEX ix_analysis_tasks_state_priority_batch_id_number ON analysis_tasks (state, priority, batch_id, number);
+
 CREATE UNIQUE INDEX ix_audit_sequence ON audit (sequence);
 
 CREATE INDEX ix_bench_stops_bench_id ON bench_stops (bench, id);
@@ -404,6 +533,8 @@ CREATE INDEX ix_calibrations_unit_id ON calibrations (unit, id);
 CREATE INDEX ix_campaign_runs_campaign_id ON campaign_runs (campaign, id);
 
 CREATE INDEX ix_campaign_runs_state_id ON campaign_runs (state, id);
+
+CREATE INDEX ix_correction_decisions_correction_id_id ON correction_decisions (correction_id, id);
 
 CREATE INDEX ix_corrections_unit_id ON corrections (unit, id);
 
@@ -419,11 +550,21 @@ CREATE INDEX ix_jobs_state_id ON jobs (state, id);
 
 CREATE INDEX ix_jobs_unit_id ON jobs (unit, id);
 
+CREATE INDEX ix_manual_demands_lease_id ON manual_demands (lease, id);
+
+CREATE INDEX ix_manual_leases_bench_id ON manual_leases (bench, id);
+
+CREATE UNIQUE INDEX ix_manual_leases_open ON manual_leases (bench) WHERE ended_at IS NULL;
+
 CREATE INDEX ix_mountings_bench_id ON mountings (bench, id);
 
 CREATE INDEX ix_mountings_unit_id ON mountings (unit, id);
 
+CREATE INDEX ix_recording_holds_recording_id ON recording_holds (recording_id);
+
 CREATE INDEX ix_recordings_job_id_id ON recordings (job_id, id);
+
+CREATE INDEX ix_recordings_raw_state_stored_bytes ON recordings (raw, state, stored_bytes);
 
 CREATE INDEX ix_recordings_state_stored_bytes ON recordings (state, stored_bytes);
 
@@ -447,6 +588,8 @@ CREATE UNIQUE INDEX ix_tokens_digest ON tokens (digest);
 
 CREATE INDEX ix_tokens_name ON tokens (name);
 
+CREATE INDEX ix_unit_notes_unit_id ON unit_notes (unit, id);
+
 CREATE INDEX ix_upkeep_kind_id ON upkeep (kind, id);
 
 CREATE UNIQUE INDEX uq_calibrations_current_unit_triad ON calibrations (unit, triad) WHERE is_current;
@@ -459,5 +602,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0017');
+INSERT INTO "alembic_version" VALUES ('0021');
 

@@ -10,10 +10,23 @@ from dataclasses import replace
 from procedures.analysis.fitness.findings import Kind
 from procedures.analysis.fitness.watched import Inspection, Watch
 from procedures.analysis.measured_stations import at_measured_angles
+from procedures.core.decision import OutcomeName
 from procedures.core.errors import BadParameter, DomainError, MissingChannel
+from procedures.core.limits import Check, Verdict, decided
 from procedures.core.recording import Recording, cut
 from procedures.core.unit import Unit
-from procedures.procedure import Context, Evidence, Method, P, Procedure, R, RecordedParameters
+from procedures.parameters import DecisionRules
+from procedures.procedure import (
+    Context,
+    Evidence,
+    JudgedParameters,
+    Method,
+    P,
+    Procedure,
+    R,
+    RecordedParameters,
+    Statement,
+)
 
 
 def analyse_procedure(procedure: Procedure[P, R], recordings: Sequence[Recording], params: P, context: Context) -> R:
@@ -24,7 +37,9 @@ def analyse_procedure(procedure: Procedure[P, R], recordings: Sequence[Recording
     """
     used, sentence = at_measured_angles(recordings) if context.bench.accuracy.measured else (recordings, "")
     outcome = _inspected(used, procedure.inspection(params), lambda r: procedure.analyse(r, params, context))
-    return outcome.model_copy(update={"warnings": (sentence, *outcome.warnings)}) if sentence else outcome
+    if sentence:
+        outcome = outcome.model_copy(update={"warnings": (sentence, *outcome.warnings)})
+    return judged(outcome, params)
 
 
 def analyse_method(method: Method[P, R], evidence: Evidence, params: P, unit: Unit | None) -> R:
@@ -34,7 +49,40 @@ def analyse_method(method: Method[P, R], evidence: Evidence, params: P, unit: Un
     def analyse(watched: Sequence[Recording]) -> R:
         return method.analyse(replace(evidence, recordings=tuple(watched)), params, unit)
 
-    return _inspected(recordings, method.inspection(params, len(recordings)), analyse)
+    return judged(_inspected(recordings, method.inspection(params, len(recordings)), analyse), params)
+
+
+def judged(outcome: R, params: object) -> R:
+    """The outcome under the decision rules of its parameters: checks, verdict and statement of conformity.
+
+    A rule can make a pass a fail, never the reverse; a verdict that is an error stays one. A rule for a check that the
+    result does not have is a warning: where names are known beforehand it was refused.
+    """
+    given = params.decision if isinstance(params, JudgedParameters) else None
+    rules = DecisionRules() if given is None else given
+    checks = tuple(decided(c, rules.of(c.name)) for c in outcome.checks)
+    if not checks:
+        return outcome
+    failed = any(not c.passed for c in checks)
+    final = Verdict.FAIL if failed and outcome.verdict is Verdict.PASS else outcome.verdict
+    unused = [name for name in rules.by_check if name not in {c.name for c in checks}]
+    warnings = tuple(f"the decision rule for {name!r} was not used: there is no such check" for name in unused)
+    statement = None if final is Verdict.ERROR else _statement(checks, final, rules)
+    changed = {"checks": checks, "verdict": final, "warnings": (*outcome.warnings, *warnings), "statement": statement}
+    return outcome.model_copy(update=changed)
+
+
+def _statement(checks: Sequence[Check], final: Verdict, rules: DecisionRules) -> Statement:
+    """A pass is conditional where any value is near its limit, a fail where each value that fails is."""
+    near = tuple(c.name for c in checks if c.decision is not None and c.decision.conditional)
+    deciding = [c for c in checks if final is Verdict.PASS or not c.passed]
+    sure = [c.decision is None or not c.decision.conditional for c in deciding]
+    conditional = not all(sure) if final is Verdict.PASS else bool(deciding) and not any(sure)
+    outcome: OutcomeName = "pass" if final is Verdict.PASS else "fail"
+    if conditional:
+        outcome = "conditional pass" if final is Verdict.PASS else "conditional fail"
+    own = {str(rules.of(c.name)) for c in checks if not c.significance}
+    return Statement(outcome, "; ".join(sorted(own)) or "test of significance", near)
 
 
 def _inspected(

@@ -5,21 +5,25 @@ Defines the parameters and the checks. The numerics are in `procedures.analysis.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal, TypeVar
 
 from pydantic import Field
 
-from procedures.analysis.launch.analysis import INSPECTION, analyse_launch
+from procedures.analysis.launch.analysis import INSPECTION
+from procedures.analysis.launch.analysis import analyse_launches as all_launches
 from procedures.analysis.launch.prediction import predicted_noise
-from procedures.analysis.launch.results import LaunchNoise
+from procedures.analysis.launch.results import ChannelNoise, LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.summary import ChannelSummary, summarise
+from procedures.analysis.launch.surroundings import vibration, with_origins
 from procedures.core import units
-from procedures.core.errors import UnfitRecording
+from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
+from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import TRIADS, Recording
 from procedures.core.unit import Unit
-from procedures.procedure import Outcome, Parameters
+from procedures.procedure import JudgedParameters, Outcome, Parameters
 
 SOURCE = "thesis 4.3, 5.6"
 LAUNCH = INSPECTION
@@ -33,9 +37,23 @@ class NoiseLimits(Parameters):
     gyro_random_walk_deg_sqrt_h: float = Field(0.003, gt=0.0, le=1e6)
     gyro_bias_in_run_deg_h: float = Field(0.015, gt=0.0, le=1e6, description="bias instability")
     accelerometer_bias_in_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0, description="bias instability")
+    readiness_s: float | None = Field(
+        None,
+        gt=0.0,
+        le=1e6,
+        description="since the launch, by which a warm-up that was found has ended; null: no check",
+    )
+    absence_level: float | None = Field(
+        None,
+        gt=0.0,
+        le=0.2,
+        description="rate random walk and ramp must be absent; chance that a sound unit fails; null: no check",
+    )
+    vibration_deg_h: float | None = Field(None, gt=0.0, description="of the base, rms above 1 Hz; null: no check")
+    vibration_m_s2: float | None = Field(None, gt=0.0, description="the same by the accelerometers")
 
 
-class NoiseParameters(Parameters):
+class NoiseParameters(JudgedParameters):
     """Steps of the analysis, each can be switched; what it changes is in the result's table of steps."""
 
     cell_s: float = Field(1.0, gt=0.0, le=3600.0, description="cell whose means the slow part works on")
@@ -54,6 +72,10 @@ class NoiseParameters(Parameters):
     confidence: float = Field(0.95, gt=0.5, lt=1.0, description="of the intervals")
     level: float = Field(0.01, gt=0.0, le=0.2, description="chance that an absent process is reported present")
     points_per_decade: int = Field(10, ge=3, le=100, description="of the deviation curves")
+    band_step_decades: float | None = Field(
+        None, ge=0.002, le=1.0, description="of the band over all starts (paper A: 0.002); null: as the curves"
+    )
+    band_launch: int = Field(1, ge=1, le=100, description="launch whose band, interval and lines are drawn")
     noise_limits: NoiseLimits = Field(default_factory=lambda: NoiseLimits.model_validate({}))
 
     def settings(self) -> LaunchSettings:
@@ -71,6 +93,7 @@ class NoiseParameters(Parameters):
             confidence=self.confidence,
             level=self.level,
             points_per_decade=self.points_per_decade,
+            band_step_decades=self.band_step_decades,
         )
 
 
@@ -81,25 +104,32 @@ class NoiseResult(Outcome):
     channels: tuple[ChannelSummary, ...]
     averaging_time_s: float | None
     """The longest of the channels': the dwell that a calibration needs. None: quantization rules nowhere."""
+    drawn_launch: int = 1
+    """Number of the launch whose band, interval and lines are drawn."""
 
 
 R = TypeVar("R", bound=NoiseResult)
 
 
-def analyse_launches(result: type[R], recordings: Sequence[Recording], params: NoiseParameters) -> R:
+def analyse_launches(
+    result: type[R], recordings: Sequence[Recording], params: NoiseParameters, unit: Unit | None = None
+) -> R:
     """Analyse each recording as a launch of its own, block by block, then all of them together, with checks.
 
-    Raises `UnfitRecording`, `MissingChannel`, `BadParameter`.
+    `unit`: lines are matched to its declared dithers. Raises `UnfitRecording`, `MissingChannel`, `BadParameter`.
     """
     if not recordings:
         raise UnfitRecording("there is no recording to analyse")
     settings = params.settings()
-    launches = tuple(analyse_launch(r, _label(r, i), settings) for i, r in enumerate(recordings, start=1))
+    if params.band_launch > len(recordings):
+        raise BadParameter("band_launch", params.band_launch, f"1 … {len(recordings)}, the launches that there are")
+    labels = [_label(r, i) for i, r in enumerate(recordings, start=1)]
+    launches = tuple(_matched(launch, unit) for launch in all_launches(recordings, labels, settings))
     names = {tuple((c.channel, c.rate_unit) for c in launch.channels) for launch in launches}
     if len(names) > 1:
         raise UnfitRecording("the recordings have different channels: analyse them one by one")
     channels = summarise(launches)
-    checks = _checks(channels, params.noise_limits)
+    checks = (*_checks(channels, params.noise_limits), *surroundings_checks(launches, channels, params.noise_limits))
     longest = max((s.averaging_time_s for s in channels if s.averaging_time_s is not None), default=None)
     return result(
         checks=checks,
@@ -108,7 +138,37 @@ def analyse_launches(result: type[R], recordings: Sequence[Recording], params: N
         launches=launches,
         channels=channels,
         averaging_time_s=longest,
+        drawn_launch=params.band_launch,
     )
+
+
+def _matched(launch: LaunchNoise, unit: Unit | None) -> LaunchNoise:
+    """The launch beside the unit's record: origins of its lines by the declared dithers, vibration by the known noise.
+
+    The fitted noise takes a part of a vibration for its own; that of the record does not know it.
+    """
+    if unit is None:
+        return launch
+    dithers = None if unit.gyro is None else unit.gyro.dither_frequency_hz
+    found: list[ChannelNoise] = []
+    for c in launch.channels:
+        known = _known_noise(unit, c)
+        if known is not None and c.density is not None:
+            c = replace(c, vibration=vibration(c.density, c.lines, known, c.bandwidth_hz))
+        if dithers is not None:
+            c = replace(c, lines=with_origins(c.lines, c.channel, dithers, launch.rate_hz))
+        found.append(c)
+    return replace(launch, channels=tuple(found))
+
+
+def _known_noise(unit: Unit, channel: ChannelNoise) -> NoiseCoefficients | None:
+    """Noise of a channel in the unit's record; None where it has none, or the channel is in counts."""
+    for triad, names in TRIADS.items():
+        record = unit.triad(triad)
+        if channel.channel in names and record is not None and channel.rate_unit != "count":
+            noise = record.noise[names.index(channel.channel)]
+            return noise if noise.quantization > 0.0 or noise.random_walk > 0.0 else None
+    return None
 
 
 def _warnings(launches: Sequence[LaunchNoise]) -> tuple[str, ...]:
@@ -155,7 +215,7 @@ def noise_checks(params: NoiseParameters, unit: Unit, duration_s: float, launche
     for triad, process, name, size, field in LIMITED:
         record = unit.triad(triad)
         limit = Limit(name, maximum=getattr(params.noise_limits, field), source=SOURCE)
-        for channel, noise in zip(TRIADS[triad], record.noise if record else (), strict=False):
+        for channel, noise in zip(TRIADS[triad], record.observed_noise if record else (), strict=False):
             of_process = [p for p in predicted_noise(channel, noise, duration_s, launches) if p.process == process]
             check_name = f"{channel} {process.replace('_', ' ')}"
             for p in of_process:
@@ -181,3 +241,43 @@ def _check(s: ChannelSummary, process: str, maximum: float, unit: str, size: flo
     described = all(reading.described for reading in found.values)
     reason = "not observed" if described else "not described by the noise model"
     return check(name, bound / size, limit, note=f"{reason}: the value is what it stays below")
+
+
+READY, BASE = "thesis table 1.4, 4.1.2", "ours: base vibration"
+
+
+def surroundings_checks(
+    launches: Sequence[LaunchNoise], channels: Sequence[ChannelSummary], limits: NoiseLimits
+) -> list[Check]:
+    """Readiness, absence of rate random walk and ramp, and base vibration, each where its limit is given."""
+    found: list[Check] = []
+    for index, s in enumerate(channels):
+        of_launches = [launch.channels[index] for launch in launches]
+        name, ends = s.channel, [c.warm_up for c in of_launches if c.warm_up is not None]
+        if limits.readiness_s is not None and s.rate_unit != "count":
+            limit = Limit("s", maximum=limits.readiness_s, source=READY)
+            if ends:
+                last = max(ends, key=lambda w: w.end_s)
+                note = "" if last.has_ended else "it has not ended within the launch: extrapolated"
+                found.append(check(f"{name} readiness time", last.end_s, limit, last.end_sd_s, note))
+            else:
+                found.append(check(f"{name} readiness time", 0.0, limit, note="no warm-up was found"))
+        if limits.absence_level is not None:
+            level = limits.absence_level / (2 * len(channels))
+            limit = Limit("1", minimum=level, source="thesis 4.1.2: their absence is a sign of quality")
+            for process in ("rate_random_walk", "rate_ramp"):
+                p_values = [c.coefficient(process).likelihood.p_value for c in of_launches]
+                least = min((p for p in p_values if p is not None), default=1.0)
+                value = min(1.0, len(p_values) * least)  # Bonferroni: several launches, one chance
+                found.append(check(f"{name} {process.replace('_', ' ')} absent, p-value", value, limit))
+        found += _vibration(name, s.rate_unit, of_launches, limits)
+    return found
+
+
+def _vibration(name: str, rate_unit: str, launches: Sequence[ChannelNoise], limits: NoiseLimits) -> list[Check]:
+    maximum = {"rad/s": limits.vibration_deg_h, "m/s^2": limits.vibration_m_s2}.get(rate_unit)
+    seen = [c.vibration.vibration for c in launches if c.vibration is not None]
+    if maximum is None or not seen:
+        return []
+    unit, size = ("deg/h", units.DEG_PER_HOUR) if rate_unit == "rad/s" else ("m/s^2", 1.0)
+    return [check(f"{name} base vibration, rms", max(seen) / size, Limit(unit, maximum=maximum, source=BASE))]

@@ -23,20 +23,20 @@ from procedures.analysis.calibration.triad_analysis import analyse_inputs, noise
 from procedures.core.arrays import Array
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, triad_calibration
-from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.limits import Check, Limit, check, significance, verdict
 from procedures.core.recording import Recording
 from procedures.core.report import Report, Table
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
-from procedures.procedure import Outcome, Parameters, PredictedUncertainty
+from procedures.procedure import JudgedParameters, Outcome, PredictedUncertainty
 from procedures.reports import calibration as pictures
 
 TriadName = Literal["accelerometer", "gyro"]
 ACCELEROMETER_TERMS: tuple[Kind, ...] = ("quadratic", "asymmetry")
 
 
-class FitParameters(Parameters):
+class FitParameters(JudgedParameters):
     """Settings of the fit. Weights as in `calibration_12_orientations`."""
 
     triads: tuple[TriadName, ...] = Field(("gyro", "accelerometer"), min_length=1, max_length=2)
@@ -171,6 +171,7 @@ def report(result: Result) -> Report:
     magnitudes = [t.magnitudes for t in result.triads]
     tables = [pictures.triad_table(t) for t in result.triads]
     tables += [_term_table(e) for e in result.extended]
+    tables += [pictures.budget_table(t.calibration.triad, t.budgets) for t in result.triads if t.budgets]
     tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
     tables += [pictures.magnitude_table(magnitudes, "Magnitudes over the positions")]
     figures = [f for t in result.triads for f in pictures.triad_figures(t)]
@@ -192,8 +193,8 @@ def _checks(t: TriadSummary, extended: Extended | None, params: FitParameters) -
     checks = [check(f"{triad} condition number", condition, Limit("1", maximum=params.condition_max))]
     p_value = t.p_value if extended is None else extended.p_value
     if p_value is not None:
-        limit = Limit("1", minimum=params.residual_p_value_min)
-        checks.append(check(f"{triad} residuals, p-value of chi-square", p_value, limit, note=f"worst: {t.worst}"))
+        name = f"{triad} residuals, p-value of chi-square"
+        checks.append(significance(name, p_value, params.residual_p_value_min, t.residual_note))
     elif t.misfit is not None and extended is None:
         limit = Limit("1", maximum=MISFIT_MAX, source="ours")
         name = f"{triad} residuals over what noise and positions allow"

@@ -1,8 +1,8 @@
 """Interface of a catalogue file: a procedure is three functions and a little around them."""
 
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Generic, Self, TypeVar
+from typing import Annotated, Any, Generic, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -10,6 +10,7 @@ from procedures.analysis.fitness.findings import FitnessSettings
 from procedures.analysis.fitness.watched import Inspection
 from procedures.bench import Bench, BenchDescription
 from procedures.bench.imu import Stream
+from procedures.core.decision import OutcomeName
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Check, PlannedCheck, Verdict
@@ -18,30 +19,21 @@ from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.unit import Unit
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
+from procedures.parameters import JudgedParameters as JudgedParameters
+from procedures.parameters import Parameters
+from procedures.parameters import RecordedParameters as RecordedParameters
 
 
-class Parameters(BaseModel):
-    """Base of every parameter model: unknown names are refused, NaN and infinity too."""
+@dataclass(frozen=True)
+class Statement:
+    """Statement of conformity of a whole result."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-    def filled(self, defaults: Mapping[str, Any]) -> Self:
-        """Copy the parameters with each None replaced by its default, where there is one."""
-        return self.model_copy(update={name: value for name, value in defaults.items() if getattr(self, name) is None})
-
-
-Second = Annotated[float, Field(ge=0.0, le=1e9)]
-
-
-class RecordedParameters(Parameters):
-    """Base of the parameters of methods that work on recordings, or on a stretch of them."""
-
-    start_s: Second | tuple[Second, ...] | None = Field(
-        None, description="from this second of each recording; a list: one for each"
-    )
-    stop_s: Second | tuple[Second, ...] | None = Field(
-        None, description="up to this second of each recording; a list: one for each"
-    )
+    outcome: OutcomeName
+    """The verdict, conditional where some value lies within its expanded uncertainty of the limit."""
+    rule: str
+    """Decision rule in words."""
+    conditional: tuple[str, ...] = ()
+    """Checks whose values lie within their expanded uncertainty of the limit."""
 
 
 class Outcome(BaseModel):
@@ -52,6 +44,9 @@ class Outcome(BaseModel):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
+    statement: Statement | None = Field(
+        None, exclude_if=lambda found: found is None, description="None without checks and in results of older versions"
+    )
 
 
 @dataclass(frozen=True)

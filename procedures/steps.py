@@ -225,3 +225,48 @@ async def _soaked(bench: Bench, chamber: Chamber, profile: TemperatureProfile, s
                 if await _advance(chamber, progress, t_s, readings, reading.air_c):
                     return
     raise SoakNotReached("the converter has not soaked in the time that the profile allows")
+
+
+WATCH_S = 60.0
+"""The chamber is looked at so often while the unit soaks switched off [s]."""
+
+
+async def record_cold_start(bench: Bench, station: Station) -> Stream:
+    """Record the first moments of a unit that has soaked at the station's temperature, switched off.
+
+    Off, chamber to the temperature of the station's profile, off for `power_off_s`, on, record; the chamber's readings
+    stand in two more channels as those of `record_profile`. Raises `SoakNotReached` where the chamber's air is not at
+    its target by then, `DeviceFault` (no chamber, tripped, door open), and as the devices do.
+    """
+    chamber, profile = bench.chamber, station.profile
+    if chamber is None or profile is None:
+        raise DeviceFault(f"station {station.label!r} needs a thermal chamber and a temperature")
+    await bench.supply.switch_off()
+    leg = profile.legs[-1]
+    await _command(chamber, leg)
+    left_s = station.power_off_s
+    while left_s > 0.0:
+        await bench.clock.sleep(min(WATCH_S, left_s))
+        left_s -= WATCH_S
+        _require_working(await chamber.read())
+    reading = await chamber.read()
+    if abs(reading.air_c - leg.target_c) > profile.criterion.air_within_c:
+        raise SoakNotReached(
+            f"after {station.power_off_s:g} s the chamber's air was at {reading.air_c:.1f} °C, and {leg.target_c:g} °C "
+            "was the target: give it more time (soak_s), or find out why"
+        )
+    await _switch_on(bench, station)
+    stream = bench.imu.record(station.record_s, station)
+    _columns(stream.channels)
+    said = _with_chamber(chamber, stream)
+    return replace(stream, channels=(*stream.channels, *CHAMBER_CHANNELS), blocks=said)
+
+
+async def _with_chamber(chamber: Chamber, stream: Stream) -> Blocks:
+    """The stream's blocks with the chamber's readings appended."""
+    async for block in stream.blocks:
+        reading = await chamber.read()
+        set_point_c = reading.air_c if reading.set_point_c is None else reading.set_point_c
+        said = [round(value / CHAMBER_SCALE_C) for value in (reading.air_c, set_point_c)]
+        yield np.column_stack([block, np.broadcast_to(np.array(said, dtype=np.int32), (len(block), 2))])
+        _require_working(reading)

@@ -6,7 +6,9 @@ from procedures.analysis.thermal.converter import zero_and_scale
 from procedures.analysis.thermal.normalised import fit_normalised
 from procedures.core.arrays import Array
 from procedures.core.converter import ConverterModel, Normalised
+from procedures.core.gyro_thermal import GyroPolynomial, GyroThermalCorrection
 from procedures.core.thermal_correction import AxisCorrection, Form, ThermalCorrection
+from procedures.core.thermometers import SensorCorrection, ThermometerCorrection
 from procedures.core.unit_correction import UnitCorrection
 
 
@@ -37,6 +39,19 @@ def thermal(seed: int, form: Form = Form.BOTH) -> UnitCorrection:
 
     first_stage = converter(seed + 1).converter if form is Form.SWITCHED else None
     return UnitCorrection("thermal", ThermalCorrection("accelerometer", (axis(), axis(), axis()), first_stage))
+
+
+def thermometers(seed: int) -> UnitCorrection:
+    rng = np.random.Generator(np.random.PCG64(seed))
+    sensors = tuple(SensorCorrection(f"temperature_{i}", *(0.01 * rng.normal(size=2)).tolist()) for i in range(3))
+    return UnitCorrection("thermometers", ThermometerCorrection(sensors, 20.25, _covariance(rng, 6), (-39.5, 60.1)))
+
+
+def gyros(seed: int) -> UnitCorrection:
+    rng = np.random.Generator(np.random.PCG64(seed))
+    curves = [GyroPolynomial(tuple(rng.normal(size=n).tolist()), _covariance(rng, n) if n else ()) for n in (2, 0, 1)]
+    known = thermometers(seed + 1).thermometers
+    return UnitCorrection("gyros", GyroThermalCorrection((curves[0], curves[1], curves[2]), 20.1, (-40.0, 60.0), known))
 
 
 def converter_model(

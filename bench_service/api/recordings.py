@@ -24,6 +24,7 @@ from bench_service.formats.plain_json import shown
 from bench_service.formats.proposal.model import Proposal
 from bench_service.jobs.numbers import job_id_of
 from bench_service.mapping import copied
+from bench_service.model.raw_data import RawState
 from bench_service.model.records import RecordingState, StoredRecording
 from bench_service.service import BenchService
 from procedures.core.errors import BadParameter
@@ -54,6 +55,8 @@ class RecordingView(BaseModel):
     stored_bytes: int
     chunks: int
     created_at: datetime
+    raw: RawState = Field(description="Where the raw samples are; `removed`: reading them answers 410")
+    raw_changed_at: datetime | None = Field(description="When they came there; null: never moved")
     source: dict[str, Any] = Field(
         description="Of an import: files, description, and `clock`, what its stamps say. Of a bench with a bench file: "
         "`origin` (real, mixed or simulated) and `devices`, with identities and certificates"
@@ -112,7 +115,7 @@ def read_recording(recording_id: str, service: Service) -> RecordingView:
     return RecordingView.of(stored, service.stores.results.of_recording(recording_id))
 
 
-@router.get("/{recording_id}/data", response_class=StreamingResponse, responses={**problems(404, 409), **DATA})
+@router.get("/{recording_id}/data", response_class=StreamingResponse, responses={**problems(404, 409, 410), **DATA})
 async def read_data(
     recording_id: str,
     service: Service,
@@ -173,7 +176,7 @@ class OverviewView(BaseModel):
     channels: list[OverviewChannel]
 
 
-@router.get("/{recording_id}/overview", responses=problems(404))
+@router.get("/{recording_id}/overview", responses=problems(404, 410))
 def read_overview(
     recording_id: str,
     service: Service,

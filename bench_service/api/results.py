@@ -4,9 +4,11 @@ from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
+from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 
-from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
+from bench_service.api.batches import BatchView, RecordingSelection
+from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, RequestedBy, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.fields import NAME, Request
 from bench_service.api.http.printed import PDF, PRINTED, printed
@@ -14,7 +16,10 @@ from bench_service.api.http.queries import Searched
 from bench_service.evidence.analyses import AnalysisRequest
 from bench_service.evidence.recomputation import Recomputation
 from bench_service.mapping import copied
+from bench_service.model.batches import BatchRequest, Grouping
 from bench_service.model.records import StoredResult
+from bench_service.service import BenchService
+from procedures.core.errors import BadParameter
 from procedures.core.limits import Verdict
 from procedures.core.mounting import Mounting
 from procedures.core.report import Figure, Table
@@ -29,6 +34,11 @@ class AnalysisSubmission(Request):
     recordings: list[str] = Field(default_factory=list[str], max_length=1000)
     calibrations: list[str] = Field(default_factory=list[str], max_length=1000)
     parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+    selection: RecordingSelection | None = Field(
+        None, description="Instead of `recordings`: a query; a batch with one task for each group is queued (202)"
+    )
+    each: Grouping = Field(Grouping.RECORDING, description="With `selection`: recordings that are analysed together")
+    priority: int = Field(10, ge=0, le=100, description="With `selection`: among batches, smaller runs first")
 
 
 class Lineage(BaseModel):
@@ -94,17 +104,44 @@ class ResultPage(BaseModel):
 @router.post(
     "/analyses",
     status_code=201,
-    responses={**problems(404, 409, 413, 507), **made(201, "result_id", "read_result_by_id")},
+    response_model=ResultView,
+    responses={
+        **problems(404, 409, 413, 507),
+        **made(201, "result_id", "read_result_by_id"),
+        202: {"model": BatchView, "description": "With `selection`: the batch is queued"},
+    },
 )
 def run_method(
-    body: AnalysisSubmission, service: Service, response: Response, key: IdempotencyKey = None
-) -> ResultView:
-    """Run a method on given recordings or calibrations of one unit."""
+    body: AnalysisSubmission,
+    service: Service,
+    response: Response,
+    requested_by: RequestedBy,
+    key: IdempotencyKey = None,
+) -> ResultView | JSONResponse:
+    """Run a method on given recordings or calibrations of one unit; with a selection, queue a batch of analyses.
+
+    The tasks of a batch run in processes of their own, here or on other machines, and give way to jobs on benches. A
+    task takes the stored result of the same content (recordings by their hashes, method, version, parameters,
+    calibrations, the unit's record) where there is one. Too many waiting tasks are refused with 503 and `Retry-After`.
+    """
+    if body.selection is not None:
+        return _queued(body, body.selection, service, requested_by or "", key)
     given = {"recordings": tuple(body.recordings), "calibrations": tuple(body.calibrations)}
     request = copied(AnalysisRequest, body, **given)
     result = service.analyses.run_method(request, key)
     response.headers["Location"] = f"/api/v1/results/{result.id}"
     return ResultView.of(result)
+
+
+def _queued(
+    body: AnalysisSubmission, selection: RecordingSelection, service: BenchService, by: str, key: str | None
+) -> JSONResponse:
+    if body.recordings:
+        raise BadParameter("recordings", body.recordings[0], "either recordings or a selection (selection.ids)")
+    wanted = copied(BatchRequest, body, selection=selection.query(), calibrations=tuple(body.calibrations))
+    batch = service.batches.submit(wanted, by, key)
+    view = BatchView.of(batch).model_dump(mode="json")
+    return JSONResponse(view, 202, {"Location": f"/api/v1/analyses/batches/{batch.id}"})
 
 
 @router.get("/results", responses=problems())

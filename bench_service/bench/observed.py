@@ -20,6 +20,7 @@ from procedures.bench.environment import EnvironmentReading
 from procedures.bench.imu import Stream
 from procedures.bench.supply import SupplyLimits, SupplyReading
 from procedures.bench.turntable import TableReading
+from procedures.core.constant_rate import ConstantRate
 from procedures.core.recording import Channel, Station
 from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
@@ -83,6 +84,10 @@ class ObservedTurntable(_Seen):
     async def settle(self) -> None:
         with self._seen("turntable.settle"):
             await self._table.settle()
+
+    async def command_rate(self, rate: ConstantRate) -> None:
+        with self._seen("turntable.command_rate", **vars(rate)):
+            await self._table.command_rate(rate)
 
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
         with self._seen("turntable.command_sinusoid", **vars(sinusoid)):

@@ -28,8 +28,8 @@ class BenchRegistry(Protocol):
 
     def benches(self) -> tuple[BenchDescription, ...]: ...
 
-    def stop_bench(self, stop: BenchStop) -> None:
-        """Add a stop to the bench. Repeated with the same id it changes nothing.
+    def stop_bench(self, stop: BenchStop) -> BenchStop:
+        """Add a stop to the bench; return it as it is stored. Repeated with the same id it changes nothing.
 
         Raises `TooManyStops` where so many stand that one more is not stored.
         """

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from procedures.core.decision import RuleName
 from procedures.core.limits import bounds
 from procedures.core.units import converted
 
@@ -38,6 +39,7 @@ class StepLimit(Document):
     unit: str = Field(min_length=1, max_length=32, pattern=TEXT, description="of the limits; deg/h, m/s^2, ppm, 1, …")
     minimum: float | None = None
     maximum: float | None = None
+    rule: RuleName | None = Field(None, description="of the decision on this limit; null: the campaign's")
     source: str = Field(
         "", max_length=300, pattern=TEXT, description="where the limit comes from; a new campaign needs it for each"
     )
@@ -89,6 +91,13 @@ class DecisionRule(Document):
     rule: Literal["simple", "guarded"] = "simple"
     guard: float = Field(1.0, gt=0.0, le=10.0, description="r of the guarded rule: the guard band is r·U")
     coverage_factor: float = Field(2.0, ge=1.0, le=10.0, description="k of U = k·u; 2 is about 95 %")
+    false_alarm: float | None = Field(
+        None,
+        gt=0.0,
+        le=0.5,
+        description="chance, stated beforehand, that a sound unit fails any test of significance of all steps: the sum "
+        "of their levels (Bonferroni) must stay within it",
+    )
 
 
 class Step(Document):

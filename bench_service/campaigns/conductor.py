@@ -9,6 +9,7 @@ long, is computed in the background, under such a key too.
 import logging
 from collections.abc import Callable, Sequence
 from threading import Event, Thread
+from typing import Protocol
 
 from bench_service.background import BackgroundTasks
 from bench_service.campaigns import gates, transitions
@@ -49,13 +50,19 @@ HOPELESS = ("BadParameter", "Undetermined", "MissingChannel", "NotMounted")
 log = logging.getLogger(__name__)
 
 
+class Submit(Protocol):
+    """Submits a job to the queue; repeated with its key it gives the same job."""
+
+    def __call__(self, request: JobRequest, key: str, *, team: str) -> Job: ...
+
+
 class Conductor:
     """Advances every open run, and starts due schedules, in a thread of its own from `begin` to `stop`."""
 
     def __init__(
         self,
         stores: Stores,
-        submit: Callable[[JobRequest, str], Job],
+        submit: Submit,
         cancel: Callable[[str], Job],
         analyses: AnalysisService,
         fire_schedules: Callable[[], None],
@@ -194,7 +201,7 @@ class Conductor:
             seed=wanted.seed,
             deadline_at=run.deadline_at,
         )
-        return self._submit(request, key_of(run, index))
+        return self._submit(request, key_of(run, index), team=run.team)
 
     def _followed(self, run: CampaignRun, index: int, late: bool) -> CampaignRun | None:
         """The run after a look at its step's job."""

@@ -1,50 +1,51 @@
-"""Decisions on a campaign's own limits: expanded uncertainty, guard band, and how sure a pass or a fail is.
+"""Decisions on a campaign's own limits, by the rules of `procedures.core.decision`.
 
-ISO/IEC 17025 wants the rule of a statement of conformity (7.8.6); the words are those of ILAC-G8:09/2019, 4.2.3: a pass
-or a fail is conditional where the value lies within U of the limit.
+The words are those of ILAC-G8 (4.2.3): a pass or a fail is conditional where the value lies within U of the limit.
 """
 
 from dataclasses import replace
-from math import inf
 
-from bench_service.campaigns.campaign import DecisionRule
-from procedures.core.limits import Check, Verdict
+from bench_service.campaigns.campaign import DecisionRule, StepLimit
+from procedures.core import limits
+from procedures.core.decision import Rule, RuleName, coverage_factor
+from procedures.core.limits import Check
+from procedures.parameters import DecisionRules
 
 
-def decided(check: Check, rule: DecisionRule) -> Check:
-    """The check under the rule: its outcome, with the rule, U and the kind of pass or fail in its note.
+def decided(check: Check, rule: DecisionRule, own: RuleName | None = None) -> Check:
+    """The check under the campaign's rule, or under its limit's `own`, with the decision in its note.
 
     A value that is not finite stays a fail.
     """
-    if check.standard_uncertainty is None:
-        return replace(check, note=_joined(check.note, "simple acceptance: its uncertainty is not known"))
-    expanded = rule.coverage_factor * check.standard_uncertainty
-    band = rule.guard * expanded if rule.rule == "guarded" else 0.0
-    inside = _inside(check)
-    passed = check.passed and inside >= band
-    sure = "" if abs(inside) >= expanded else "conditional "
-    how = "simple acceptance" if rule.rule == "simple" else f"guard band {band:.3g} (r = {rule.guard:g})"
-    outcome = Verdict.PASS if passed else Verdict.FAIL
-    text = f"{how}, U = {expanded:.3g} {check.limit.unit} (k = {rule.coverage_factor:g}): {sure}{outcome.value}"
-    return replace(check, passed=passed, note=_joined(check.note, text))
+    made = limits.decided(check, Rule(own or rule.rule, rule.guard, coverage_factor=rule.coverage_factor))
+    said = "" if made.decision is None else made.decision.sentence
+    return replace(made, note="; ".join(text for text in (made.note, said) if text))
+
+
+def rule_of(limit: StepLimit, rule: DecisionRule) -> DecisionRule:
+    """The rule of one limit of a campaign: its own, else the campaign's."""
+    return rule if limit.rule is None else rule.model_copy(update={"rule": limit.rule})
+
+
+def rule_of_check(rules: DecisionRules | None, check: str) -> DecisionRule:
+    """The rule of a procedure's own check, as its parameters have it; simple acceptance without."""
+    if rules is None:
+        return DecisionRule.model_validate({})
+    of = rules.of(check)
+    k = coverage_factor(of.coverage_probability, None)
+    return DecisionRule(rule=of.name, guard=of.guard, coverage_factor=max(1.0, k))
 
 
 def in_words(rule: DecisionRule) -> str:
     """The rule as a sentence for a report."""
+    stated = (
+        ""
+        if rule.false_alarm is None
+        else f"; all tests of significance together refuse a sound unit with a chance of at most {rule.false_alarm:g} "
+        "(Bonferroni)"
+    )
     if rule.rule == "simple":
-        return f"simple acceptance: a value passes at its limit; U = k·u is told with k = {rule.coverage_factor:g}"
+        told = f"simple acceptance: a value passes at its limit; U = k·u is told with k = {rule.coverage_factor:g}"
+        return told + stated
     band = f"{rule.guard:g}·U, U = k·u with k = {rule.coverage_factor:g}"
-    return f"guarded acceptance on the campaign's own limits: a value passes within its limit by {band}"
-
-
-def _inside(check: Check) -> float:
-    """Distance of the value from the nearer limit; negative outside, and for no finite value."""
-    limit = check.limit
-    below = inf if limit.maximum is None else limit.maximum - check.value
-    above = inf if limit.minimum is None else check.value - limit.minimum
-    found = min(below, above)
-    return -inf if found != found else found
-
-
-def _joined(*texts: str) -> str:
-    return "; ".join(text for text in texts if text)
+    return f"guarded acceptance on the campaign's own limits: a value passes within its limit by {band}{stated}"

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from bench_service.campaigns.campaign import Campaign, DecisionRule, Step, StepLimit
-from bench_service.campaigns.decision import in_words
+from bench_service.campaigns.decision import in_words, rule_of, rule_of_check
 from bench_service.campaigns.expected_unit import NO_CALIBRATIONS, NO_CORRECTIONS, Progress
 from bench_service.campaigns.faults import (
     first_fault,
@@ -60,6 +60,18 @@ class Examination:
     """Probability that the unit as recorded fails a limit of known false alarm, were they independent."""
 
 
+def _require_stated(rule: DecisionRule, levels: Sequence[float]) -> None:
+    """Refuse a stated chance of false alarms that the levels exceed together. Raises `BadParameter`.
+
+    Bonferroni's bound, which holds for dependent tests as well: the chance of any is at most the sum.
+    """
+    stated, together = rule.false_alarm, sum(levels)
+    if stated is not None and together > stated * (1.0 + 1e-9):
+        enough = f"at least {together:.3g}: so much have the {len(levels)} tests of significance together"
+        way_out = f"with a level of {stated / len(levels):.2g} each, they would do"
+        raise BadParameter("decision.false_alarm", stated, f"{enough} ({way_out})")
+
+
 _CORRECTED = "predicted without the share of the thermal correction, which an earlier step is to give"
 _EXPECTED = "predicted with the calibration that earlier steps are to give, at nominal scale factors"
 
@@ -94,6 +106,7 @@ class Examiner:
         warnings = _warnings(plans)
         if all(plan.left_out for plan in plans):
             warnings.append("every step is left out: the verdict will be error, because nothing is judged")
+        _require_stated(campaign.decision, [one.level for p in plans for one in p.limits if one.level is not None])
         sound = prod(1.0 - one.false_alarm for p in plans for one in p.limits if one.false_alarm is not None)
         told = (plans, duration_s, sum(p.data_bytes for p in plans), tuple(warnings), in_words(campaign.decision))
         return Examination(*told, false_alarm=1.0 - sound)
@@ -117,7 +130,7 @@ class Examiner:
             why = f"it works on {missing[0]}, which is left out" if missing else f"there is no {kind} {step.does} yet"
             return StepPlan(step.name, step.does, f"left out: {why}")
         if step.method is not None:
-            return self._method(step, where, unit, bench, progress, campaign.decision)
+            return self._method(step, where, unit, bench, progress)
         try:
             plan, unknown = self._foreseen(step, unit, bench, progress)
         except ValidationError as error:
@@ -132,9 +145,7 @@ class Examiner:
             raise BadParameter(f"{where}.parameters", plan.violations[0], "beyond a limit of the bench")
         return self._planned(step, where, plan, unknown, progress, campaign.decision)
 
-    def _method(
-        self, step: Step, where: str, unit: str, bench: str | None, progress: Progress, rule: DecisionRule
-    ) -> StepPlan:
+    def _method(self, step: Step, where: str, unit: str, bench: str | None, progress: Progress) -> StepPlan:
         method = self._catalogue.methods[step.does]
         require_calibrations(step, where, progress.calibrating)
         valid_parameters(method.params.model_validate, step.parameters, where)
@@ -142,7 +153,7 @@ class Examiner:
             progress.calibrating.add(step.name)
         params, record = method.params.model_validate(step.parameters), self._planner.context(unit, bench).unit
         checks = method.planned_checks(params, record, progress.plans_of(step.calibrations_of))
-        limits = tuple(preview(one, rule.model_copy(update={"rule": "simple"})) for one in checks)
+        limits = tuple(preview(one, rule_of_check(getattr(params, "decision", None), one.check)) for one in checks)
         coarse = (
             f"{one.check}: the limit of {one.maximum:g} {one.unit} cannot be resolved, U = "
             f"{one.expanded_uncertainty:.3g} {one.unit}"
@@ -182,10 +193,12 @@ class Examiner:
         if procedure.corrections is not NO_CORRECTIONS:
             progress.correcting.add(step.name)
         checks = [
-            preview(one, DecisionRule.model_validate({}))
+            preview(one, rule_of_check(getattr(plan.parameters, "decision", None), one.check))
             for one in procedure.planned_checks(plan.parameters, plan.context)
         ]
-        checks += [preview(_of_campaign(limit, prediction.uncertainties), rule) for limit in step.limits]
+        checks += [
+            preview(_of_campaign(limit, prediction.uncertainties), rule_of(limit, rule)) for limit in step.limits
+        ]
         told = (len(plan.stations), prediction.duration_s, plan.data_bytes, tuple(warnings))
         return StepPlan(step.name, step.does, "", *told, limits=tuple(checks))
 

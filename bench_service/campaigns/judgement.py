@@ -76,7 +76,7 @@ def _limited(limit: StepLimit, campaign: Campaign, document: dict[str, Any]) -> 
     wanted = Limit(limit.unit, limit.maximum, limit.minimum, source)
     uncertainty = None if found.standard_uncertainty is None else found.standard_uncertainty * size
     made = check(f"{limit.quantity}, campaign's limit", found.value * size, wanted, uncertainty)
-    return decided(made, campaign.decision)
+    return decided(made, campaign.decision, limit.rule)
 
 
 def _trend(rule: TrendRule, result: StoredResult, stores: Stores) -> tuple[list[Check], list[str]]:

@@ -31,6 +31,8 @@ class LimitPreview:
     """Probability that the unit as recorded fails; of a test of significance its level."""
     power_at_twice: float | None
     """Probability that a unit at twice the limit fails."""
+    level: float | None = None
+    """Of a test of significance its level; None for a requirement on the unit."""
 
     def __str__(self) -> str:
         parts = [f"{self.check}: {_bounds(self)} ({self.source or 'source not said'})"]
@@ -47,10 +49,10 @@ def preview(planned: PlannedCheck, rule: DecisionRule) -> LimitPreview:
     width = half_width(limit)
     guard = rule.guard * k * u if rule.rule == "guarded" and u is not None else 0.0
     false_alarm = planned.level
-    if planned.expected is not None and limit.maximum is not None and u is not None:
+    if planned.level is None and planned.expected is not None and limit.maximum is not None and u is not None:
         false_alarm = beyond(planned, planned.expected, limit.maximum - guard)
     twice = None
-    if u is not None and planned.level is None and width > 0.0:
+    if u is not None and width > 0.0:
         twice = beyond(planned, 2.0 * width, width - guard)
     return LimitPreview(
         planned.check,
@@ -66,6 +68,7 @@ def preview(planned: PlannedCheck, rule: DecisionRule) -> LimitPreview:
         planned.expected,
         false_alarm,
         twice,
+        planned.level,
     )
 
 

@@ -82,6 +82,8 @@ class CampaignRun:
     simulated: bool = False
     seed: int | None = None
     labels: dict[str, str] = field(default_factory=dict[str, str])
+    team: str = ""
+    """Team whose members act on the run and its jobs: of the person or program that started it, or of its schedule."""
     verdict: Verdict | None = None
     cancel_requested: bool = False
     waiting: str = ""

@@ -57,6 +57,8 @@ class Schedule:
     """Delay beyond which a start counts as missed [s]."""
     overlap: Overlap = Overlap.SKIP
     labels: dict[str, str] = field(default_factory=dict[str, str])
+    team: str = ""
+    """Team whose members change it, and act on its runs; empty: every engineer, and every operator on the runs."""
     next_at: datetime | None = None
     """Next planned start (UTC); None while disabled."""
     last_at: datetime | None = None

@@ -61,10 +61,11 @@ class Scheduler:
         self._prepared = prepared
         self._looked_s = -inf
 
-    def add(self, request: ScheduleRequest, key: str | None = None) -> Schedule:
-        """Add a campaign's schedule. Raises `BadParameter` for a time that never comes, and its run's refusals.
+    def add(self, request: ScheduleRequest, key: str | None = None, team: str = "") -> Schedule:
+        """Add a campaign's schedule; its runs belong to `team`.
 
-        A key of a schedule that was removed since is used up: `IdempotencyConflict`.
+        Raises `BadParameter` for a time that never comes, and its run's refusals. A key of a schedule that was removed
+        since is used up: `IdempotencyConflict`.
         """
         idempotency = None if key is None else Idempotency(f"schedules:{key}", fingerprint(request))
         known = self._stores.keys.made(idempotency, "schedule")
@@ -80,6 +81,7 @@ class Scheduler:
             created_at=at,
             bench=run.bench,
             next_at=next_at if request.enabled else None,
+            team=team,
         )
         return self._stores.campaigns.add_schedule(schedule, idempotency)
 
@@ -174,4 +176,4 @@ class Scheduler:
             campaign = self._campaign_of(schedule.campaign)
             run = transitions.not_begun(new_id(), request, campaign, schedule.bench or "", str(error), at)
         outcome = f"could not begin: {run.reason}" if not run.open else "made up: " + late if missed else "started"
-        return replace(run, schedule_id=schedule.id, planned_at=planned), outcome
+        return replace(run, schedule_id=schedule.id, planned_at=planned, team=schedule.team), outcome

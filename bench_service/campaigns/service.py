@@ -7,7 +7,7 @@ from random import SystemRandom
 from typing import Any
 
 from bench_service.campaigns.campaign import Campaign
-from bench_service.campaigns.conductor import Conductor
+from bench_service.campaigns.conductor import Conductor, Submit
 from bench_service.campaigns.examination import Examination, Examiner, step_field
 from bench_service.campaigns.faults import require_sources
 from bench_service.campaigns.run import CampaignRun, RunRequest, StepRun, StepState
@@ -21,7 +21,7 @@ from bench_service.model.errors import IllegalTransition, NameTaken, NotFound
 from bench_service.model.job import Job, JobState
 from bench_service.model.quantities import quantity
 from bench_service.model.records import Idempotency, Page
-from bench_service.model.request import JobRequest, fingerprint
+from bench_service.model.request import fingerprint
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter
 
@@ -36,7 +36,7 @@ class CampaignService:
         stores: Stores,
         planner: Planner,
         analyses: AnalysisService,
-        submit: Callable[[JobRequest, str], Job],
+        submit: Submit,
         cancel: Callable[[str], Job],
     ) -> None:
         self._stores = stores
@@ -61,8 +61,8 @@ class CampaignService:
         shown = tuple(found[name] for name in names[:limit])
         return Page(shown, shown[-1].name if len(names) > limit else None)
 
-    def add(self, campaign: Campaign, key: str | None = None) -> Campaign:
-        """Store a campaign once it was examined. Raises `NameTaken`, and the errors of `examine`."""
+    def add(self, campaign: Campaign, key: str | None = None, team: str = "") -> Campaign:
+        """Store a campaign of a team once it was examined. Raises `NameTaken`, and the errors of `examine`."""
         idempotency = None if key is None else Idempotency(f"campaigns:{key}", fingerprint(campaign.model_dump()))
         if self._stores.keys.made(idempotency, "campaign") is not None:
             return self._stores.campaigns.get(campaign.name)
@@ -70,7 +70,11 @@ class CampaignService:
             raise NameTaken(f"campaign {campaign.name!r} comes with the service: choose another name")
         require_sources(campaign)
         self.examine(campaign)
-        return self._stores.campaigns.add(campaign, now(), idempotency)
+        return self._stores.campaigns.add(campaign, now(), idempotency, team)
+
+    def team_of(self, name: str) -> str:
+        """The team whose members change a campaign; empty: every engineer. Raises `NotFound`."""
+        return "" if name in shipped() else self._stores.campaigns.team_of(name)
 
     def replace(self, campaign: Campaign) -> Campaign:
         """Change a stored campaign; runs that have begun keep theirs. Raises `NotFound`, `NameTaken`."""
@@ -90,13 +94,13 @@ class CampaignService:
         first = self._planner.benches.mounted(at)[0].serial
         return self._examiner.examine(campaign, first, at, strict=False)
 
-    def start(self, request: RunRequest, key: str | None = None) -> CampaignRun:
-        """Queue a campaign run. Raises `NotFound`, `NotMounted`, `BadParameter`, `IdempotencyConflict`."""
+    def start(self, request: RunRequest, key: str | None = None, team: str = "") -> CampaignRun:
+        """Queue a campaign run of a team. Raises `NotFound`, `NotMounted`, `BadParameter`, `IdempotencyConflict`."""
         idempotency = None if key is None else Idempotency(f"campaign_runs:{key}", fingerprint(request))
         known = self._stores.keys.made(idempotency, "campaign_run")
         if known is not None:
             return self._stores.campaigns.run(known)
-        stored = self._stores.campaigns.add_run(self.prepared(request), idempotency)
+        stored = self._stores.campaigns.add_run(replace(self.prepared(request), team=team), idempotency)
         self.conductor.nudge()
         return stored
 

@@ -17,8 +17,8 @@ from bench_service.model.records import Idempotency, Page
 class CampaignStore(Protocol):
     """The stored campaigns, runs and schedules."""
 
-    def add(self, campaign: Campaign, at: datetime, idempotency: Idempotency | None = None) -> Campaign:
-        """Store a new campaign. Raises `NameTaken`, `IdempotencyConflict`."""
+    def add(self, campaign: Campaign, at: datetime, idempotency: Idempotency | None = None, team: str = "") -> Campaign:
+        """Store a new campaign, for the members of a team to change. Raises `NameTaken`, `IdempotencyConflict`."""
         ...
 
     def replace(self, campaign: Campaign, at: datetime) -> None:
@@ -27,6 +27,10 @@ class CampaignStore(Protocol):
 
     def get(self, name: str) -> Campaign:
         """Return one campaign by its name. Raises `NotFound`."""
+        ...
+
+    def team_of(self, name: str) -> str:
+        """The team whose members change a campaign; empty: every engineer. Raises `NotFound`."""
         ...
 
     def list(self, after: str | None = None, limit: int = 50) -> tuple[Campaign, ...]:

@@ -12,6 +12,7 @@ import typer
 from bench_service.cli.completion import completion, prepare
 from bench_service.cli.groups import (
     access,
+    batches,
     benches,
     calibrations,
     campaigns,
@@ -20,11 +21,13 @@ from bench_service.cli.groups import (
     evidence,
     importing,
     jobs,
+    manual,
     mountings,
     plans,
     reports,
     reservations,
     services,
+    storage,
     units,
 )
 from bench_service.cli.groups.one_job import job
@@ -76,9 +79,12 @@ app.command("import", rich_help_panel="Evidence")(importing.import_)
 app.add_typer(job, name="job", rich_help_panel="Jobs")
 app.add_typer(calibrations.calibration, name="calibration", rich_help_panel="Evidence")
 app.add_typer(certificates.certificate, name="certificate", rich_help_panel="Evidence")
+app.add_typer(batches.batches, name="batch", rich_help_panel="Evidence")
 app.add_typer(mountings.mounting, name="mounting", rich_help_panel="Service and bench")
+app.add_typer(manual.manual, name="manual", rich_help_panel="Service and bench")
 app.add_typer(campaigns.campaigns, name="campaign", rich_help_panel="Jobs")
 app.add_typer(campaigns.schedules, name="schedule", rich_help_panel="Jobs")
+app.add_typer(storage.storage, name="storage", rich_help_panel="Database")
 app.add_typer(access.users, name="user", rich_help_panel="Access")
 app.add_typer(access.tokens, name="token", rich_help_panel="Access")
 app.add_typer(access.trail, name="audit", rich_help_panel="Access")

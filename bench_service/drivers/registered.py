@@ -13,6 +13,8 @@ from procedures.bench.errors import BenchError, Disconnected, OutOfRange
 
 READS = frozenset(f"{device}.{verb}" for device in (*SAFE_ORDER, "imu", "environment") for verb in ("read", "identify"))
 """Verbs that change nothing and are not noted."""
+MOTIONS = frozenset(f"turntable.{verb}" for verb in ("move_to", "command_turn", "command_rate", "command_sinusoid"))
+"""Demands after which the table moves."""
 REMEMBERED = ("table", "powered", "chamber_target_c", "current_ma")
 """Fields of the state that change as soon as a demand is made; a refused demand does not change them."""
 SAFE: dict[str, Callable[[DeviceState], dict[str, Any]]] = {
@@ -69,7 +71,7 @@ class RegisterObserver:
         self._before = self._link.state
         self._arguments[verb] = arguments
         changes: dict[str, Any] = {}
-        if verb in ("turntable.move_to", "turntable.command_turn", "turntable.command_sinusoid"):
+        if verb in MOTIONS:
             changes = {"table": MOVING}
         elif verb == "supply.switch_on":
             changes = {"powered": True}

@@ -111,6 +111,8 @@ class SimulatedDriver:
             thermal=needs.temperatures,
             currents=needs.currents,
         )
+        if needs.real_time and config.real_time_factor is None:
+            config = replace(config, real_time_factor=1.0)
         bench = build(config, checkpoint)
         if self._register is None:
             return bench

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.content import content_of
 from bench_service.evidence.documents import document_of, require_storable
 from bench_service.evidence.job_analysis import analysed, recordings_of
 from bench_service.evidence.stores import EvidenceStores
@@ -21,9 +22,10 @@ from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Recording
+from procedures.core.unit import Unit
 from procedures.core.unit_correction import UnitCorrection
 from procedures.inspection import analyse_method
-from procedures.procedure import DatedCalibration, Evidence
+from procedures.procedure import DatedCalibration, Evidence, Method, Parameters
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,21 @@ class AnalysisRequest:
     recordings: tuple[str, ...] = ()
     calibrations: tuple[str, ...] = ()
     parameters: dict[str, Any] = field(default_factory=dict[str, Any])
+
+
+Computed = tuple[StoredResult, tuple[TriadCalibration, ...], tuple[UnitCorrection, ...]]
+"""A result that is not stored yet, with the calibrations and corrections that it gives."""
+
+
+@dataclass(frozen=True)
+class _Inputs:
+    method: Method[Any, Any]
+    params: Parameters
+    evidence: Evidence
+    unit: Unit | None
+    serial: str | None
+    content: str
+    simulated: bool
 
 
 class AnalysisService:
@@ -85,41 +102,65 @@ class AnalysisService:
         if self._processes is not None:
             self._catalogue.method(request.method).params.model_validate(request.parameters)
             return self._stores.results.get(self._processes.result("method", request, key))
-        stored, calibrations, corrections = self.computed(request)
-        require_storable(calibrations, corrections)
-        return self._stores.results.add(stored, calibrations, False, idempotency, corrections)
+        return self._run(request, idempotency, reuse=False)[0]
 
-    def computed(
-        self, request: AnalysisRequest
-    ) -> tuple[StoredResult, tuple[TriadCalibration, ...], tuple[UnitCorrection, ...]]:
+    def run_or_take(self, request: AnalysisRequest) -> tuple[StoredResult, bool]:
+        """Take the stored result of the same content, or run the method here; True where a result was taken.
+
+        Raises as `run_method`. Two that run the same content at once store one result, and both give it.
+        """
+        return self._run(request, None, reuse=True)
+
+    def computed(self, request: AnalysisRequest) -> Computed:
         """The result of a method with the calibrations and corrections that it gives; nothing is stored.
 
         Raises `NotFound`, `DomainError`, `ValidationError`.
         """
+        return self._computed(self._gathered(request), request)
+
+    def _run(self, request: AnalysisRequest, idempotency: Idempotency | None, reuse: bool) -> tuple[StoredResult, bool]:
+        inputs = self._gathered(request)
+        known = self._stores.results.of_content(inputs.content) if reuse else None
+        if known is not None:
+            return known, True
+        stored, calibrations, corrections = self._computed(inputs, request)
+        require_storable(calibrations, corrections)
+        added = self._stores.results.add(stored, calibrations, False, idempotency, corrections, inputs.content, reuse)
+        return added, added.id != stored.id
+
+    def _gathered(self, request: AnalysisRequest) -> _Inputs:
         method = self._catalogue.method(request.method)
         params = method.params.model_validate(request.parameters)
         used = self._stores.calibrations.several(request.calibrations)
         dated = tuple(DatedCalibration(c.id, c.made_at.isoformat(), (c.value,), self._mounting_of(c)) for c in used)
         evidence = Evidence(self._complete(request.recordings), dated)
-        units = {r.info.unit for r in evidence.recordings} | {c.unit for c in used}
+        infos = [recording.info for recording in evidence.recordings]
+        units = {info.unit for info in infos} | {c.unit for c in used}
         if len(units) > 1:
             raise UnfitRecording(f"the evidence is of several units: {', '.join(sorted(units))}")
         serial = next(iter(units), None)
-        outcome = analyse_method(method, evidence, params, None if serial is None else self._stores.units.unit(serial))
+        unit = None if serial is None else self._stores.units.unit(serial)
+        content = content_of(method.name, method.version, params.model_dump(mode="json"), infos, used, unit)
+        simulated = any(info.simulated for info in infos) or any(c.simulated for c in used)
+        return _Inputs(method, params, evidence, unit, serial, content, simulated)
+
+    def _computed(self, inputs: _Inputs, request: AnalysisRequest) -> Computed:
+        method = inputs.method
+        outcome = analyse_method(method, inputs.evidence, inputs.params, inputs.unit)
         stored = StoredResult(
             id=new_id(),
             kind="method",
             name=method.name,
             version=method.version,
-            parameters=params.model_dump(mode="json"),
+            parameters=inputs.params.model_dump(mode="json"),
             document=document_of(outcome),
             verdict=outcome.verdict,
-            recordings=tuple((r.info.id, r.info.content_hash) for r in evidence.recordings),
+            recordings=tuple((r.info.id, r.info.content_hash) for r in inputs.evidence.recordings),
             calibrations=request.calibrations,
             code_version=self._code_version,
-            simulated=any(r.info.simulated for r in evidence.recordings) or any(c.simulated for c in used),
+            simulated=inputs.simulated,
             created_at=now(),
-            unit=serial,
+            unit=inputs.serial,
         )
         return stored, method.calibrations(outcome), method.corrections(outcome)
 

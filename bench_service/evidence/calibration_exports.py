@@ -45,7 +45,7 @@ def calibration_subject(
         triads=tuple(_triad(stores, c) for c in chosen),
         asked=calibration_id,
         exported_at=_text(now()) or "",
-        noise={name: triad.noise for name, triad in known.items()},
+        noise={name: triad.observed_noise for name, triad in known.items()},
         noise_origin={name: triad.noise_origin for name, triad in known.items()},
     )
 
@@ -121,6 +121,7 @@ def _lineage(result: StoredResult) -> dict[str, Any]:
         "corrections": list(result.corrections),
         "code_version": result.code_version,
         "job": result.job_id,
+        "statement": result.document.get("statement"),
     }
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Protocol
 
+from bench_service.model.calibrations import Act, Approval, Decider, Decision
 from bench_service.model.records import Idempotency, Page
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
 
@@ -19,6 +20,24 @@ class StoredCorrection:
     current: bool
     correction: UnitCorrection
     simulated: bool
+    approval: Approval = Approval.OPEN
+    valid_until: datetime | None = None
+    """End of its validity; None: it has none."""
+    decisions: tuple[Decision, ...] = ()
+    """All decisions about it, oldest first; `calibration_id` of each is this correction's id."""
+
+    def unusable(self, at: datetime) -> str:
+        """Reason why it may not be used at a time, with the way out; empty where it may."""
+        what = f"correction {self.id} of the kind {self.correction.kind!r}"
+        other = "make another correction of its history current, or run the job that gives one again"
+        if self.approval is Approval.REJECTED:
+            last = next((d for d in reversed(self.decisions) if d.act is Act.REJECTED), None)
+            why = f" by {last.by}: {last.remark}" if last else ""
+            return f"{what} was rejected{why}; {other}, or approve it"
+        if self.valid_until is not None and at >= self.valid_until:
+            day = self.valid_until.strftime("%Y-%m-%d %H:%M UTC")
+            return f"{what} expired at {day}; {other}, or approve it with a later valid_until"
+        return ""
 
 
 class CorrectionStore(Protocol):
@@ -45,4 +64,21 @@ class CorrectionStore(Protocol):
 
         A known key with the same fingerprint changes nothing. Raises `NotFound`, `IdempotencyConflict`.
         """
+        ...
+
+    def approve(
+        self,
+        unit: str,
+        correction_id: str,
+        by: Decider,
+        valid_until: datetime | None,
+        idempotency: Idempotency | None = None,
+    ) -> StoredCorrection:
+        """Approve a correction, with the end of its validity where one is given. Raises `NotFound`."""
+        ...
+
+    def reject(
+        self, unit: str, correction_id: str, by: Decider, idempotency: Idempotency | None = None
+    ) -> StoredCorrection:
+        """Reject a correction: no new job uses it, also where it is current. Raises `NotFound`."""
         ...

@@ -9,7 +9,8 @@ class KeyStore(Protocol):
     """The objects that clients' idempotency keys made."""
 
     def made(self, idempotency: Idempotency | None, kind: str) -> str | None:
-        """Id of the "job", "recording", "result", "campaign", "campaign_run" or "schedule" that a key made.
+        """Id of the "job", "recording", "result", "campaign", "campaign_run", "schedule" or "batch" that a key
+        made.
 
         None for a key that is new, and without one. Called before a request is examined: an object once made is
         returned, also where the same request would be refused now. Raises `IdempotencyConflict` for a key of another

@@ -53,6 +53,14 @@ class RecordingWriter(Protocol):
         ...
 
 
+class RecordingSoFar(Recording, Protocol):
+    """The part of a recording that is stored; `count` of its `info` is that part's."""
+
+    def since(self, start: int) -> Iterator[RawArray]:
+        """The raw samples from sample `start` on, each block (n, channels)."""
+        ...
+
+
 class RecordingStore(Protocol):
     """The stored recordings and their samples."""
 
@@ -77,20 +85,27 @@ class RecordingStore(Protocol):
         """The complete recordings of a job in the order of their stations."""
         ...
 
-    def load(self, recording_id: str) -> Recording:
-        """The recording for an analysis: blocks are read chunk by chunk. Raises `NotFound`."""
+    def load(self, recording_id: str) -> RecordingSoFar:
+        """The recording for an analysis: blocks are read chunk by chunk. Raises `NotFound`, `RawDataRemoved`."""
+        ...
+
+    def so_far(self, job_id: str) -> "RecordingSoFar | None":
+        """The stored part of the recording that a job is making now; None where nothing of one is stored yet."""
         ...
 
     def read(
         self, recording_id: str, channels: Sequence[str] | None, start: int, stop: int
     ) -> Iterator[NDArray[np.int32] | NDArray[np.float64]]:
-        """Raw samples start…stop (half open) of some channels, chunk by chunk. Raises `NotFound`, `MissingChannel`."""
+        """Raw samples start…stop (half open) of some channels, chunk by chunk; archived ones come from the archive.
+
+        Raises `NotFound`, `MissingChannel`, `RawDataRemoved`; `ArchiveAway` where the archive cannot be read.
+        """
         ...
 
     def damage(self, recording_id: str, start: int, stop: int) -> Iterator[DamagedChunk]:
         """Compare the chunks that hold samples start…stop (half open) with their hashes; yield the damaged ones.
 
-        Raises `NotFound`.
+        Raises `NotFound`, `RawDataRemoved`, `ArchiveAway`.
         """
         ...
 

@@ -22,17 +22,25 @@ class ResultStore(Protocol):
         by_rule: bool = True,
         idempotency: Idempotency | None = None,
         corrections: Sequence[UnitCorrection] = (),
+        content: str | None = None,
+        reuse: bool = True,
     ) -> StoredResult:
         """Store a result with its lineage, calibrations and corrections, in one transaction.
 
         Calibrations, at most one of a triad, join the unit's history; where `by_rule` is true, those that
         `model.calibrations.takes_over` allows become current. Corrections, at most one of a kind, become current there.
+        `content`: the digest of everything that the analysis read; with `reuse` a result of that content that is
+        stored already is returned, and nothing is added.
         Raises `IdempotencyConflict`; a known key with the same fingerprint returns the first result.
         """
         ...
 
     def get(self, result_id: str) -> StoredResult:
         """Return one result by its id. Raises `NotFound`."""
+        ...
+
+    def of_content(self, content: str) -> StoredResult | None:
+        """The stored result of a content, see `add`; None where there is none."""
         ...
 
     def list(

@@ -9,6 +9,7 @@ from typing import Any
 
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.model.errors import ServiceError
+from bench_service.model.raw_data import HERE
 from bench_service.telemetry.upkeep import DatabasePort, DatabaseSize, UpkeepKind, UpkeepReport
 from bench_service.wall_clock import monotonic_s, new_id, now
 
@@ -30,6 +31,8 @@ class _Found:
     recordings: int = 0
     stored_bytes: int = 0
     damaged_chunks: int = 0
+    elsewhere: int = 0
+    """Recordings whose raw data are archived or removed."""
     damaged: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
 
 
@@ -75,6 +78,9 @@ class UpkeepService:
         while True:
             page = self._stores.recordings.list(after=after, limit=100)
             for recording in page.items:
+                if recording.raw not in HERE:  # its bytes are not in the database: reading an archive back checks them
+                    found.elsewhere += 1
+                    continue
                 begun_s = monotonic_s()
                 self._check(recording.info.id, recording.info.count, found)
                 found.recordings += 1
@@ -121,9 +127,13 @@ def sentence(report: UpkeepReport) -> str:
 class NightlyScrub:
     """Runs the check of the database each night, in a thread that gives way to everything else."""
 
-    def __init__(self, upkeep: UpkeepService, at: str) -> None:
-        """Set up with `at`, the time of day on this host's clock, "HH:MM"; empty: never."""
+    def __init__(self, upkeep: UpkeepService, at: str, then: Callable[[Event], object] = lambda ending: None) -> None:
+        """Set up with `at`, the time of day on this host's clock, "HH:MM"; empty: never.
+
+        `then`: other work of the night, called after the check with the event that ends it.
+        """
         self._upkeep = upkeep
+        self._then = then
         self._at = at
         self._ending = Event()
         self._thread = Thread(target=self._run, name="nightly check", daemon=True)
@@ -148,10 +158,11 @@ class NightlyScrub:
             due = next_time(self._at, at)
             try:
                 self._upkeep.scrub(lambda took_s: self._ending.wait(REST * took_s), at - APART)
+                self._then(self._ending)
             except ServiceError as error:
-                log.warning("the database was not checked tonight: %s", error)
+                log.warning("the work of this night was not done: %s", error)
             except Exception:
-                log.exception("the nightly check of the database")
+                log.exception("the work of the night on the database")
 
 
 def next_time(at: str, moment: datetime) -> datetime:

@@ -19,13 +19,15 @@ from dataclasses import dataclass
 from threading import Event, Thread
 from typing import Protocol
 
+from bench_service.bench.driven import ShuttingDown
 from bench_service.bench.driver import Lease
-from bench_service.bench.session import ShuttingDown
+from bench_service.jobs.manual.runner import ManualRunner
 from bench_service.jobs.queue import BenchQueue, QueueEntry
 from bench_service.jobs.runner import JobRunner
 from bench_service.jobs.stores import JobStores
 from bench_service.model.errors import NotFound, NotUnderstood, ServiceError
 from bench_service.model.job import Failure, Job
+from bench_service.model.manual import ManualLease
 from bench_service.wall_clock import monotonic_s, now
 
 RETRY_S = 0.5
@@ -76,12 +78,15 @@ class Dispatcher:
         lease: Lease,
         poll_s: float,
         stopped: Callable[[], bool] = lambda: False,
+        manual: ManualRunner | None = None,
     ) -> None:
         """Set up to look at the queue every `poll_s` seconds for jobs that other processes put there.
 
         `stopped`: returns whether the bench is stopped over its host's stop channel; the database may not know yet.
+        `manual`: runs leases of manual mode; None: they wait.
         """
         self._stopped = stopped
+        self._manual = manual
         self._bench_id = bench_id
         self._stores = stores
         self._runner = runner
@@ -100,7 +105,9 @@ class Dispatcher:
         self._thread.start()
 
     def wake(self) -> None:
-        """Look at the bench's queue now."""
+        """Look at the bench's queue now, and at the lease of manual mode that runs."""
+        if self._manual is not None:
+            self._manual.wake()
         self._wake.set()
 
     def resting_s(self) -> float:
@@ -112,9 +119,11 @@ class Dispatcher:
         return self._lease.held()
 
     def shut_down(self) -> None:
-        """Claim no more jobs. The engine ends the running job."""
+        """Claim no more jobs, and end manual mode. The engine ends the running job."""
         self._ending.set()
         self._wake.set()
+        if self._manual is not None:
+            self._manual.shut_down()
 
     def _run(self) -> None:
         while not self._ending.is_set():
@@ -139,6 +148,9 @@ class Dispatcher:
         if queue.running is not None:
             self._settle()
             return False
+        if queue.manual is not None:
+            self._tell(queue)
+            return self._run_manual(queue.manual)
         entry = queue.next()
         self._tell(queue)
         if entry is None or self._stopped():
@@ -157,6 +169,16 @@ class Dispatcher:
             self._worked_s = monotonic_s()
             self._running = False
         return True
+
+    def _run_manual(self, lease: ManualLease) -> bool:
+        if self._manual is None:
+            return False
+        self._running = True
+        try:
+            return self._manual.run(lease)
+        finally:
+            self._worked_s = monotonic_s()
+            self._running = False
 
     def _settle(self) -> None:
         """Recover the bench's running job where its workflow does not go on: requeue or interrupt it."""
@@ -189,7 +211,8 @@ class Dispatcher:
     def _tell(self, queue: BenchQueue) -> None:
         """Note in the events of the queue's first job why it does not start, once for each reason."""
         head: QueueEntry | None = queue.entries[0] if queue.entries else None
-        why = None if head is None or (not queue.stops and not queue.reservations) else queue.hold(head)
+        held = bool(queue.stops or queue.reservations or queue.manual is not None)
+        why = queue.hold(head) if head is not None and held else None
         if head is None or why is None or self._told == (head.id, why):
             return
         self._stores.jobs.note(head.id, "note", now(), {"text": why})

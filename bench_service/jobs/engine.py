@@ -17,7 +17,7 @@ from typing import Any
 from dbos import DBOS, DBOSConfig, Serializer, SetWorkflowID
 from pydantic import TypeAdapter
 
-from bench_service.bench.session import ShuttingDown
+from bench_service.bench.driven import ShuttingDown
 from bench_service.jobs.dispatcher import Unfinished
 from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.runner import JobRunner, StepOutcome

@@ -14,7 +14,7 @@ from procedures.bench import BenchDescription
 from procedures.core.errors import BadParameter, ProcedureDefect
 from procedures.core.recording import Station
 from procedures.core.unit import Unit
-from procedures.procedure import Context, Parameters, Prediction
+from procedures.procedure import Context, JudgedParameters, Parameters, Prediction
 
 BYTES_PER_SAMPLE = 2
 """Bytes that a stored sample may take; a preview gives the room that a plan may need at most."""
@@ -101,6 +101,7 @@ class Planner:
             f"station {s.index} ({s.label}): {sentence}" for s in stations for sentence in _violations(s, context.bench)
         )
         prediction = procedure.predict(parameters, context)
+        _require_rules(procedure, parameters, context)
         if overdue and not refused:
             prediction = replace(prediction, warnings=(*prediction.warnings, *overdue))
         data_bytes = sum(_samples(s, context.unit) for s in stations) * BYTES_PER_SAMPLE
@@ -109,6 +110,15 @@ class Planner:
     def refreshed(self, context: Context) -> Context:
         """Refresh a context's unit: its noise, and the current calibration; bench and mounting stay the same."""
         return replace(context, unit=self._units.unit(context.unit.serial))
+
+
+def _require_rules(procedure: AnyProcedure, parameters: Parameters, context: Context) -> None:
+    """Refuse a decision rule for a check that the result will not have, where its names are known beforehand."""
+    rules = parameters.decision if isinstance(parameters, JudgedParameters) else None
+    if rules is not None and rules.by_check:
+        planned = [one.check for one in procedure.planned_checks(parameters, context)]
+        promised = () if procedure.quantities is None else procedure.quantities(parameters, context)
+        rules.require_known([*dict.fromkeys((*planned, *promised))])
 
 
 def stations_of(procedure: AnyProcedure, parameters: Parameters) -> tuple[Station, ...]:

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from bench_service.jobs.reservation import Reservation, Reserved
 from bench_service.model.job import Failure, Job
+from bench_service.model.manual import ManualLease
 from bench_service.model.records import BenchStop, reasons_of
 
 LONGEST_PAUSE_S = 300.0
@@ -59,6 +60,8 @@ class BenchQueue:
     """The stops that stand, oldest first."""
     reservations: tuple[Reservation, ...] = ()
     """The reservations that hold now, of the bench and of the units in the queue."""
+    manual: ManualLease | None = None
+    """The open lease of manual mode: no job starts before it has ended, and the bench is safe."""
 
     def next(self) -> QueueEntry | None:
         """The next eligible job; None where no job is eligible."""
@@ -68,6 +71,11 @@ class BenchQueue:
         """The reason why a job is not eligible, whatever else the bench does; None where it is."""
         if self.stops:
             return f"bench {self.bench} is stopped: {reasons_of(self.stops)}"
+        if (manual := self.manual) is not None:
+            return (
+                f"bench {self.bench} is in manual mode by {manual.holder} until {manual.until.isoformat()}: "
+                f"{manual.reason}"
+            )
         for reservation in self._of_others(entry):
             what = f"{reservation.kind.value} {reservation.name}"
             return f"{what} is reserved by {reservation.holder} until {reservation.until.isoformat()}"

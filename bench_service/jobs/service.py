@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from random import SystemRandom
 
 from bench_service.bench.driver import BenchDriver, TrueTriad
@@ -47,10 +48,13 @@ class JobService:
         self._code_version = code_version
         self._wake = wake
 
-    def submit(self, request: JobRequest, idempotency_key: str | None = None, requested_by: str = "") -> Job:
-        """Plan, store and queue a job. Raises the errors of `Planner.plan`, and `BadParameter` for an axis limit."""
-        key = None if idempotency_key is None else Idempotency(f"jobs:{idempotency_key}", fingerprint(request))
-        known = self._stores.keys.made(key, "job")
+    def submit(self, request: JobRequest, key: str | None = None, requested_by: str = "", *, team: str = "") -> Job:
+        """Plan, store and queue a job; `team`: of the campaign run to which it belongs.
+
+        Raises the errors of `Planner.plan`, and `BadParameter` for an axis limit.
+        """
+        idempotency = None if key is None else Idempotency(f"jobs:{key}", fingerprint(request))
+        known = self._stores.keys.made(idempotency, "job")
         if known is not None:
             return self._stores.jobs.get(known)
         plan = self._planner.plan(request.procedure, request.unit, request.parameters, request.bench, request.mounting)
@@ -61,7 +65,8 @@ class JobService:
         if request.reservation is not None:
             self._queues.usable(request.reservation, plan.context.bench.id, request.unit)
         register(self._stores.units, plan.context.unit)
-        stored = self._stores.jobs.add(self._new_job(request, plan, requested_by), key)
+        job = replace(self._new_job(request, plan, requested_by), team=team)
+        stored = self._stores.jobs.add(job, idempotency)
         self._wake(stored.bench)
         with about(job=stored.id):
             log.info("%s on %s queued", stored.procedure, stored.unit)

@@ -8,7 +8,7 @@ from bench_service.bench.stop.exchange import LATE_S
 from bench_service.bench.stop.word import StopWord
 from bench_service.jobs.queue import QueueStore
 from bench_service.jobs.stores import JobStore
-from bench_service.model.errors import IllegalTransition, NotUnderstood, ServiceError
+from bench_service.model.errors import IllegalTransition, NotUnderstood
 from bench_service.model.records import BenchStop
 from bench_service.telemetry.audit import AuditEntry, AuditTrail
 from bench_service.wall_clock import now
@@ -20,7 +20,11 @@ log = logging.getLogger(__name__)
 
 
 class StopEntry:
-    """Enters stops into the database. Repeated for the same stop request it changes nothing."""
+    """Enters stops into the database.
+
+    Several processes enter the same stop, and each repeats it from the beginning where the database fails in between.
+    So each part changes nothing where it was done before, and none is left out because an earlier one was done.
+    """
 
     def __init__(self, benches: BenchRegistry, queue: QueueStore, jobs: JobStore, trail: AuditTrail) -> None:
         self._benches = benches
@@ -29,29 +33,27 @@ class StopEntry:
         self._trail = trail
 
     def enter(self, bench_id: str, word: StopWord) -> str | None:
-        """Enter a stop; return the running job's id, which is cancelled. Raises `StorageFull`, `StorageFailure`."""
-        new = all(stop.id != word.id for stop in self._benches.standing_stops(bench_id))
-        self._benches.stop_bench(BenchStop(bench_id, word.at, word.reason, by=word.by, id=word.id))
-        running = self._queue.running(bench_id)
+        """Enter a stop; return the running job's id, which is cancelled. Raises `StorageFull`, `StorageFailure`.
+
+        A stop that was released before the entry is complete ends no job: the one that runs by then began after it.
+        """
+        stop = self._benches.stop_bench(BenchStop(bench_id, word.at, word.reason, by=word.by, id=word.id))
+        running = self._queue.running(bench_id) if stop.stands else None
         if running is not None:
             with suppress(IllegalTransition, NotUnderstood):  # it has ended this moment; or this version cannot read it
                 self._jobs.request_cancel(running.id, now())
-        if new:
-            self._tell(bench_id, word)
+        self._note(word, stop)
         return None if running is None else running.id
 
-    def _tell(self, bench_id: str, word: StopWord) -> None:
-        late_s = (now() - word.at).total_seconds()
-        if late_s > LATE_S:
-            log.warning("a stop of bench %s is entered %.1f s after it was asked for", bench_id, late_s)
+    def _note(self, word: StopWord, stop: BenchStop) -> None:
+        """Note in the audit trail a stop that no request's entry shows, or that the database took late."""
+        late_s = ((stop.entered_at or word.at) - word.at).total_seconds()
         if late_s <= LATE_S and word.via in REQUESTS:
             return
         text = f"entered {late_s:.1f} s after it was asked for" if late_s > LATE_S else "entered in time"
         detail = {"stop": word.id, "reason": word.reason, "via": word.via, "asked_at": word.at.isoformat()}
         entry = AuditEntry(
-            word.id, now(), word.by, "stop", f"bench {bench_id}", "noted", {"text": text, "late_s": late_s, **detail}
+            word.id, now(), word.by, "stop", f"bench {stop.bench}", "noted", {"text": text, "late_s": late_s, **detail}
         )
-        try:
-            self._trail.add(entry)  # under the stop's own id: of several processes that enter it, one adds the entry
-        except ServiceError as error:
-            log.debug("the entry of the trail for stop %s: %s", word.id, error)
+        if self._trail.add_once(entry) and late_s > LATE_S:
+            log.warning("a stop of bench %s is entered %.1f s after it was asked for", stop.bench, late_s)

@@ -9,6 +9,7 @@ from datetime import datetime
 from typing import Any, Protocol
 
 from bench_service.bench.stores import BenchStores
+from bench_service.jobs.manual.store import ManualStore
 from bench_service.jobs.queue import QueueStore
 from bench_service.jobs.reservation import ReservationStore
 from bench_service.model.job import Event, Failure, Job, JobState
@@ -134,3 +135,4 @@ class JobStores(BenchStores):
     jobs: JobStore
     queue: QueueStore
     reservations: ReservationStore
+    manual: ManualStore

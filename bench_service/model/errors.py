@@ -16,15 +16,18 @@ ServiceError
 ├── NotAllowed           the role or the team does not have this right
 ├── WrongPassword        name or password is wrong
 ├── LockedOut            too many failed log-ins
+├── ManualRefused        manual mode cannot begin now, or its lease has ended
 ├── AlreadyReserved      another holder has reserved this bench or unit
 ├── Overloaded           too much is requested at one time
 ├── NotUnderstood        a job was stored by a version whose format this one does not know
 ├── NotMounted           this bench does not have that unit
 ├── MountingChanged      the unit was mounted anew, or taken off, since the job was planned
+├── RawDataRemoved       the raw data of a recording were removed by a rule
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way
     ├── DamagedDatabase   the database's file is damaged
     ├── DatabaseMoved     the database's file was deleted or replaced while it was open
+    ├── ArchiveAway       the archive of raw data cannot be reached or written
     ├── DamagedRecording  the stored bytes of a recording are not those written
     └── UnfitValue        a value cannot be stored, now or later
 """
@@ -130,6 +133,10 @@ class LockedOut(ServiceError):
         self.wait_s = wait_s
 
 
+class ManualRefused(ServiceError):
+    """Raised where manual mode cannot begin on a bench now, or where its lease has ended."""
+
+
 class AlreadyReserved(ServiceError):
     """Raised where another holder has reserved this bench or unit."""
 
@@ -157,6 +164,10 @@ class NotUnderstood(ServiceError):
         )
 
 
+class RawDataRemoved(ServiceError):
+    """Raised where raw data are wanted that a retention rule removed; the message says where their hash is."""
+
+
 class StorageFull(ServiceError):
     """Raised where the database cannot grow: the disk is full."""
 
@@ -171,6 +182,10 @@ class DamagedDatabase(StorageFailure):
 
 class DatabaseMoved(StorageFailure):
     """Raised where the file of the database is no longer the one that was opened."""
+
+
+class ArchiveAway(StorageFailure):
+    """Raised where the archive of raw data cannot be reached, read or written."""
 
 
 class DamagedRecording(StorageFailure):

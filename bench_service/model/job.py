@@ -111,6 +111,8 @@ class Job(JobTerms):
     retries_left: int = 0
     requested_by: str = ""
     """Person who requested it, as given by the client; may be empty."""
+    team: str = ""
+    """Team of the campaign run to which it belongs: its members act on the job; empty: see its reservation."""
     prompt: dict[str, Any] | None = None
     """Open request to the person at the bench: {"text", "asked_at"}; None: none is open."""
     started_at: datetime | None = None

@@ -9,6 +9,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from bench_service.model.quantities import Quantity
+from bench_service.model.raw_data import RawState
 from bench_service.wall_clock import new_id
 from procedures.core.limits import Verdict
 from procedures.core.recording import Channel, RecordingInfo, Station
@@ -53,6 +54,12 @@ class StoredRecording:
     chunks: int = 0
     dtype: str = "int32"
     """Type of its samples: "int32" or "float64"."""
+    raw: RawState = RawState.STORED
+    """Place of its raw samples."""
+    raw_changed_at: datetime | None = None
+    """Time at which they came there; None: they were never moved."""
+    archive: str | None = None
+    """Address of the archive that has, or had, its raw samples."""
     source: dict[str, Any] = field(default_factory=dict[str, Any])
     """Origin of an imported recording: file name, its SHA-256, reader, declared reference values."""
 
@@ -97,6 +104,8 @@ class BenchStop:
     released_by: str = ""
     remark: str = ""
     """Remark of the person who released it."""
+    entered_at: datetime | None = field(default=None, compare=False)
+    """Time when the database took it, later than `at` where it was away; None: not stored, or stored before 0014."""
 
     @property
     def stands(self) -> bool:

@@ -1,15 +1,24 @@
 """Tables of a correction set. Knows how people read it; not where it is stored."""
 
+import numpy as np
+
 from procedures.core.converter import ConverterTriad, Normalised
+from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.report import Cell, Table
 from procedures.core.thermal_correction import COEFFICIENTS, ThermalCorrection
+from procedures.core.thermometers import ThermometerCorrection
 from procedures.core.unit_correction import UnitCorrection
+from procedures.core.units import DEG_PER_HOUR
 
 
 def correction_table(correction: UnitCorrection) -> Table:
     """Coefficients of the three axes or channels, each with its standard uncertainty where it is known."""
     if correction.thermal is not None:
         return _thermal(correction.thermal)
+    if correction.thermometers is not None:
+        return _thermometers(correction.thermometers)
+    if correction.gyros is not None:
+        return _gyros(correction.gyros)
     return _converter(correction.converter or ())
 
 
@@ -25,6 +34,26 @@ def _thermal(value: ThermalCorrection) -> Table:
     fitted = "not known" if value.fitted_range is None else str(value.fitted_range)
     note = f"Fitted at: {fitted}. Beyond that it is extrapolated."
     return Table(f"Correction of the {value.triad} triad, {stage}", columns, tuple(rows), note)
+
+
+def _thermometers(value: ThermometerCorrection) -> Table:
+    sd = np.sqrt(np.diag(np.array(value.covariance))).tolist()
+    rows: list[tuple[Cell, ...]] = [
+        (s.channel, s.offset_c, sd[2 * i], s.slope, sd[2 * i + 1]) for i, s in enumerate(value.sensors)
+    ]
+    low, high = value.fitted_range_c
+    note = f"About {value.reference_c:g} °C; compared with the chamber at {low:.1f} … {high:.1f} °C."
+    return Table("Thermometers", ("sensor", "offset, °C", "±", "slope, °C/°C", "±"), tuple(rows), note)
+
+
+def _gyros(value: GyroThermalCorrection) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for name, gyro in zip("xyz", value.gyros, strict=True):
+        for k, c in enumerate(gyro.coefficients):
+            rows.append((name, k + 1, c / DEG_PER_HOUR, gyro.covariance[k][k] ** 0.5 / DEG_PER_HOUR))
+    low, high = value.fitted_range_c
+    note = f"About {value.reference_c:g} °C of each gyro's own sensor; fitted at {low:.1f} … {high:.1f} °C."
+    return Table("Gyros over temperature", ("gyro", "power", "deg/h/°C^k", "±"), tuple(rows), note)
 
 
 def _converter(models: ConverterTriad | tuple[()]) -> Table:

@@ -5,6 +5,7 @@ from typing import Any
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 
+from bench_service.formats.calibration_exports.forms import CalibrationForm
 from bench_service.jobs.numbers import job_id_of
 from bench_service.model.job import FINAL, Event, Job, JobState
 from bench_service.model.records import StoredResult
@@ -57,7 +58,8 @@ def _noise_rows(unit: Unit) -> list[list[str]]:
     rows: list[list[str]] = []
     for triad, rate_unit in (("gyro", "rad/s"), ("accelerometer", "m/s^2")):
         record = unit.triad(triad)
-        for name, noise in zip(TRIADS[triad], record.noise if record else (), strict=False):
+        found = zip(TRIADS[triad], record.observed_noise, strict=True) if record else ()
+        for name, noise in found:
             cells = [
                 f"{value / size:.4g} {label}" if (value := getattr(noise, process)) else "–"
                 for process, (label, size) in NOISE_DISPLAY[rate_unit].items()
@@ -178,7 +180,9 @@ def unit_page(serial: str, request: Request) -> HTMLResponse:
         calibrations=service.stores.calibrations.list(serial).items,
         corrections=[(c, correction_table(c.correction)) for c in service.stores.corrections.list(serial).items],
         jobs=service.stores.jobs.list(unit=serial).items,
+        notes=service.stores.unit_notes.list(serial).items,
         imports=[r for r in service.stores.recordings.list(unit=serial).items if r.job_id is None],
         names=COEFFICIENT_NAMES,
         display=DISPLAY,
+        forms=[form.value for form in CalibrationForm],
     )

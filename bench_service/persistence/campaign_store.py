@@ -33,7 +33,7 @@ class SqlCampaignStore:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def add(self, campaign: Campaign, at: datetime, idempotency: Idempotency | None = None) -> Campaign:
+    def add(self, campaign: Campaign, at: datetime, idempotency: Idempotency | None = None, team: str = "") -> Campaign:
         def once() -> Campaign:
             with self._database.write() as session:
                 if made_before(session, idempotency, "campaign") is not None:
@@ -42,7 +42,8 @@ class SqlCampaignStore:
                     raise NameTaken(f"there is a campaign {campaign.name!r} already: choose another name, or change it")
                 remember(session, idempotency, "campaign", campaign.name, at)
                 document = campaign.model_dump(mode="json")
-                session.add(CampaignRow(name=campaign.name, document=document, created_at=at, updated_at=at))
+                moments = {"created_at": at, "updated_at": at}
+                session.add(CampaignRow(name=campaign.name, team=team, document=document, **moments))
                 return campaign
 
         return again_after_conflict(once)
@@ -56,6 +57,10 @@ class SqlCampaignStore:
     def get(self, name: str) -> Campaign:
         with self._database.read() as session:
             return _campaign(_campaign_row(session, name))
+
+    def team_of(self, name: str) -> str:
+        with self._database.read() as session:
+            return _campaign_row(session, name).team
 
     def list(self, after: str | None = None, limit: int = 50) -> tuple[Campaign, ...]:
         query = select(CampaignRow).order_by(CampaignRow.name).limit(limit)

@@ -81,13 +81,13 @@ def find_results(query: S, search: Search) -> S:
 
 def _made(query: S, key: InstrumentedAttribute[str], at: InstrumentedAttribute[datetime], search: Search) -> S:
     if search.since is not None:
-        query = query.where(at >= search.since, key >= _first_id(search.since, -CLOCK_DIFFERS))
+        query = query.where(at >= search.since, key >= first_id(search.since, -CLOCK_DIFFERS))
     if search.until is not None:
-        query = query.where(at < search.until, key < _first_id(search.until, CLOCK_DIFFERS))
+        query = query.where(at < search.until, key < first_id(search.until, CLOCK_DIFFERS))
     return query
 
 
-def _first_id(moment: datetime, shift: timedelta) -> str:
+def first_id(moment: datetime, shift: timedelta = timedelta(0)) -> str:
     """Return the beginning of the ids that are made from a moment on; it sorts before all of them."""
     try:
         seconds = (moment + shift).timestamp()

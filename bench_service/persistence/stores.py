@@ -13,13 +13,17 @@ from bench_service.persistence.bench.prompt_store import SqlPromptStore
 from bench_service.persistence.bench.registry_store import SqlBenchRegistry
 from bench_service.persistence.campaign_store import SqlCampaignStore
 from bench_service.persistence.database import Database, connect
+from bench_service.persistence.evidence.batch_store import SqlBatchStore
 from bench_service.persistence.evidence.calibration_store import SqlCalibrationStore
 from bench_service.persistence.evidence.correction_store import SqlCorrectionStore
+from bench_service.persistence.evidence.raw_store import SqlRawDataStore
 from bench_service.persistence.evidence.recording_store import SqlRecordingStore
 from bench_service.persistence.evidence.result_store import SqlResultStore
+from bench_service.persistence.evidence.unit_note_store import SqlUnitNoteStore
 from bench_service.persistence.evidence.unit_store import SqlUnitStore
 from bench_service.persistence.idempotency import SqlKeyStore
 from bench_service.persistence.jobs.job_store import SqlJobStore
+from bench_service.persistence.jobs.manual_store import SqlManualStore
 from bench_service.persistence.jobs.queue_store import SqlQueueStore
 from bench_service.persistence.jobs.reservation_store import SqlReservationStore
 from bench_service.persistence.migration import upgrade_to_head
@@ -51,9 +55,11 @@ def stores_of(database: Database) -> Stores:
         jobs=SqlJobStore(database),
         queue=SqlQueueStore(database),
         reservations=SqlReservationStore(database),
+        manual=SqlManualStore(database),
         recordings=SqlRecordingStore(database),
         results=SqlResultStore(database),
         units=SqlUnitStore(database),
+        unit_notes=SqlUnitNoteStore(database),
         benches=SqlBenchRegistry(database),
         campaigns=SqlCampaignStore(database),
         calibrations=SqlCalibrationStore(database),
@@ -66,6 +72,8 @@ def stores_of(database: Database) -> Stores:
         upkeep=SqlUpkeepStore(database),
         access=SqlAccessStore(database),
         keys=SqlKeyStore(database),
+        batches=SqlBatchStore(database),
+        raw_data=SqlRawDataStore(database),
     )
 
 

@@ -42,6 +42,10 @@ class AuditTrail(Protocol):
         """Add an entry to the trail. Raises `StorageFull`, `StorageFailure`."""
         ...
 
+    def add_once(self, entry: AuditEntry) -> bool:
+        """Add an entry unless the trail has one of its id; True where it was added. Raises as `add` does."""
+        ...
+
     def list(
         self, *, who: str | None = None, target: str | None = None, after: str | None = None, limit: int = 50
     ) -> Page[AuditEntry]:

@@ -15,6 +15,10 @@ class UpkeepKind(StrEnum):
     """A check of the database's integrity and of every stored chunk against its hash."""
     BACKUP = "backup"
     """A copy of the whole database."""
+    RETENTION = "retention"
+    """Removal of raw data by the rule of retention."""
+    ARCHIVE = "archive"
+    """Raw data moved to the archive."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,8 @@ class DatabaseSize:
     """Room on the disk of the file; None where the database is a server's."""
     revision: str | None
     """Revision of the tables."""
+    reusable_bytes: int | None = None
+    """Room inside an SQLite file that removed data left; None where the database is a server's."""
 
 
 class DatabasePort(Protocol):

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from procedures.bench.device import Device, Status
+from procedures.core.errors import BadParameter
 
 
 @dataclass(frozen=True)
@@ -16,6 +17,21 @@ class ChamberLimits:
     """Fastest change of the set point."""
     ambient_c: float
     """Temperature of the chamber when the bench is made safe."""
+
+
+@dataclass(frozen=True)
+class ChamberAccuracy:
+    """Standard uncertainties of the air at the unit's place against the chamber's own reading, by its certificate."""
+
+    place_sd_c: float
+    """Part that is the same throughout a job: the chamber's thermometer, and the place against the sensor's [°C]."""
+    soak_sd_c: float = 0.0
+    """Part that is another one at each soak: what the air's fluctuation leaves in a unit that has soaked [°C]."""
+
+    def __post_init__(self) -> None:
+        for name, value in (("place_sd_c", self.place_sd_c), ("soak_sd_c", self.soak_sd_c)):
+            if not 0.0 <= value <= 100.0:
+                raise BadParameter(f"chamber.accuracy.{name}", value, "within 0 … 100 °C")
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from procedures.bench.chamber import ChamberLimits
+from procedures.bench.chamber import ChamberAccuracy, ChamberLimits
 from procedures.bench.current_source import CurrentSourceLimits
 from procedures.bench.declared_device import DeclaredDevice
 from procedures.bench.supply import SupplyLimits
+from procedures.core.constant_rate import ConstantRate
 from procedures.core.sinusoid import PEAK_ACCELERATION, Sinusoid
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
@@ -71,6 +72,8 @@ class BenchDescription:
     """Policy for a certificate that has expired: no job is planned, or its result is marked."""
     no_thermal_jobs: str = ""
     """The reason why no job that reads temperatures can run here; empty: one can, where there is a chamber."""
+    chamber_accuracy: ChamberAccuracy | None = None
+    """Accuracy of the chamber by its certificate; None: not declared, so that it cannot calibrate thermometers."""
 
     @property
     def origin(self) -> Literal["real", "mixed", "simulated"]:
@@ -138,6 +141,25 @@ class BenchDescription:
             found.append(f"{axis} rate of {rate:g} deg/s is above {limits.rate_deg_s:g}")
         if acceleration > limits.acceleration_deg_s2:
             found.append(f"{axis} acceleration of {acceleration:g} deg/s^2 is above {limits.acceleration_deg_s2:g}")
+        return tuple(found)
+
+    def rate_violations(self, angles: TableAngles, rate: ConstantRate) -> tuple[str, ...]:
+        """Violations of the limits by a constant rate that begins at angles, a sentence each."""
+        limits, axis = self.axis(rate.axis), rate.axis
+        begin = {"outer": angles.outer_deg, "middle": angles.middle_deg, "inner": angles.inner_deg}[axis]
+        end = begin + rate.angle_deg
+        found: list[str] = []
+        if abs(rate.rate_deg_s) > limits.rate_deg_s:
+            found.append(f"{axis} rate of {rate.rate_deg_s:g} deg/s is above {limits.rate_deg_s:g}")
+        if rate.acceleration_deg_s2 > limits.acceleration_deg_s2:
+            found.append(
+                f"{axis} ramps of {rate.acceleration_deg_s2:g} deg/s^2 are above {limits.acceleration_deg_s2:g}"
+            )
+        if not limits.continuous and not limits.minimum_deg <= end <= limits.maximum_deg:
+            found.append(
+                f"{rate.duration_s:g} s at {rate.rate_deg_s:g} deg/s lead the {axis} axis from {begin:g} to {end:g} "
+                f"deg, outside {limits.minimum_deg:g} … {limits.maximum_deg:g}: it has no slip rings"
+            )
         return tuple(found)
 
     def _profile_violations(self, profile: TemperatureProfile) -> tuple[str, ...]:

@@ -17,6 +17,9 @@ class BenchNeeds:
     """True if the unit's temperature sensors are read. A simulated unit then senses its temperature too."""
     currents: bool = False
     """True if a converter alone is tested, with a current source on its inputs, instead of a whole unit."""
+    real_time: bool = False
+    """True if a person commands the bench: a simulated one is then no faster than real time, unless it is told how
+    fast it is."""
 
     @classmethod
     def of(cls, stations: Sequence[Station]) -> "BenchNeeds":

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from procedures.bench.device import Device, Status
+from procedures.core.constant_rate import ConstantRate
 from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
@@ -23,6 +24,8 @@ class TableReading:
     """Status words of the controller: interlocks, limiters, faults."""
     homed: bool = True
     """False where the encoders do not know their zero: no angle is known, and no axis may move by it."""
+    rates_deg_s: tuple[float, float, float] | None = None
+    """Rates of outer, middle and inner axis [deg/s]; None where the controller tells none."""
 
 
 class Turntable(Device, Protocol):
@@ -39,6 +42,13 @@ class Turntable(Device, Protocol):
 
         Returns when the table has taken the demand. Raises `OutOfRange` before anything moves, `DeviceFault` where the
         table moves already, `Disconnected`.
+        """
+        ...
+
+    async def command_rate(self, rate: ConstantRate) -> None:
+        """Begin a constant rate of one axis, the others held; otherwise as `command_turn`. `make_safe` ends it early.
+
+        Raises `OutOfRange` before anything moves, also where an axis without slip rings would leave its range.
         """
         ...
 

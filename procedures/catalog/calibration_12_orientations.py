@@ -31,14 +31,14 @@ from procedures.analysis.calibration.scalar import require_scalar_determined
 from procedures.analysis.calibration.station_means import launch_warnings
 from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS, windows
 from procedures.analysis.calibration.summary import TriadSummary
-from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers, analyse_triad
+from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers, analyse_gyros
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter, Undetermined
 from procedures.core.frames import orientation_beta_gamma, orientation_gamma_beta
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
-from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, check, significance, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.multi_position import predicted
@@ -108,6 +108,7 @@ def resolve(params: Params, context: Context) -> Params:
     """Dwell from the unit; site and table accuracy from the bench. Refuses a correction that the unit does not have."""
     full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
     require_correctable(full.thermal_correction, full.dwell_s, context.unit)
+    full.require_sources(context, full.thermal_correction == "current")
     return full
 
 
@@ -157,8 +158,10 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     _require_scalar(params, plans[1])
     gyro, accelerometer = (context.unit.triad(triad) for triad in TRIAD_NAMES)
-    first = analyse_triad(recordings, "gyro", site, uncertainty, gyro, weighting=params.weighting)
-    correction = context.unit.thermal_correction if params.thermal_correction == "current" else None
+    warm = params.thermal_correction == "current"
+    of_gyros = context.unit.gyro_correction if warm else None
+    first = analyse_gyros(recordings, site, uncertainty, gyro, params.weighting, of_gyros)
+    correction = context.unit.thermal_correction if warm else None
     settings = AccelerometerSettings(
         params.scalar_check, params.weighting, correction, (params.case_lag_s, params.converter_lag_s)
     )
@@ -196,6 +199,7 @@ def report(result: Result) -> Report:
     tables = [pictures.triad_table(t) for t in result.triads]
     tables += [table for t in result.triads if (table := pictures.scalar_table(t)) is not None]
     tables += [pictures.sample_table(result.triads)]
+    tables += [pictures.budget_table(t.calibration.triad, t.budgets) for t in result.triads if t.budgets]
     figures = [f for t in result.triads for f in pictures.triad_figures(t)]
     stations = [pictures.station_table(m) for m in magnitudes]
     thermal = [] if result.thermal is None else pictures.thermal_tables(result.thermal, magnitudes[0].labels)
@@ -259,12 +263,13 @@ def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
             m.per_axis / size,
             Limit(unit, maximum=in_run, source=IN_RUN_SOURCE),
             m.per_axis_sd / size,
+            degrees_of_freedom=len(m.after) - 1.0,
         ),
         check(f"{triad} condition number", t.condition, Limit("1", maximum=limits.condition_max)),
     ]
     if t.p_value is not None:
-        limit = Limit("1", minimum=limits.residual_p_value_min)
-        checks.append(check(f"{triad} residuals, p-value of chi-square", t.p_value, limit, note=f"worst: {t.worst}"))
+        name = f"{triad} residuals, p-value of chi-square"
+        checks.append(significance(name, t.p_value, limits.residual_p_value_min, t.residual_note))
     elif t.misfit is not None:
         limit = Limit("1", maximum=MISFIT_MAX, source="ours")
         checks.append(
@@ -276,7 +281,7 @@ def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
 PROCEDURE = Procedure(
     *("calibration_12_orientations", "Calibration in twelve orientations", "1.4.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report, calibrations),
-    uses_corrections=lambda params: ("thermal",) if params.thermal_correction == "current" else (),
+    uses_corrections=lambda params: ("thermal", "gyros") if params.thermal_correction == "current" else (),
     quantities=quantities,
     planned_checks=planned_checks,
 )

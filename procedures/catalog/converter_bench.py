@@ -24,7 +24,7 @@ from procedures.core.recording import AXES, Recording, Station
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
 from procedures.core.unit_correction import UnitCorrection
-from procedures.procedure import STATIONS, Context, Outcome, Parameters, Prediction, Procedure
+from procedures.procedure import STATIONS, Context, JudgedParameters, Outcome, Parameters, Prediction, Procedure
 
 TEMPERATURES_C = tuple(float(t) for t in range(-40, 61, 10))
 
@@ -39,7 +39,7 @@ class Limits(Parameters):
     scale_residual_ppm: float = Field(5.0, gt=0.0, le=1e6, description="spread about Fc")
 
 
-class Params(Parameters):
+class Params(JudgedParameters):
     """Currents, soaks, and limits of the converter."""
 
     current_ma: float = Field(10.0, gt=0.0, le=1000.0, description="given with either sign")

@@ -35,7 +35,7 @@ from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter
-from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.limits import Check, Limit, check, significance, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
@@ -199,9 +199,9 @@ def _basis(context: Context) -> str:
 def _checks(angles: Sequence[AngleErrors], limits: Limits) -> tuple[Check, ...]:
     most = Limit("deg", limits.heading_sd_max_deg, source="ours")
     found = [check("heading, expected standard uncertainty of one alignment", angles[0].expected_sd_deg, most)]
-    agreement = Limit("1", minimum=limits.prediction_p_value_min, source="ours")
+    level = limits.prediction_p_value_min
     found += [
-        check(f"{a.angle} errors as predicted, p-value of chi-square", a.p_value, agreement)
+        significance(f"{a.angle} errors as predicted, p-value of chi-square", a.p_value, level)
         for a in angles
         if a.p_value is not None
     ]

@@ -50,7 +50,9 @@ def resolve(params: Params, context: Context) -> Params:
         raise BadParameter("positions", len(params.positions), "not beside a program: one of the two")
     own = {"positions": FOURTEEN} if params.program is None else {}
     dwell = {} if params.program is not None else {"dwell_s": context.unit.averaging_time_s}
-    return params.filled({**own, **dwell, **declared_table(context)})
+    full = params.filled({**own, **dwell, **declared_table(context)})
+    full.require_sources(context, corrected=False)
+    return full
 
 
 def schedule(params: Params) -> tuple[Station, ...]:

@@ -21,7 +21,7 @@ from procedures.core.limits import Check, Limit, check, verdict
 from procedures.core.recording import AXES, TRIADS, Recording, Station
 from procedures.core.report import Report, Table
 from procedures.core.turn import PEAK_ACCELERATION, Turn
-from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
+from procedures.procedure import Context, JudgedParameters, Outcome, Parameters, Prediction, Procedure
 
 ACCELERATION_SHARE = 0.5
 """Share of the outer axis' acceleration that the ramps use."""
@@ -35,7 +35,7 @@ class Limits(Parameters):
     other_max: float = Field(0.2, gt=0.0, le=1.0, description="magnitude of its answers to the other axes")
 
 
-class Params(Parameters):
+class Params(JudgedParameters):
     """Rate of the turn and the rest after it. None takes the bench's value."""
 
     rate_deg_s: float = Field(30.0, ge=1.0, le=360.0)

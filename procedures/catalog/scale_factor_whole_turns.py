@@ -26,12 +26,20 @@ from procedures.core import units
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, check, significance, verdict
 from procedures.core.recording import AXES, Recording, Station
 from procedures.core.report import Report
 from procedures.core.site import Site
 from procedures.core.turn import PEAK_ACCELERATION
-from procedures.procedure import Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+from procedures.procedure import (
+    Context,
+    JudgedParameters,
+    Outcome,
+    Parameters,
+    PredictedUncertainty,
+    Prediction,
+    Procedure,
+)
 from procedures.reports import whole_turns as pictures
 from procedures.site_parameters import Arcsec
 
@@ -50,7 +58,7 @@ class Limits(Parameters):
     residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the residuals' chi-square")
 
 
-class Params(Parameters):
+class Params(JudgedParameters):
     """Rates and durations of the turns, and limits of the unit. None takes the bench's value."""
 
     rates_deg_s: tuple[Rate, ...] = Field(
@@ -264,8 +272,7 @@ def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
             limit = Limit("ppm", maximum=maximum, source=TERM_SOURCE)
             checks.append(check(f"gyro {name} {axis}", abs(c.estimate) / ppm, limit, c.standard_uncertainty / ppm))
     if found.p_value is not None:
-        limit = Limit("1", minimum=limits.residual_p_value_min)
-        checks.append(check("gyro residuals, p-value of chi-square", found.p_value, limit))
+        checks.append(significance("gyro residuals, p-value of chi-square", found.p_value, limits.residual_p_value_min))
     return tuple(checks)
 
 

@@ -20,7 +20,7 @@ from procedures.core.recording import TRIADS, Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import TriadRecord, Unit
-from procedures.launches import LAUNCH, NoiseParameters, NoiseResult, analyse_launches, noise_checks
+from procedures.launches import LAUNCH, NoiseLimits, NoiseParameters, NoiseResult, analyse_launches, noise_checks
 from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
 from procedures.reports.launch import noise_report
 
@@ -28,8 +28,30 @@ DWELL_STEP_S = 5.0
 """The averaging time is rounded up to whole steps of this (thesis 4.1.3: 55 and 65 s gave 70 s)."""
 
 
+class Limits(NoiseLimits):
+    """Requirements of a launch on the bench: those of its noise, and readiness within ten minutes (table 1.4)."""
+
+    readiness_s: float | None = Field(
+        600.0,
+        gt=0.0,
+        le=1e6,
+        description="since the launch, by which a warm-up that was found has ended; null: no check",
+    )
+    absence_level: float | None = Field(
+        0.001,
+        gt=0.0,
+        le=0.2,
+        description="rate random walk and ramp must be absent; chance that a sound unit fails; null: no check",
+    )
+
+
 class Params(NoiseParameters):
     """Number and duration of the launches, and settings of their analysis."""
+
+    noise_limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))  # pyright: ignore[reportIncompatibleVariableOverride]
+    temperatures: bool = Field(
+        False, description="record the unit's temperature sensors beside; the unit then stands in the thermal chamber"
+    )
 
     launches: int = Field(4, ge=1, le=100)
     duration_s: float = Field(21_600.0, ge=600.0, le=1_209_600.0, description="of each launch")
@@ -64,6 +86,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             params.settle_s,
             params.duration_s,
             power_off_s=params.off_time_s,
+            temperatures=params.temperatures,
             sample_rate_hz=params.sample_rate_hz,
         )
         for i in range(params.launches)
@@ -81,7 +104,7 @@ def predict(params: Params, context: Context) -> Prediction:
         if record is None:
             warnings.append(f"nothing is known of the {triad} triad's noise: no uncertainty can be predicted")
             continue
-        for name, noise in zip(names, record.noise, strict=True):
+        for name, noise in zip(names, record.observed_noise, strict=True):
             found += [
                 PredictedUncertainty(
                     f"{name}.{p.process}",
@@ -105,16 +128,19 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
     """Analyse each launch on its own, then all of them together."""
-    return analyse_launches(Result, recordings, params)
+    return analyse_launches(Result, recordings, params, context.unit)
 
 
 def report(result: Result) -> Report:
     """Tables 4.1 and 4.2 of the thesis, and the plots behind them."""
-    return noise_report(result.launches, result.channels, result.averaging_time_s)
+    return noise_report(result.launches, result.channels, result.averaging_time_s, result.drawn_launch)
 
 
 def learns(result: Result, unit: Unit, origin: str) -> Unit:
-    """Update the unit's record with the noise and the averaging time found, for later previews and dwells."""
+    """Update the unit's record with the noise and the averaging time found, for later previews and dwells.
+
+    A process that no launch shows enters with the mean square that its upper limit leaves likely, and is named.
+    """
     records: dict[str, TriadRecord | None] = {"gyro": unit.gyro, "accelerometer": unit.accelerometer}
     known = {
         name: noise
@@ -123,10 +149,12 @@ def learns(result: Result, unit: Unit, origin: str) -> Unit:
         for name, noise in zip(names, record.noise, strict=True)
     }
     noise = {s.channel: s.noise_over(known.get(s.channel)) for s in result.channels}
+    absent = {s.channel: s.not_observed for s in result.channels}
     for triad, (x, y, z) in TRIADS.items():
         if all(name in noise for name in (x, y, z)):
             old = records[triad] or TriadRecord((noise[x], noise[y], noise[z]))
-            records[triad] = replace(old, noise=(noise[x], noise[y], noise[z]), noise_origin=origin)
+            found = {"noise": (noise[x], noise[y], noise[z]), "not_observed": (absent[x], absent[y], absent[z])}
+            records[triad] = replace(old, noise_origin=origin, **found)
     dwell = unit.averaging_time_s
     if result.averaging_time_s is not None:
         dwell = DWELL_STEP_S * ceil(result.averaging_time_s / DWELL_STEP_S)
@@ -137,7 +165,15 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
     """Checks that a result will have; for channels in counts only that there is noise."""
     rates = [(c.name, c.rate_unit) for c in context.unit.channels if c.rate_unit in ("rad/s", "m/s^2")]
     walks = [f"{name} random walk" for name, unit in rates if unit == "rad/s"]
-    return (*walks, *(f"{name} bias instability" for name, _ in rates)) if rates else ("noise processes observed",)
+    if not rates:
+        return ("noise processes observed",)
+    found = [*walks, *(f"{name} bias instability" for name, _ in rates)]
+    limits = params.noise_limits
+    if limits.readiness_s is not None:
+        found += [f"{name} readiness time" for name, _ in rates]
+    if limits.absence_level is not None:
+        found += [f"{name} {k} absent, p-value" for name, _ in rates for k in ("rate random walk", "rate ramp")]
+    return tuple(found)
 
 
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
@@ -152,7 +188,7 @@ def _origins(unit: Unit) -> str:
 PROCEDURE = Procedure(
     "static_run",
     "Static launches",
-    "1.0.0",
+    "1.1.0",
     Params,
     Result,
     resolve,

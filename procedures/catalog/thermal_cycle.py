@@ -14,11 +14,12 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis.calibration.reference import site_with
+from procedures.analysis.fitness.watched import each_watched
 from procedures.analysis.thermal.cycle.analysis import KnownOfUnit, analyse_cycle
 from procedures.analysis.thermal.cycle.checks import CycleLimits, cycle_checks, planned_cycle_checks
 from procedures.analysis.thermal.cycle.results import ThermalCycle
 from procedures.analysis.thermal.cycle.runs import CycleSettings
-from procedures.analysis.thermal.cycle.series import read_cycle
+from procedures.analysis.thermal.cycle.series import run_of
 from procedures.analysis.thermal.regime import RegimeSettings
 from procedures.analysis.turns.plan import UPRIGHT
 from procedures.bench import Bench
@@ -32,67 +33,15 @@ from procedures.core.report import Report
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
 from procedures.core.thermal_correction import Form
 from procedures.core.unit_correction import CorrectionKind, UnitCorrection
-from procedures.procedure import STATIONS, Context, Outcome, Parameters, Prediction, Procedure
+from procedures.procedure import STATIONS, Context, JudgedParameters, Outcome, Prediction, Procedure
 from procedures.reports import thermal_figures, thermal_tables
+from procedures.thermal_parameters import DEFAULT_LEGS, Leg, Limits, Regime, Soak
 
 LEAST_OFF_S = 3.0 * units.HOUR
 """Least time switched off between runs, three hours (thesis 4.2.1)."""
 
 
-class Leg(Parameters):
-    """A ramp to an air temperature and a soak there; times run from setting out."""
-
-    target_c: float = Field(ge=-100.0, le=200.0)
-    ramp_c_min: float = Field(1.0, ge=0.01, le=100.0, description="of the chamber's set point")
-    least_s: float = Field(0.0, ge=0.0, le=604_800.0, description="the leg is no shorter, however soon it has soaked")
-    least_soak_s: float = Field(600.0, ge=0.0, le=604_800.0, description="so long the criterion must hold")
-    longest_s: float = Field(14_400.0, ge=60.0, le=604_800.0, description="with no soak by then the job fails")
-
-
-def _leg(target_c: float, least_s: float) -> Leg:
-    return Leg(target_c=target_c, ramp_c_min=1.0, least_s=least_s, least_soak_s=600.0, longest_s=least_s + units.HOUR)
-
-
-DEFAULT_LEGS = (
-    _leg(20.0, 2160.0),
-    _leg(-40.0, 8460.0),
-    *(_leg(target, 5100.0) for target in (-20.0, 0.0, 20.0, 40.0, 60.0)),
-    _leg(20.0, 7080.0),
-)
-"""Twelve hours: within these least times a unit with a case time constant of some twenty minutes soaks at every leg."""
-
-
-class Soak(Parameters):
-    """Soak criterion of the unit, judged from its own case and converter sensors every ten seconds."""
-
-    slope_c_min: float = Field(0.1, ge=1e-4, le=100.0, description="most that either sensor may drift")
-    window_s: float = Field(300.0, ge=60.0, le=86_400.0, description="of the straight line whose slope that is")
-    air_within_c: float = Field(1.5, ge=0.01, le=100.0, description="chamber's air about the target")
-
-
-class Regime(Parameters):
-    """Settings of the regime indicator of thesis 3.18."""
-
-    memory_s: float = Field(120.0, ge=3.0, le=86_400.0)
-    enter_c_s2: float = Field(4.0e-6, gt=0.0, le=1.0)
-    release_c_s2: float = Field(2.5e-6, gt=0.0, le=1.0)
-    release_rate_c_s: float = Field(2.5e-3, gt=0.0, le=1e3)
-    hold_s: float = Field(300.0, ge=0.0, le=86_400.0)
-
-
-class Limits(Parameters):
-    """Requirements (thesis 4.3, 5.6; tests at the level of significance are this program's own)."""
-
-    three_sigma_m_s2: float = Field(0.0005, gt=0.0, le=100.0, description="of each axis after correction, worst soak")
-    magnitude_rms_m_s2: float = Field(0.0005, gt=0.0, le=100.0, description="of |ĝ| about its mean, worst run")
-    allan_rise: float = Field(
-        1.0, gt=0.0, le=1e6, description="least sure deviation at a longer time over the most at a shorter one"
-    )
-    gyro_random_walk_deg_sqrt_h: float = Field(0.003, gt=0.0, le=1e6)
-    gyro_bias_in_run_deg_h: float = Field(0.015, gt=0.0, le=1e6, description="bias instability in the cycle")
-
-
-class Params(Parameters):
+class Params(JudgedParameters):
     """Profile, analysis and limits of the cycle."""
 
     legs: tuple[Leg, ...] = Field(DEFAULT_LEGS, min_length=1, max_length=100)
@@ -104,13 +53,21 @@ class Params(Parameters):
     sample_rate_hz: float = Field(100.0, ge=1.0, le=10_000.0)
     cell_s: float = Field(60.0, ge=1.0, le=600.0, description="cells that the fits work on")
     case_lag_s: float = Field(5.0, ge=0.0, le=600.0, description="time constant of the case sensor, by its data sheet")
-    converter_lag_s: float = Field(5.0, ge=0.0, le=600.0)
+    converter_lag_s: float | None = Field(
+        None, ge=0.0, le=600.0, description="of the converter's sensor; None: found from the readings"
+    )
     lag_sd_s: float = Field(0.05, ge=0.0, le=600.0, description="standard uncertainty of each time constant")
     reference_case_c: float = Field(
         20.0, ge=-100.0, le=200.0, description="reading of the case sensor at which the correction does nothing"
     )
     reference_converter_c: float = Field(20.0, ge=-100.0, le=200.0)
     regime: Regime = Field(default_factory=lambda: Regime.model_validate({}))
+    static_sensor: Literal["case", "gyros"] = Field(
+        "case", description="of the static terms: the case's, or each axis' own gyro's (thesis 4.1)"
+    )
+    thermometers: Literal["current", "none"] = Field(
+        "current", description="current: the unit's current calibration of its thermometers, where it has one"
+    )
     form: Form = Field(Form.BOTH, description="which terms of thesis 4.1 act in which regime")
     correction: Literal["fit", "current"] = Field(
         "fit",
@@ -119,6 +76,11 @@ class Params(Parameters):
     )
     gyro_noise: Literal["cycle", "unit"] = Field(
         "cycle", description="noise that the gyros' dependence on temperature is tested against"
+    )
+    gyro_dependence: Literal["fail", "correct"] = Field(
+        "fail",
+        description="of a gyro that depends on temperature: fail it (thesis 4.2.3), or judge what a correction leaves "
+        "in runs that the correction has not seen",
     )
     gyro_trim_s: float = Field(600.0, ge=0.0, le=86_400.0, description="start of a launch that gyros are not judged by")
     level: float = Field(0.01, gt=0.0, le=0.2, description="chance that a sound set of gyros is said to depend")
@@ -137,6 +99,7 @@ class Params(Parameters):
             cell_s=self.cell_s,
             case_lag_s=self.case_lag_s,
             converter_lag_s=self.converter_lag_s,
+            static=self.static_sensor,
             lag_sd_s=self.lag_sd_s,
             reference_c=(self.reference_case_c, self.reference_converter_c),
             regime=RegimeSettings(**self.regime.model_dump()),
@@ -202,7 +165,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     params = resolve(params, context)
     _require_correction(params, context)
     site = site_with(context.bench.site, None, params.gravity_m_s2, None, None)
-    series = [(r.info.id, read_cycle(r, _up(r, context))) for r in recordings]
+    series = each_watched(run_of, recordings, lambda _, recording: (recording, _up(recording, context)))
     unit = context.unit
     calibration = unit.calibration("accelerometer")
     known = KnownOfUnit(
@@ -210,30 +173,43 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
         calibration if calibration is not None and calibration.output_unit == "m/s^2" else None,
         unit.thermal_correction,
         None if unit.gyro is None else unit.gyro.noise,
+        unit.thermometers if params.thermometers == "current" else None,
+        None if unit.accelerometer is None else unit.accelerometer.noise,
     )
     cycle = analyse_cycle(
         *(series, params.settings(), params.form, site.gravity_m_s2, known),
         judge_current=params.correction == "current",
         noise_from_cycle=params.gyro_noise == "cycle",
     )
-    checks = cycle_checks(cycle, _limits(params))
-    return Result(checks=checks, verdict=verdict(checks), warnings=cycle.warnings, cycle=cycle)
+    checks = cycle_checks(cycle, _limits(params), correct_gyros=params.gyro_dependence == "correct")
+    warnings = (*_withheld(context), *cycle.warnings)
+    return Result(checks=checks, verdict=verdict(checks), warnings=warnings, cycle=cycle)
 
 
 def corrections(result: Result) -> tuple[UnitCorrection, ...]:
-    """The correction that was fitted; none where the unit's own was judged."""
-    return (UnitCorrection("thermal", result.cycle.correction),) if result.cycle.judged == "fit" else ()
+    """The correction that was fitted, and one of gyros that depend on temperature; none where the own was judged."""
+    if result.cycle.judged != "fit":
+        return ()
+    gyros = result.cycle.gyro_correction
+    accelerometers = UnitCorrection("thermal", result.cycle.correction)
+    return (accelerometers,) if gyros is None else (accelerometers, UnitCorrection("gyros", gyros))
 
 
 def uses_corrections(params: Params) -> tuple[CorrectionKind, ...]:
-    """Kinds of corrections used: the converter's models in stage one; the unit's own as judged or for comparison."""
-    return "converter", "thermal"
+    """Kinds of corrections used: sensors and stage one first; the unit's own as judged or for comparison."""
+    return ("converter", "thermal", *(("thermometers",) if params.thermometers == "current" else ()))
 
 
 def report(result: Result) -> Report:
     """Report with Tables 4.3 to 4.7 and figures 3.15 to 3.17 and 4.11 to 4.16 of the thesis, reworded."""
     cycle = result.cycle
     return Report(thermal_tables.summary(cycle), (*thermal_tables.tables(cycle), *thermal_figures.figures(cycle)))
+
+
+def _withheld(context: Context) -> tuple[str, ...]:
+    """Corrections of the unit that would have been used, and why they were not."""
+    kinds: tuple[CorrectionKind, ...] = ("converter", "thermometers")
+    return tuple(f"left out: {why}" for kind in kinds if (why := context.unit.why_withheld(kind)))
 
 
 def _limits(params: Params) -> CycleLimits:
@@ -270,11 +246,13 @@ def _require_possible(params: Params, context: Context) -> None:
 
 def _require_correction(params: Params, context: Context) -> None:
     if params.correction == "current" and context.unit.thermal_correction is None:
-        raise BadParameter("correction", "current", f"unit {context.unit.serial} has no thermal correction to judge")
+        why = context.unit.why_withheld("thermal")
+        own = why or f"unit {context.unit.serial} has no thermal correction to judge"
+        raise BadParameter("correction", "current", own)
 
 
 def _warnings(params: Params, context: Context) -> tuple[str, ...]:
-    found: list[str] = []
+    found: list[str] = list(_withheld(context))
     if params.power_off_s < LEAST_OFF_S:
         found.append(
             f"power_off_s = {params.power_off_s:g}: the unit may not be at rest; the thesis leaves it off for 3 h"
@@ -289,7 +267,7 @@ def _warnings(params: Params, context: Context) -> tuple[str, ...]:
 
 
 PROCEDURE = Procedure(
-    *("thermal_cycle", "Thermal cycle", "1.1.0"),
+    *("thermal_cycle", "Thermal cycle", "1.2.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report),
     uses_calibration=("accelerometer",),
     corrections=corrections,

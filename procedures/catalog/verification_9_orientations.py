@@ -21,6 +21,7 @@ from pydantic import Field
 from procedures import steps
 from procedures.analysis.calibration.diagnosis import LIKELY_P_VALUE
 from procedures.analysis.calibration.plan import (
+    IN_RUN_LEVEL,
     TriadPlan,
     basis,
     in_run_check,
@@ -38,6 +39,7 @@ from procedures.analysis.calibration.triad_verification import (
     planned_covariance,
     planned_diagnosis,
     verify_at_reference,
+    verify_gyros,
     verify_triad,
 )
 from procedures.analysis.calibration.verification import predicted_sd
@@ -45,7 +47,7 @@ from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter
-from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, check, significance, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.table_angles import TableAngles
@@ -62,8 +64,9 @@ ORIENTATIONS = tuple((40.0 * i, 10.0 * i, 20.0 * i) for i in range(9))
 
 
 _OF_PLAN = (
-    "None: the expanded uncertainty of the plan (k = 2), which has the unit's change between launches; with 80 ppm of "
-    "accelerometer scale factor a sound unit may exceed 0.0005 m/s^2 in another launch"
+    "None: the expanded uncertainty of the plan, which has the unit's change between launches and which a sound unit "
+    "exceeds with a chance of prediction_p_value_min; with 80 ppm of accelerometer scale factor a sound unit may "
+    "exceed 0.0005 m/s^2 in another launch"
 )
 
 
@@ -150,7 +153,8 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     site = params.site(context)
     used = context.unit.thermal_correction if params.thermal_correction == "current" else None
     table = params.table(site)
-    doubts, gyro = (), verify_triad(recordings, "gyro", site, context.unit, table)
+    of_gyros = None if used is None else context.unit.gyro_correction
+    doubts, gyro = (), verify_gyros(recordings, site, context.unit, table, of_gyros)
     if used is None:
         accelerometer = verify_triad(recordings, "accelerometer", site, context.unit, table)
     else:
@@ -253,16 +257,19 @@ def _warnings(plans: Sequence[TriadPlan], limits: Limits) -> tuple[str, ...]:
 def _in_run(plan: TriadPlan, limits: Limits) -> PlannedCheck:
     gyro = plan.triad == "gyro"
     maximum = limits.gyro_bias_in_run_deg_h if gyro else limits.accelerometer_bias_in_run_m_s2
-    return in_run_check(plan, maximum, planned_covariance(plan))
+    level = limits.prediction_p_value_min
+    if maximum is None and level == 0.0:
+        raise BadParameter("limits.prediction_p_value_min", level, "above 0: the limit of the plan is made with it")
+    return in_run_check(plan, maximum, planned_covariance(plan), level or IN_RUN_LEVEL)
 
 
 def _checks(t: TriadVerification, limits: Limits, plan: TriadPlan) -> list[Check]:
     m, planned = t.magnitudes, _in_run(plan, limits)
     size = units.DISPLAY[m.unit][1]
-    checks = [check(planned.check, m.per_axis / size, planned.limit, m.per_axis_sd / size)]
+    checks = [check(planned.check, m.per_axis / size, planned.limit, m.per_axis_sd / size, "", len(m.after) - 1.0)]
     if t.p_value is not None:
-        agreement = Limit("1", minimum=limits.prediction_p_value_min)
-        checks.append(check(f"{m.triad} errors as predicted, p-value of chi-square", t.p_value, agreement))
+        name = f"{m.triad} errors as predicted, p-value of chi-square"
+        checks.append(significance(name, t.p_value, limits.prediction_p_value_min))
     return checks
 
 
@@ -270,7 +277,7 @@ PROCEDURE = Procedure(
     *("verification_9_orientations", "Verification in nine orientations", "1.2.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report),
     uses_calibration=TRIAD_NAMES,
-    uses_corrections=lambda params: ("thermal",) if params.thermal_correction == "current" else (),
+    uses_corrections=lambda params: ("thermal", "gyros") if params.thermal_correction == "current" else (),
     quantities=quantities,
     planned_checks=planned_checks,
 )

@@ -1,9 +1,11 @@
 """Measured values against requirements, and the verdict over all checks."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import isfinite
+
+from procedures.core.decision import Decision, Rule, decide, inside
 
 
 class Verdict(StrEnum):
@@ -41,6 +43,12 @@ class Check:
     passed: bool
     standard_uncertainty: float | None = None
     note: str = ""
+    degrees_of_freedom: float | None = None
+    """Degrees of freedom of the standard uncertainty; None: so many that they do not count."""
+    decision: Decision | None = None
+    """Rule by which it was decided, and the expanded uncertainty; None in results of versions before it."""
+    significance: bool = False
+    """True for a test of significance: the value is a p-value and the limit its level."""
 
 
 @dataclass(frozen=True)
@@ -64,14 +72,37 @@ class PlannedCheck:
     """Of a test of significance: chance that a sound unit fails it."""
 
 
-def check(name: str, value: float, limit: Limit, standard_uncertainty: float | None = None, note: str = "") -> Check:
-    """Compare a value with its limit. A value that is not finite never passes."""
+def check(
+    name: str,
+    value: float,
+    limit: Limit,
+    standard_uncertainty: float | None = None,
+    note: str = "",
+    degrees_of_freedom: float | None = None,
+) -> Check:
+    """Compare a value with its limit by simple acceptance. A value that is not finite never passes."""
     passed = (
         isfinite(value)
         and (limit.maximum is None or value <= limit.maximum)
         and (limit.minimum is None or value >= limit.minimum)
     )
-    return Check(name, value, limit, passed, standard_uncertainty, note)
+    return Check(name, value, limit, passed, standard_uncertainty, note, degrees_of_freedom)
+
+
+def significance(name: str, p_value: float, level: float, note: str = "", source: str = "") -> Check:
+    """Test of significance at a level: fails where the p-value is below it. Such a value has no uncertainty."""
+    limit = Limit("1", minimum=level, source=source or "ours: a test of significance")
+    return replace(check(name, p_value, limit, note=note), significance=True)
+
+
+def decided(made: Check, rule: Rule) -> Check:
+    """The check under a decision rule, which can make a pass a fail, never the reverse."""
+    if made.significance:
+        outcome = "pass" if made.passed else "fail"
+        return replace(made, decision=Decision(f"test of significance at {made.limit.minimum or 0.0:g}", outcome))
+    distance = inside(made.value, made.limit.minimum, made.limit.maximum)
+    found = decide(distance, made.passed, made.standard_uncertainty, made.degrees_of_freedom, rule)
+    return replace(made, passed=found.outcome.endswith("pass"), decision=found)
 
 
 def verdict(checks: Iterable[Check]) -> Verdict:

@@ -16,6 +16,7 @@ are swapped. This module names them as thesis 4.1 does.
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +24,7 @@ from numpy.typing import ArrayLike
 from procedures.core.arrays import Array
 from procedures.core.converter import ConverterTriad
 from procedures.core.errors import BadParameter
+from procedures.core.thermometers import ThermometerCorrection
 
 ALPHAS = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
 BETAS = ("beta_1", "beta_2", "beta_3", "beta_4")
@@ -126,6 +128,8 @@ class TemperatureRange:
             np.maximum(low - np.asarray(t, dtype=np.float64), np.asarray(t, dtype=np.float64) - high)
             for t, (low, high) in ((case_c, self.case_c), (converter_c, self.converter_c))
         ]
+        if found[0].ndim == 2:  # a sensor for each axis: the farthest counts
+            found[0] = found[0].max(axis=1)
         return np.asarray(np.maximum(np.maximum(found[0], found[1]), 0.0), dtype=np.float64)
 
     def __str__(self) -> str:
@@ -145,6 +149,11 @@ class ThermalCorrection:
     then these models' for the converter's own drift, and the axes' for the rest: best the same."""
     fitted_range: TemperatureRange | None = None
     """Temperature range of the fit; beyond it the correction extrapolates. None: not known (older versions)."""
+    thermometers: ThermometerCorrection | None = None
+    """Correction of the sensors that was taken out of their readings before the fit, and so must be wherever the
+    correction is used: its temperatures are then temperatures. None: they are readings."""
+    static_sensors: Literal["case", "gyros"] = "case"
+    """Sensor of the static terms: the case's for all axes, or the thermometer of each axis' own gyro (thesis 4.1)."""
 
     @property
     def scales(self) -> Array:

@@ -1,16 +1,18 @@
 """Record of a unit before a job: its channels, its noise, its stability from launch to launch."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from procedures.core.arrays import Array
 from procedures.core.converter import ConverterTriad
-from procedures.core.errors import NoCalibration
+from procedures.core.errors import BadParameter, NoCalibration
+from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import TRIADS, Channel
 from procedures.core.thermal_correction import ThermalCorrection
+from procedures.core.thermometers import ThermometerCorrection
 from procedures.core.unit_correction import CorrectionKind
 
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
@@ -28,6 +30,23 @@ class TriadRecord:
     """Standard deviation of the scale factor from run to run, relative."""
     noise_origin: str = "data sheet"
     """Origin of the coefficients: a data sheet, or the result that found them."""
+    not_observed: tuple[tuple[str, ...], ...] = ((), (), ())
+    """Processes of x, y, z that no launch showed: their coefficients come from upper limits, and are no finding."""
+    dither_frequency_hz: tuple[float, float, float] | None = None
+    """Frequencies of the mechanical dithers of x, y, z, by the data sheet; 0: no dither. None: not declared."""
+
+    def __post_init__(self) -> None:
+        for name, value in zip("xyz", self.dither_frequency_hz or (), strict=False):
+            if not 0.0 <= value <= 1e5:
+                raise BadParameter(f"dither_frequency_hz.{name}", value, "within 0 … 100 000 Hz")
+
+    @property
+    def observed_noise(self) -> tuple[NoiseCoefficients, ...]:
+        """The noise that was declared or found, x, y, z: zero for what no launch showed."""
+        return tuple(
+            replace(noise, **dict.fromkeys(absent, 0.0))
+            for noise, absent in zip(self.noise, self.not_observed, strict=True)
+        )
 
     def launch_covariance(self, outputs: Array) -> Array:
         """Covariance by which outputs K·v (n, 3) of one launch depart from the unit's mean, per channel, (3, n, n).
@@ -69,9 +88,10 @@ class UnitDeclaration:
 
 @dataclass(frozen=True)
 class WithheldCalibration:
-    """The calibration of a triad that would be in use, but was rejected or has expired."""
+    """A calibration or correction that would be in use, but was rejected or has expired."""
 
     triad: str
+    """Triad of a calibration, or kind of a correction."""
     id: str
     why: str
     """Sentence that says why it is not used, and what to do."""
@@ -93,13 +113,19 @@ class Unit:
     calibration_ids: tuple[str, ...] = ()
     """Ids of the stored calibrations in use, in the order of `calibrations`."""
     withheld: tuple[WithheldCalibration, ...] = field(default=(), repr=False)
-    """Current calibrations that may not be used."""
+    """Current calibrations and corrections that may not be used."""
     thermal_correction: ThermalCorrection | None = field(default=None, repr=False)
     """The current correction of the kind "thermal", or None."""
     thermal_correction_id: str | None = None
     converter: ConverterTriad | None = field(default=None, repr=False)
     """Current models of the signal converter, x, y, z, or None."""
     converter_id: str | None = None
+    thermometers: ThermometerCorrection | None = field(default=None, repr=False)
+    """Current correction of the temperature sensors, or None: they are taken as they read."""
+    thermometers_id: str | None = None
+    gyro_correction: GyroThermalCorrection | None = field(default=None, repr=False)
+    """Current correction of the gyros for temperature, or None."""
+    gyro_correction_id: str | None = None
     declaration: UnitDeclaration | None = field(default=None, repr=False)
     """Declaration from the unit's own file; None for a simulated unit."""
 
@@ -122,7 +148,16 @@ class Unit:
 
     def correction_id(self, kind: CorrectionKind) -> str | None:
         """Id of the current correction of a kind, or None."""
-        return {"thermal": self.thermal_correction_id, "converter": self.converter_id}[kind]
+        return {
+            "thermal": self.thermal_correction_id,
+            "converter": self.converter_id,
+            "thermometers": self.thermometers_id,
+            "gyros": self.gyro_correction_id,
+        }[kind]
+
+    def why_withheld(self, kind: CorrectionKind) -> str:
+        """The reason why the current correction of a kind may not be used; empty where it may, or there is none."""
+        return next((w.why for w in self.withheld if w.triad == kind), "")
 
     def triad(self, triad: str) -> TriadRecord | None:
         """The record of a triad by name."""

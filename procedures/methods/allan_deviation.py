@@ -4,9 +4,9 @@ Overlapping and non-overlapping Allan, modified Allan, time and Hadamard deviati
 confidence from equivalent degrees of freedom. Samples are taken in nominal units, before any calibration.
 """
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -24,13 +24,17 @@ from procedures.analysis.allan.statistic import (
 )
 from procedures.analysis.fitness.findings import FitnessSettings
 from procedures.analysis.fitness.watched import Inspection
-from procedures.core import units
+from procedures.analysis.launch.curves import Curve, bands
+from procedures.analysis.launch.density import Density
+from procedures.analysis.launch.results import BandCurve
+from procedures.analysis.launch.spectrum import densities
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import Limit, check, verdict
 from procedures.core.recording import INCREMENTS, Quantity, Recording
-from procedures.core.report import Figure, Report, Series, Table
+from procedures.core.report import Report
 from procedures.core.unit import Unit
 from procedures.procedure import Evidence, Method, Outcome, RecordedParameters
+from procedures.reports.allan import deviation_report
 
 MOST = 10_000
 """Cluster times that are taken of one recording: a curve of more is no curve to be read."""
@@ -55,29 +59,17 @@ class Params(RecordedParameters):
         "every whole number of samples; or a list [s], each taken as the nearest whole number of samples",
     )
     confidence: float = Field(0.6827, gt=0.0, lt=1.0, description="of the intervals")
+    density: bool = Field(True, description="the power spectral density beside each curve")
+    band: Literal["none", "all_starts", "sampled_intervals"] = Field(
+        "none",
+        description="all_starts: least, mean and greatest deviation over every start; sampled_intervals: `intervals` "
+        "a τ (both paper A)",
+    )
+    band_step_decades: float = Field(0.02, ge=0.002, le=1.0, description="between the band's τ; paper A: 0.002")
+    intervals: int = Field(300, ge=2, le=1_000_000, description="a τ, of sampled_intervals")
     gaps: Literal["refuse", "leave_out"] = Field(
         "refuse", description="samples that are NaN; leave_out: every term that touches one is left out"
     )
-
-
-@dataclass(frozen=True)
-class Curve:
-    """The deviation of one channel of one recording; all lists go with `tau_s`."""
-
-    recording: str
-    channel: str
-    unit: str
-    """Unit of the deviation: that of the channel's nominal rate, times s for the time deviation."""
-    tau_s: tuple[float, ...]
-    deviation: tuple[float, ...]
-    lower: tuple[float, ...]
-    upper: tuple[float, ...]
-    terms: tuple[int, ...]
-    """Squared differences that were averaged."""
-    edf: tuple[float, ...]
-    """Equivalent degrees of freedom."""
-    noise_exponent: tuple[float, ...]
-    """α of the rate's spectral density f^α that the degrees of freedom were taken for."""
 
 
 class Result(Outcome):
@@ -93,13 +85,17 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     if not evidence.recordings:
         raise UnfitRecording("there is no recording to take a deviation of")
     statistic = STATISTICS[params.statistic]
+    if params.band != "none" and params.gaps == "leave_out":
+        raise BadParameter("band", params.band, "none where gaps are left out: a band needs every sample")
     curves = tuple(c for r in evidence.recordings for c in _curves(r, statistic, params))
+    curves, told = beside(evidence.recordings, curves, params)
     shortest = min(min(c.edf[0] for c in curves), 1e9)
     limit = Limit("1", minimum=1.0, source="an interval needs one degree of freedom")
     checks = (check("equivalent degrees of freedom at the shortest τ, the least", shortest, limit),)
     return Result(
         checks=checks,
         verdict=verdict(checks),
+        warnings=told,
         statistic=params.statistic,
         confidence=params.confidence,
         curves=curves,
@@ -107,18 +103,8 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 
 def report(result: Result) -> Report:
-    """Report with a plot for each curve, and a table with three of its points."""
-    name = result.statistic.replace("_", " ")
-    figures = tuple(_figure(curve, name, result.confidence) for curve in result.curves)
-    rows = tuple(
-        (c.channel, c.recording, _shown(c)[0], c.tau_s[k], c.deviation[k] / size, c.lower[k] / size, c.upper[k] / size)
-        for c in result.curves
-        for size in (_shown(c)[1],)
-        for k in (0, len(c.tau_s) // 2, len(c.tau_s) - 1)
-    )
-    columns = ("channel", "recording", "unit", "τ, s", "deviation", "lower", "upper")
-    title = f"{name.capitalize()} deviation, first, middle and last point"
-    return Report(sections=(Table(title, columns, rows), *figures))
+    """Report with a plot for each curve and its density, and a table with three of its points."""
+    return deviation_report(result.statistic, result.confidence, result.curves)
 
 
 def _curves(recording: Recording, statistic: Statistic, params: Params) -> tuple[Curve, ...]:
@@ -210,22 +196,27 @@ def _naming(recording: str, channel: str = "") -> Generator[None]:
         raise UnfitRecording(f"{where}: {refusal}") from refusal
 
 
-def _shown(curve: Curve) -> tuple[str, float]:
-    """Display unit of a curve, and its size in SI."""
-    known = {"rad/s": ("deg/h", units.DEG_PER_HOUR), "rad/s·s": ("arcsec", units.ARCSEC)}
-    return known.get(curve.unit, (curve.unit, 1.0))
-
-
-def _figure(curve: Curve, name: str, confidence: float) -> Figure:
-    label, size = _shown(curve)
-    x, y = curve.tau_s, tuple(d / size for d in curve.deviation)
-    low, high = (tuple(v / size for v in side) for side in (curve.lower, curve.upper))
-    series = (
-        Series(name, x, y, style="line_points"),
-        Series(f"{100 * confidence:.0f} % interval, lower", x, low, style="reference"),
-        Series("upper", x, high, style="reference"),
-    )
-    return Figure(f"{curve.channel}, {curve.recording}", "τ, s", f"σ, {label}", series, x_log=True, y_log=True)
+def beside(
+    recordings: Sequence[Recording], curves: tuple[Curve, ...], params: Params
+) -> tuple[tuple[Curve, ...], tuple[str, ...]]:
+    """The curves with densities and bands beside them, and sentences on what could not be told."""
+    told: list[str] = []
+    found: list[Curve] = []
+    for recording in recordings:
+        own = [c for c in curves if c.recording == recording.info.id]
+        names = [c.channel for c in own]
+        spectra: list[Density | None] = [None] * len(own)
+        if params.density and params.gaps == "leave_out":
+            told.append("no spectral density where gaps are left out")
+        elif params.density:
+            spectra, why = densities(recording, names, params.confidence)
+            told += why
+        own_bands: list[BandCurve | None] = [None] * len(own)
+        if params.band != "none":
+            with _naming(recording.info.id):
+                own_bands = [*bands(recording, names, params.band, params.band_step_decades, params.intervals)]
+        found += [replace(c, density=s, band=b) for c, s, b in zip(own, spectra, own_bands, strict=True)]
+    return tuple(found), tuple(dict.fromkeys(told))
 
 
 def inspection(params: Params, count: int) -> Inspection:
@@ -237,7 +228,7 @@ def inspection(params: Params, count: int) -> Inspection:
 METHOD = Method(
     "allan_deviation",
     "Allan deviation and its relatives",
-    "1.0.0",
+    "1.1.0",
     Params,
     Result,
     analyse,

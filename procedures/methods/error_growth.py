@@ -25,7 +25,7 @@ from procedures.core.limits import Limit, check, verdict
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.report import Report, Table
 from procedures.core.unit import Unit
-from procedures.procedure import Evidence, Method, Outcome, Parameters
+from procedures.procedure import Evidence, JudgedParameters, Method, Outcome, Parameters
 from procedures.reports import growth
 
 TILT_MAX_RAD = 0.01
@@ -48,7 +48,7 @@ class Declared(Parameters):
     accelerometer_bias_instability_ug: float = Field(1.0, ge=0.0, le=1e6)
 
 
-class Params(Parameters):
+class Params(JudgedParameters):
     """Position, attitude and initial errors of the navigator. The latitude has no default: it depends on the place."""
 
     latitude_deg: float = Field(ge=-90.0, le=90.0)

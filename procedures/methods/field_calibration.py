@@ -28,7 +28,7 @@ from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.limits import Check, Limit, check, significance, verdict
 from procedures.core.recording import ACCELEROMETER, GYRO, Recording
 from procedures.core.report import Report, Table
 from procedures.core.site import Site
@@ -227,8 +227,8 @@ def _checks(triads: Sequence[FieldTriad], params: Params) -> list[Check]:
         note = "; ".join(filter(None, (f"worst: {t.worst}", t.suspected)))
         name = t.calibration.triad
         if t.p_value is not None:
-            limit = Limit("1", minimum=params.residual_p_value_min)
-            found.append(check(f"{name} residuals, p-value of chi-square", t.p_value, limit, note=note))
+            level = params.residual_p_value_min
+            found.append(significance(f"{name} residuals, p-value of chi-square", t.p_value, level, note))
         elif t.misfit is not None:
             limit = Limit("1", maximum=params.misfit_max, source="ours")
             found.append(check(f"{name} residuals over what noise and positions allow", t.misfit, limit, note=note))

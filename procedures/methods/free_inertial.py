@@ -25,7 +25,7 @@ from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, Undetermined, UnfitRecording
 from procedures.core.imu_model import TriadCalibration, correct
-from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.limits import Check, Limit, check, significance, verdict
 from procedures.core.recording import ACCELEROMETER, GYRO, TRIADS, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
@@ -183,9 +183,9 @@ def _at(time_s: Array, track: Track, values: Array) -> tuple[float, ...]:
 def _checks(params: Params, track: Track, p_value: float | None, distance: float) -> tuple[Check, ...]:
     made: list[Check] = []
     if p_value is not None:
-        limit = Limit("1", minimum=params.p_value_min, source="ours")
+        level = params.p_value_min
         note = f"{distance:.3g} standard deviations"
-        made.append(check("drift as predicted, p-value of its Mahalanobis distance", p_value, limit, note=note))
+        made.append(significance("drift as predicted, p-value of its Mahalanobis distance", p_value, level, note))
     if params.drift_max_m is not None:
         limit = Limit("m", maximum=params.drift_max_m)
         made.append(check("greatest distance from the start", float(track.radial_m.max()), limit))

@@ -19,7 +19,7 @@ from procedures.analysis.recursive_bias.kalman import RecursiveBias, white_covar
 from procedures.analysis.recursive_bias.window_noise import WindowMeans
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.limits import Check, Limit, check, significance, verdict
 from procedures.core.recording import ACCELEROMETER, GYRO, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
@@ -184,10 +184,9 @@ def _asked(params: Params, rate_unit: str) -> tuple[float | None, float | None]:
 def _checks(b: ChannelBias) -> tuple[Check, ...]:
     name, size = units.DISPLAY[b.unit]
     where = f"{b.channel}, {b.recording}"
-    found = [check(f"{where}: scatter of ten parts, p-value", b.slow_noise_p_value, Limit("1", minimum=P_VALUE_MIN))]
+    found = [significance(f"{where}: scatter of ten parts, p-value", b.slow_noise_p_value, P_VALUE_MIN)]
     if b.noise == "record":
-        limit = Limit("1", minimum=P_VALUE_MIN)
-        found.append(check(f"{where}: innovations, p-value", b.innovations_p_value, limit))
+        found.append(significance(f"{where}: innovations, p-value", b.innovations_p_value, P_VALUE_MIN))
     if b.target_sd is not None:
         limit = Limit(name, b.target_sd / size, source="target")
         found.append(check(f"{where}: standard uncertainty", b.standard_uncertainty / size, limit))

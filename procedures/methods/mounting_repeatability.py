@@ -4,19 +4,19 @@ from math import sqrt
 
 from pydantic import Field
 
-from procedures.analysis.calibration.seat_repeatability import CrossCoupling, seat_repeatability
+from procedures.analysis.repeatability.seat_repeatability import CrossCoupling, seat_repeatability
 from procedures.core import units
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Limit, check, verdict
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
-from procedures.procedure import DatedCalibration, Evidence, Method, Outcome, Parameters
+from procedures.procedure import DatedCalibration, Evidence, JudgedParameters, Method, Outcome
 
 TRIADS = ("gyro", "accelerometer")
 
 
-class Params(Parameters):
+class Params(JudgedParameters):
     """Requirement on the repeatability of the seat."""
 
     repeatability_arcsec: float = Field(

@@ -20,18 +20,18 @@ class Result(NoiseResult):
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     """Analyse the recordings as launches. Raises `UnfitRecording`, `MissingChannel`, `BadParameter`."""
-    return analyse_launches(Result, evidence.recordings, params)
+    return analyse_launches(Result, evidence.recordings, params, unit)
 
 
 def report(result: Result) -> Report:
     """Tables and plots of every channel."""
-    return noise_report(result.launches, result.channels, result.averaging_time_s)
+    return noise_report(result.launches, result.channels, result.averaging_time_s, result.drawn_launch)
 
 
 METHOD = Method(
     "noise_analysis",
     "Noise of recordings at rest",
-    "1.0.0",
+    "1.1.0",
     Params,
     Result,
     analyse,

@@ -4,20 +4,20 @@ from math import sqrt
 
 from pydantic import Field
 
-from procedures.analysis.calibration.run_to_run import Scatter, run_to_run
+from procedures.analysis.repeatability.run_to_run import Scatter, run_to_run
 from procedures.core import units
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
-from procedures.procedure import Evidence, Method, Outcome, Parameters, Planned
+from procedures.procedure import Evidence, JudgedParameters, Method, Outcome, Planned
 
 TRIADS = ("gyro", "accelerometer")
 SOURCE = "thesis 4.3, 5.6"
 
 
-class Params(Parameters):
+class Params(JudgedParameters):
     """Requirements on the standard deviation between launches (thesis 4.3, 5.6); None: it is not judged."""
 
     gyro_bias_run_to_run_deg_h: float | None = Field(0.015, gt=0.0, le=1e6)
@@ -116,7 +116,7 @@ def _check(s: Scatter, limit: Limit) -> Check:
     size = _display(s)[1]
     note = "" if s.resolves(_si(s, limit)) else "beneath the uncertainty of the calibrations: not resolved"
     standard_uncertainty = s.sd / size / sqrt(2.0 * (len(s.values) - 1))
-    return check(f"{s.triad} {s.name} run to run", s.sd / size, limit, standard_uncertainty, note)
+    return check(f"{s.triad} {s.name} run to run", s.sd / size, limit, standard_uncertainty, note, len(s.values) - 1.0)
 
 
 def planned_checks(params: Params, unit: Unit, planned: Planned) -> tuple[PlannedCheck, ...]:

@@ -28,7 +28,7 @@ from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.limits import Check, Limit, check, significance, verdict
 from procedures.core.recording import TRIADS, Recording, rates, require_finite
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
@@ -229,8 +229,8 @@ def _checks(fit: ScalarFit, params: Params, misfit: Misfit) -> tuple[Check, ...]
         ),
     ]
     if fit.p_value is not None:
-        limit = Limit("1", minimum=params.residual_p_value_min)
-        checks.append(check("residuals, p-value of chi-square", fit.p_value, limit, note=f"worst: {misfit.worst}"))
+        note = f"worst: {misfit.worst}"
+        checks.append(significance("residuals, p-value of chi-square", fit.p_value, params.residual_p_value_min, note))
     elif not fit.noise_known:
         checks += misfit.checks("residuals over the scatter within the poses", params.misfit_max)
     return tuple(checks)

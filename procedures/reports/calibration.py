@@ -4,6 +4,7 @@ words.
 
 from collections.abc import Sequence
 
+from procedures.analysis.calibration.budget import Budget
 from procedures.analysis.calibration.reference_temperature import ThermalShare
 from procedures.analysis.calibration.summary import Coefficient, TriadSummary
 from procedures.analysis.calibration.verification import Magnitudes
@@ -34,6 +35,27 @@ def _coefficient_row(c: Coefficient, sources: Sequence[str]) -> tuple[str | floa
     unit, size = ("ppm", units.PPM) if c.unit == "1" else units.DISPLAY.get(c.unit, (c.unit, 1.0))
     parts = (c.standard_uncertainty, c.from_noise, c.from_table, *(c.from_table_source[s] for s in sources))
     return (f"{name} − 1" if zero else name, unit, (c.estimate - zero) / size, *(part / size for part in parts))
+
+
+def budget_table(triad: str, budgets: Sequence[Budget]) -> Table:
+    """Uncertainty budget of each coefficient, source by source, with the expanded uncertainty below the rows."""
+    rows: list[tuple[str | float, ...]] = []
+    for budget in budgets:
+        unit, size = ("ppm", units.PPM) if budget.unit == "1" else units.DISPLAY.get(budget.unit, (budget.unit, 1.0))
+        name = budget.coefficient.symbol
+        for r in budget.rows:
+            freedom = "∞" if r.degrees_of_freedom is None else r.degrees_of_freedom
+            of_source = (r.source, r.value, r.unit, r.distribution, r.divisor)
+            rows.append((name, *of_source, r.sensitivity / size, r.contribution / size, unit, freedom))
+        freedom = "∞" if budget.degrees_of_freedom is None else budget.degrees_of_freedom
+        of_all = ("root sum of squares", "", "", "", "", "")
+        rows.append((name, *of_all, budget.standard_uncertainty / size, unit, freedom))
+        expanded = (f"expanded, k = {budget.coverage_factor:.3g}", "", "", "", "", "")
+        rows.append((name, *expanded, budget.expanded_uncertainty / size, unit, ""))
+    source = ("coefficient", "source", "value", "unit", "distribution", "divisor")
+    columns = (*source, "sensitivity", "contribution", "in", "degrees of freedom")
+    note = "Sensitivity: change of the coefficient by one unit of the source, all of its independent parts together."
+    return Table(f"Uncertainty budget of the {triad} triad", columns, tuple(rows), note)
 
 
 def triad_figures(t: TriadSummary) -> tuple[Figure, ...]:

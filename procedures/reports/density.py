@@ -1,19 +1,23 @@
 """Figure of a channel's power spectral density with the noise model's lines."""
 
 from collections.abc import Callable, Sequence
-from math import pi
+from math import pi, sin
 
 from procedures.analysis.launch.results import ChannelNoise
 from procedures.core.report import Figure, Series
 from procedures.core.units import DEVIATION_DISPLAY
 
-LINES: dict[str, Callable[[float], float]] = {
-    "quantization": lambda f: 2.0 * (2.0 * pi * f) ** 2,
-    "random_walk": lambda _: 2.0,
-    "bias_instability": lambda f: 1.0 / (pi * f),
-    "rate_random_walk": lambda f: 2.0 / (2.0 * pi * f) ** 2,
+LINES: dict[str, Callable[[float, float], float]] = {
+    "quantization": lambda f, period_s: 8.0 * sin(pi * f * period_s) ** 2 / period_s,
+    "random_walk": lambda _f, _: 2.0,
+    "bias_instability": lambda f, _: 1.0 / (pi * f),
+    "rate_random_walk": lambda f, _: 2.0 / (2.0 * pi * f) ** 2,
 }
-"""One-sided density of each process for a coefficient of one (IEEE Std 952 Annex C, which gives two-sided ones)."""
+"""One-sided density of each process for a coefficient of one, at f [Hz] of samples of a period [s].
+
+IEEE Std 952 Annex C, which gives two-sided ones. Quantization is the difference of two readings of independent errors
+over a period: ``2Δt·|1 − e^{−i2πfΔt}|²/Δt²``, at low frequencies ``2·(2πf)²·Δt``.
+"""
 
 
 def density_figure(channels: Sequence[ChannelNoise], labels: Sequence[str]) -> Figure | None:
@@ -42,11 +46,13 @@ def _model(channel: ChannelNoise, size: float) -> tuple[Series, ...]:
     """The line of each observed process where it is at least a tenth of the density."""
     assert channel.density is not None
     pairs = tuple(zip(channel.density.frequency_hz, channel.density.density, strict=True))
+    period_s = 0.5 / channel.bandwidth_hz
     made: list[Series] = []
     for process, of_one in LINES.items():
         value = channel.coefficient(process).likelihood.value
         if value:
-            on = [(f, value**2 * of_one(f)) for f, s in pairs if value**2 * of_one(f) > 0.1 * s]
+            line = [(f, s, value**2 * of_one(f, period_s)) for f, s in pairs]
+            on = [(f, own) for f, s, own in line if own > 0.1 * s]
             title = process.replace("_", " ")
             made.append(Series(title, tuple(f for f, _ in on), _in([s for _, s in on], size), style="reference"))
     return tuple(made)

@@ -9,6 +9,7 @@ from procedures.analysis.launch.summary import ChannelSummary
 from procedures.core.report import Cell, Figure, Report, Series, Table
 from procedures.core.units import DEVIATION_DISPLAY, HOUR, NOISE_DISPLAY
 from procedures.reports.density import density_figure
+from procedures.reports.surroundings import surroundings_tables
 
 TITLES = {
     "quantization": "quantization Q",
@@ -20,7 +21,10 @@ TITLES = {
 
 
 def noise_report(
-    launches: Sequence[LaunchNoise], channels: Sequence[ChannelSummary], averaging_time_s: float | None
+    launches: Sequence[LaunchNoise],
+    channels: Sequence[ChannelSummary],
+    averaging_time_s: float | None,
+    drawn_launch: int = 1,
 ) -> Report:
     """Tables 4.1 and 4.2, the three ways, every step's effect, and the plots of every channel."""
     doubts = disagreements(launches)
@@ -30,9 +34,11 @@ def noise_report(
         averaging_table(channels, launches),
         steps_table(launches),
         launch_means_table(channels, launches),
+        *surroundings_tables(launches),
         *(three_ways(launch) for launch in launches),
     ]
-    figures = [figure for s in channels for figure in channel_figures(s.channel, launches)]
+    drawn = (launches[drawn_launch - 1], *(x for i, x in enumerate(launches, start=1) if i != drawn_launch))
+    figures = [figure for s in channels for figure in channel_figures(s.channel, drawn)]
     return Report(_summary(launches, averaging_time_s), (*tables, *figures))
 
 

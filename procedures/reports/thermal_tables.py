@@ -6,6 +6,7 @@ from procedures.core import units
 from procedures.core.recording import AXES
 from procedures.core.report import Cell, Table
 from procedures.core.thermal_correction import COEFFICIENTS, Form
+from procedures.reports import thermal_sensors as more
 
 OF_COEFFICIENT = ("1/°C²", "1/°C", "1/°C²", "1/°C", "m/s²/°C", "m/s²/°C²", "m/s²/°C", "m/s²/°C²")
 """Units in the order of `COEFFICIENTS`; thesis 4.1 does not print β in the order of α."""
@@ -27,6 +28,7 @@ def tables(cycle: ThermalCycle) -> tuple[Table, ...]:
         coefficient_table(cycle),
         order_table(cycle),
         accelerometer_correlations(cycle),
+        *more.sections(cycle),
         gyro_correlations(cycle),
         gyro_noise_table(cycle),
         magnitude_table(cycle),
@@ -89,11 +91,15 @@ def coefficient_table(cycle: ThermalCycle) -> Table:
 def order_table(cycle: ThermalCycle) -> Table:
     """Table of the tests for the polynomial order."""
     rows = tuple((axis, *_order(found)) for axis, found in zip(AXES, cycle.axes, strict=True))
+    orders = len(cycle.axes[0].bic)
     columns = (
-        *("axis", "BIC 1", "BIC 2", "BIC 3", "F test 2 against 1, p", "3 against 2, p", "preferred"),
+        *("axis", *(f"BIC {k + 1}" for k in range(orders))),
+        *(f"F test {k + 1} against {k}, p" for k in range(1, orders)),
+        "preferred",
         *("effective samples", "residual static, m/s²", "dynamic, m/s²", "condition"),
     )
-    note = "Least criterion is best; the counts are those of independent samples in correlated noise."
+    reasons = ". ".join(f"{a}: {f.order_reason}" for a, f in zip(AXES, cycle.axes, strict=True) if f.order_reason)
+    note = f"Least criterion is best; the counts are those of independent samples in correlated noise. {reasons}"
     return Table("Choice of the order, and what the fit leaves", columns, rows, note)
 
 

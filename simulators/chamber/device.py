@@ -98,6 +98,10 @@ class SimChamber:
         if s.target_c is not None and not (s.tripped or s.door_open):
             self.plant.command(self._limits.ambient_c, self._limits.ramp_c_min / 60.0)
 
+    def follow(self, air_c: float) -> None:
+        """Stand the unit in a real chamber's air; see `ChamberPlant.follow`."""
+        self.plant.follow(air_c)
+
     def unit_power(self, on: bool) -> None:
         """Note that the unit's supply was switched: from the next second on it heats itself, or no more."""
         self.plant.state.unit_on = on

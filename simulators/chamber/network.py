@@ -54,6 +54,13 @@ def rates(chamber: ChamberTruth, unit: NetworkTruth, door_open: bool) -> tuple[A
     return conductance / capacity[:, None], inputs / capacity[:, None]
 
 
+def with_held_air(a: Array, b: Array) -> tuple[Array, Array]:
+    """The same network where the air's temperature is given from outside, and holds for a step."""
+    held_a, held_b = a.copy(), b.copy()
+    held_a[AIR], held_b[AIR] = 0.0, 0.0
+    return held_a, held_b
+
+
 @dataclass(frozen=True)
 class Step:
     """One exact time step: ``T(t + Δ) = M·[T(t), u, u_ramped(t + Δ)]``, M of shape (8, 13)."""

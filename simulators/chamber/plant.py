@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from simulators.chamber.network import AIR, AMBIENT, HEATER, INPUTS, PLACE, POWER, Step, rates
+from simulators.chamber.network import AIR, AMBIENT, HEATER, INPUTS, PLACE, POWER, Step, rates, with_held_air
 from simulators.truth import Array, KeyedBlocks
 from simulators.truth.thermal import NODES, ChamberTruth, NetworkTruth
 
@@ -52,6 +52,8 @@ class ChamberPlant:
         self.truth = chamber
         self.state = PlantState([chamber.ambient_c] * len(NODES), place_c=0.0, control_reading_c=chamber.ambient_c)
         self._steps = {door: Step.of(*rates(chamber, unit, door), STEP_S).matrix for door in (False, True)}
+        self._follows = Step.of(*with_held_air(*rates(chamber, unit, False)), STEP_S).matrix
+        self._air_c: float | None = None
         self._draws = KeyedBlocks(seed, "chamber")
         self._block, self._normal = -1, np.empty((0, 2))
         self._decay = exp(-STEP_S / chamber.fluctuation_s)
@@ -60,6 +62,8 @@ class ChamberPlant:
 
     def run(self, steps: int) -> Array:
         """Advance some seconds; return the node temperatures at the end of each, (steps, 8) [°C]."""
+        if self._air_c is not None:
+            return self._run_in(self._air_c, steps)
         s = self.state
         nodes, z = len(NODES), np.empty(len(NODES) + len(INPUTS) + 1)
         z[:nodes], z[AMBIENT], z[POWER] = s.temperatures_c, self.truth.ambient_c, float(s.unit_on)
@@ -79,6 +83,28 @@ class ChamberPlant:
                 place = after
             at += last - first
         s.temperatures_c, s.place_c, s.step = temperatures.tolist(), place, s.step + steps
+        return path
+
+    def follow(self, air_c: float) -> None:
+        """From now on the air is that of a real chamber, by its newest reading [°C]; this one controls nothing.
+
+        A unit that felt nothing yet has the temperature of the first reading throughout.
+        """
+        if self._air_c is None and self.state.step == 0:
+            self.state.temperatures_c = [air_c] * len(NODES)
+        self._air_c = air_c
+
+    def _run_in(self, air_c: float, steps: int) -> Array:
+        """Advance some seconds in air of a given temperature, which is that at the unit; see `run`."""
+        s, nodes = self.state, len(NODES)
+        z, path = np.zeros(len(NODES) + len(INPUTS) + 1), np.empty((steps, nodes))
+        z[:nodes], z[AMBIENT], z[POWER] = s.temperatures_c, self.truth.ambient_c, float(s.unit_on)
+        z[AIR] = air_c
+        for k in range(steps):
+            path[k] = self._follows @ z
+            z[:nodes] = path[k]
+        s.temperatures_c, s.step = z[:nodes].tolist(), s.step + steps
+        s.control_reading_c = air_c
         return path
 
     def _draw(self, block: int) -> Array:

@@ -1,6 +1,7 @@
 """Temperature sensors of the unit: lag, offset, noise, quantization; and their faults.
 
-``y' = (T − y)/lag`` between whole seconds, T a straight line; ``code = round((y + offset + noise)/step)``.
+``y' = (T − y)/lag`` between whole seconds, T a straight line; ``code = round((y + error(y) + noise)/step)`` with
+``error(y) = offset + slope·(y − 20 °C)``.
 """
 
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from simulators.chamber.network import CASE, CONVERTER, GYRO
 from simulators.chamber.plant import BLOCK_STEPS, STEP_S
 from simulators.truth import Array, KeyedBlocks
-from simulators.truth.thermal import THERMOMETERS, ThermometerTruth
+from simulators.truth.thermal import REFERENCE_C, THERMOMETERS, ThermometerTruth
 
 DISCONNECTED_CODE = -32768
 """Code of a sensor that is disconnected: the smallest number of 16 bits."""
@@ -33,12 +34,14 @@ class Thermometers:
         self._block, self._normal = -1, np.empty((0, len(self.truths)))
         self._lagged = np.full(len(self.truths), start_c)
         self._before = np.full(len(self.truths), start_c)
-        self._last = [round((start_c + t.offset_c) / t.step_c) for t in self.truths]
+        errors = [t.offset_c + t.slope * (start_c - REFERENCE_C) for t in self.truths]
+        self._last = [round((start_c + e) / t.step_c) for e, t in zip(errors, self.truths, strict=True)]
         self.sent = np.array(self._last, dtype=np.int32)
         """Codes of the last second, (5,)."""
         self.sent[[t.disconnected_from_s <= 0.0 for t in self.truths]] = DISCONNECTED_CODE
-        self._offset, self._noise_sd, self._step, lag = (
-            np.array([getattr(t, name) for t in self.truths]) for name in ("offset_c", "noise_c", "step_c", "lag_s")
+        self._offset, self._slope, self._noise_sd, self._step, lag = (
+            np.array([getattr(t, name) for t in self.truths])
+            for name in ("offset_c", "slope", "noise_c", "step_c", "lag_s")
         )
         self._decay = np.array([exp(-STEP_S / t.lag_s) if t.lag_s else 0.0 for t in self.truths])
         share = lag / STEP_S * (1.0 - self._decay)
@@ -49,7 +52,13 @@ class Thermometers:
         count = len(temperatures_c)
         if count == 0:
             return np.empty((0, len(self.truths)), dtype=np.int32)
-        values = self._lag(temperatures_c[:, COLUMNS]) + self._offset + self._noise_sd * self._noise(first_step, count)
+        lagged = self._lag(temperatures_c[:, COLUMNS])
+        values = (
+            lagged
+            + self._offset
+            + self._slope * (lagged - REFERENCE_C)
+            + self._noise_sd * self._noise(first_step, count)
+        )
         codes = np.rint(values / self._step).astype(np.int32)
         moments = (first_step + np.arange(count) + 1) * STEP_S
         for i, truth in enumerate(self.truths):

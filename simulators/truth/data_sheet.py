@@ -37,7 +37,9 @@ def declared_unit(truth: UnitTruth, averaging_time_s: float = 70.0, sample_rate_
             strict=True,
         )
         x, y, z = (NoiseCoefficients(*column, flicker_band_s=triad.flicker_band_s) for column in columns)
-        return TriadRecord((x, y, z), triad.bias_run_to_run_sd, triad.scale_factor_run_to_run_sd_ppm * units.PPM)
+        dithers = triad.dither_frequency_hz if any(triad.dither_frequency_hz) else None
+        changes = triad.bias_run_to_run_sd, triad.scale_factor_run_to_run_sd_ppm * units.PPM
+        return TriadRecord((x, y, z), *changes, dither_frequency_hz=dithers)
 
     return Unit(
         truth.serial,

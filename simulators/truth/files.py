@@ -7,7 +7,7 @@ from json import dumps
 from pathlib import Path
 from typing import Any
 
-from procedures.bench.chamber import ChamberLimits
+from procedures.bench.chamber import ChamberAccuracy, ChamberLimits
 from procedures.bench.current_source import CurrentSourceLimits
 from procedures.bench.description import AxisLimits, BenchDescription, TableAccuracy
 from procedures.bench.supply import SupplyLimits
@@ -121,7 +121,18 @@ def _description(table: Table) -> BenchDescription:
     check_keys(
         "description",
         table,
-        {"id", "title", "site", "accuracy", "chamber", "current_source", "supply", "sinusoidal", *axes},
+        {
+            "id",
+            "title",
+            "site",
+            "accuracy",
+            "chamber",
+            "chamber_accuracy",
+            "current_source",
+            "supply",
+            "sinusoidal",
+            *axes,
+        },
         {"id", "site", *axes},
     )
     outer, middle, inner = (_axis(f"description.{axis}", table[axis]) for axis in ("outer", "middle", "inner"))
@@ -132,6 +143,10 @@ def _description(table: Table) -> BenchDescription:
     if "chamber" in table:
         needed = {f.name for f in fields(ChamberLimits)}
         chamber = read_record(ChamberLimits, "description.chamber", table["chamber"], needed)
+    trust = None
+    if "chamber_accuracy" in table:
+        where = "description.chamber_accuracy"
+        trust = read_record(ChamberAccuracy, where, table["chamber_accuracy"], {"place_sd_c"})
     source = None
     if "current_source" in table:
         source = read_record(CurrentSourceLimits, "description.current_source", table["current_source"], {"maximum_ma"})
@@ -152,6 +167,7 @@ def _description(table: Table) -> BenchDescription:
         current_source=source,
         supply=supply,
         sinusoidal=_flag("description", "sinusoidal", table),
+        chamber_accuracy=trust,
     )
 
 
@@ -252,6 +268,7 @@ def save_bench(truth: BenchTruth, path: Path) -> None:
         "description.inner": described.inner,
         "description.accuracy": described.accuracy,
         **({} if described.chamber is None else {"description.chamber": described.chamber}),
+        **({} if described.chamber_accuracy is None else {"description.chamber_accuracy": described.chamber_accuracy}),
         **({} if described.current_source is None else {"description.current_source": described.current_source}),
         **({} if described.supply is None else {"description.supply": described.supply}),
         "site_truth": truth.site,

@@ -114,9 +114,14 @@ class NetworkTruth:
 
 @dataclass(frozen=True)
 class ThermometerTruth:
-    """A temperature sensor of the unit: ``code = round((T_lagged + offset + noise)/step)``. Ours: a 12-bit sensor."""
+    """A temperature sensor of the unit: ``code = round((T_lagged + offset + slope·(T_lagged − 20) + noise)/step)``.
+
+    Ours: a 12-bit sensor.
+    """
 
     offset_c: float = 0.0
+    slope: float = 0.0
+    """Change of the offset by temperature [°C/°C], about `REFERENCE_C`; zero in the units that ship."""
     lag_s: float = 5.0
     noise_c: float = 0.03
     """Standard deviation of the noise of one reading."""
@@ -128,6 +133,7 @@ class ThermometerTruth:
 
     def __post_init__(self) -> None:
         check_fields("thermometer", self, {"offset_c": (-50.0, 50.0), "lag_s": (0.0, 3600.0), "noise_c": (0.0, 10.0)})
+        within("thermometer.slope", self.slope, -0.4, 0.4)
         within("thermometer.step_c", self.step_c, 1e-6, 10.0)
         never = float("inf")
         check_fields("thermometer", self, {"stuck_from_s": (0.0, never), "disconnected_from_s": (0.0, never)})

@@ -16,6 +16,7 @@ from procedures.bench.device import DeviceIdentity
 from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
 from procedures.bench.turntable import TableReading
 from procedures.core import units
+from procedures.core.constant_rate import ConstantRate
 from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
@@ -92,6 +93,14 @@ class SimTurntable:
         self._turned[axis] = self._description.axis(turn.axis).continuous
         self._begin(Spin(self._plant.angles_rad, axis, angle, turn.duration_s, turn.ramp_s))
 
+    async def command_rate(self, rate: ConstantRate) -> None:
+        """Begin a constant rate of one axis; see the port. Its pointing error stays as it was."""
+        self._need_leave(self._description.rate_violations(self.read_angles(), rate))
+        axis = AXES.index(rate.axis)
+        self._turned[axis] = self._description.axis(rate.axis).continuous
+        angle = units.DEG * rate.angle_deg
+        self._begin(Spin(self._plant.angles_rad, axis, angle, rate.duration_s, rate.ramp_s))
+
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
         """Begin whole cycles of one axis; see the port."""
         self._need_leave(self._description.sinusoid_violations(self.read_angles(), sinusoid))
@@ -132,7 +141,10 @@ class SimTurntable:
 
     async def read(self) -> TableReading:
         """Read encoders and status; see the port."""
-        return TableReading(self._clock.now_s(), self.read_angles(), not self.locked)
+        outer, middle, inner = self.read_rates_deg_s().tolist()
+        return TableReading(
+            self._clock.now_s(), self.read_angles(), not self.locked, rates_deg_s=(outer, middle, inner)
+        )
 
     def read_angles(self) -> TableAngles:
         """Read the axis angles from the encoders at this moment."""
@@ -141,7 +153,7 @@ class SimTurntable:
         return TableAngles(outer, middle, inner)
 
     def read_rates_deg_s(self) -> Array:
-        """Rates of the axes [deg/s], (3,): for tests; a procedure has no use for them."""
+        """Rates of the axes [deg/s], (3,)."""
         return self._plant.rates_rad_s / units.DEG
 
     async def make_safe(self) -> None:

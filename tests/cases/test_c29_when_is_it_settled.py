@@ -111,3 +111,26 @@ def test_a_leg_that_never_soaks_is_late_and_says_why() -> None:
     evidence, progress = run(np.round(creeping(40.0, 36_000.0)(TIMES)), np.full_like(TIMES, TARGET_C), 0.001)
     assert evidence is None
     assert "is not soaked" in progress.why_late(TARGET_C)
+
+
+@pytest.mark.parametrize("lag_s", [600.0, 1200.0, 1800.0])
+def test_a_unit_that_has_only_begun_to_follow_is_not_soaked(lag_s: float) -> None:
+    """Seen: 10 °C at 2 °C/min, and a converter behind two lags moved by 0.25 °C while the soak was said to be reached.
+
+    The air is a ramp from −40 to −30 °C; the unit, two equal lags behind it, is the difference of the responses to two
+    endless ramps, r(t) = t − 2τ + (t + 2τ)·exp(−t/τ).
+    """
+
+    def ramp(t: np.ndarray) -> np.ndarray:
+        return np.where(t > 0.0, t - 2.0 * lag_s + (t + 2.0 * lag_s) * np.exp(-np.maximum(t, 0.0) / lag_s), 0.0)
+
+    air = -40.0 + np.minimum(TIMES / 30.0, 10.0)
+    unit = -40.0 + (ramp(TIMES) - ramp(TIMES - 300.0)) / 30.0
+    leg = ProfileLeg(-30.0, 2.0, 0.0, LONGEST_S)
+    progress = ProfileProgress(TemperatureProfile((leg,), SoakCriterion(0.02, 300.0, 1.5)))
+    for t, case, around in zip(TIMES.tolist(), unit.tolist(), air.tolist(), strict=True):
+        if progress.step(t, case, case, around) is Standing.DONE:
+            break
+    (evidence,) = progress.evidence
+    # Late in the creep the rest is at most the slope times the lags, of which the slower decay is one.
+    assert abs(evidence.case_c - -30.0) < 0.02 / 60.0 * (2.0 * lag_s + 300.0)

@@ -88,6 +88,10 @@ def _summary(outcomes: list[Outcome], failed: list[str]) -> None:
     print(
         f"{len(outcomes)} presses, {sum(outcome.kept for outcome in outcomes)} in time, {len(failed)} not carried out"
     )
+    for name in dict.fromkeys(outcome.hindrance for outcome in timed):
+        of_cell = {way: [o.safe_s or 0.0 for o in timed if (o.hindrance, o.way) == (name, way)] for way in WAYS}
+        cells = (f"{way} {max(times):.2f} s of {len(times)}" for way, times in of_cell.items() if times)
+        print(f"longest  {name:28} {', '.join(cells)}")
     for killed in (False, True):
         longest = max((o for o in timed if o.killed is killed), key=lambda o: o.safe_s or 0.0, default=None)
         if longest is not None:

@@ -226,7 +226,9 @@ def test_dwells_so_long_that_noise_vanishes_beside_the_table_are_no_trouble():
     for sd in (1e-10, 1e-11, 1e-14):  # [m/s²], where the flaws are 2e-4: S = C + F·Fᵀ has no C left at the last
         plan = estimator("it", vectors, np.array([np.eye(12) * sd**2] * 3), flaws)
         noise.append(np.sqrt(np.diagonal(plan.noise_covariance)))
-        total.append(np.sqrt(np.diagonal(plan.noise_covariance + table_share(plan, flaws, table).covariance)))
+        total.append(
+            np.sqrt(np.diagonal(plan.noise_covariance + table_share(plan, flaws, table, np.eye(3)).covariance))
+        )
     assert noise[1] == pytest.approx(0.1 * noise[0], rel=1e-3, abs=0.0)
     pointed = total[0] > 1e-7
     assert pointed.sum() == 6  # what magnitudes do not tell

@@ -79,7 +79,7 @@ def test_information_adds_up_to_the_estimators_covariance(model: str):
     flaws = table_errors([TableAngles(*row) for row in ANGLES.tolist()], vectors, table, of_gravity=False)
     noise = np.array([np.eye(len(ANGLES)) * v for v in design.noise_variance])
     plan = estimator("it", vectors, noise, flaws.of_outputs(matrix))
-    covariance = plan.noise_covariance + table_share(plan, flaws.of_outputs(matrix), flaws).covariance
+    covariance = plan.noise_covariance + table_share(plan, flaws.of_outputs(matrix), flaws, matrix).covariance
     # The weak prior on the coefficients, 30 000 limits, shows at (sd/prior)² ≈ 1e-5.
     assert found == pytest.approx(np.sqrt(np.diagonal(covariance)), rel=1e-4)
 

@@ -9,14 +9,18 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from procedures.analysis.calibration.reference_temperature import gyros_at_reference
+from procedures.analysis.calibration.station_means import station_means
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers
 from procedures.catalog.calibration_12_orientations import PROCEDURE, Params, schedule
 from procedures.core.converter import ConverterModel, Normalised
 from procedures.core.errors import BadParameter, MissingChannel
-from procedures.core.recording import ACCELEROMETER, Channel, MemoryRecording, Quantity, RecordingInfo
+from procedures.core.gyro_thermal import GyroPolynomial, GyroThermalCorrection
+from procedures.core.recording import ACCELEROMETER, GYRO, Channel, MemoryRecording, Quantity, RecordingInfo
 from procedures.core.thermal_correction import AxisCorrection, Form, TemperatureRange, ThermalCorrection
+from procedures.core.thermometers import SensorCorrection, ThermometerCorrection
 from procedures.core.unit import TriadRecord
 from simulators.chamber.behaviour import response
 from simulators.truth.thermal import REFERENCE_C, AccelerometerThermalTruth, ConverterTruth, UnitThermalTruth
@@ -203,5 +207,31 @@ def test_what_is_refused():
 def test_stations_ask_for_temperatures_only_with_a_correction():
     assert all(s.temperatures for s in STATIONS)
     assert not any(s.temperatures for s in schedule(Params.model_validate({"dwell_s": 70.0})))
-    assert PROCEDURE.uses_corrections(Params.model_validate({"thermal_correction": "current"})) == ("thermal",)
+    assert PROCEDURE.uses_corrections(Params.model_validate({"thermal_correction": "current"})) == ("thermal", "gyros")
     assert PROCEDURE.uses_corrections(Params.model_validate({})) == ()
+
+
+def test_a_gyro_that_depends_on_temperature_is_brought_to_its_reference():
+    """Rates of 1e-7 rad/s/°C over a thermometer that reads 2 °C too much: nothing of it is left, its doubt is told."""
+    names = tuple(f"temperature_gyro_{axis}" for axis in "xyz")
+    sensors = ThermometerCorrection(
+        tuple(SensorCorrection(n, 2.0, 0.0) for n in names), 20.0, tuple(map(tuple, np.zeros((6, 6)))), (0.0, 60.0)
+    )
+    curve = GyroPolynomial((1e-7,), ((4e-18,),))
+    correction = GyroThermalCorrection((curve, GyroPolynomial(), GyroPolynomial()), 20.0, (0.0, 60.0), sensors)
+    channels = (
+        *(Channel(n, Quantity.ANGULAR_RATE, "rad/s") for n in GYRO),
+        *(Channel(n, Quantity.TEMPERATURE, "degC") for n in names),
+    )
+    given = []
+    for k, temperature in enumerate((20.0, 40.0, 60.0)):
+        ripple = 1e-9 * np.where(np.arange(70) % 2, 1.0, -1.0)
+        rates = [5e-5 + 1e-7 * (temperature - 20.0) + ripple, 1e-5 + ripple, ripple]
+        raw = np.column_stack([*rates, *(np.full(70, temperature + 2.0) + ripple for _ in names)])
+        given.append(MemoryRecording(RecordingInfo(f"r{k}", "S-1", channels, 1.0, 70, 80.0 * k, STATIONS[k]), raw))
+    means, covariance = gyros_at_reference(given, station_means(given, "gyro"), correction)
+    assert means.outputs[:, 0] == pytest.approx([5e-5] * 3, rel=1e-9)
+    assert means.outputs[:, 1] == pytest.approx([1e-5] * 3, rel=1e-9)
+    assert np.sqrt(np.diagonal(covariance[0])) == pytest.approx([0.0, 2e-9 * 20, 2e-9 * 40], abs=1e-15)
+    assert covariance[0, 1, 2] == pytest.approx(4e-18 * 20 * 40)
+    assert not covariance[1:].any()

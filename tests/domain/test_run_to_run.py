@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from procedures.analysis.calibration.run_to_run import run_to_run, sd_interval
+from procedures.analysis.repeatability.run_to_run import run_to_run, sd_interval
 from procedures.core import units
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration, triad_calibration

@@ -133,7 +133,7 @@ def test_the_report_is_complete_and_small_enough_to_draw(result: Result):
     sections = thermal_cycle.report(result).sections
     tables = [s for s in sections if isinstance(s, Table)]
     figures = [s for s in sections if isinstance(s, Figure)]
-    assert len(tables) == 10
+    assert len(tables) == 11
     assert len(figures) == 3 * 5 + 3 + 1
     for table in tables:
         assert all(len(row) == len(table.columns) for row in table.rows), table.title

@@ -2,10 +2,16 @@
 
 import numpy as np
 import pytest
+from scipy.special import chdtri
 
 from procedures.analysis.calibration.reference import reference_vectors
 from procedures.analysis.calibration.station_noise import mean_covariance
-from procedures.analysis.calibration.verification import error_covariance, magnitudes, predicted_sd
+from procedures.analysis.calibration.verification import (
+    effective_freedom,
+    error_covariance,
+    magnitudes,
+    predicted_sd,
+)
 from procedures.analysis.least_squares.chi_square import chi_square, tail_probability
 from procedures.core.imu_model import triad_calibration
 from procedures.core.table_angles import TableAngles
@@ -62,3 +68,23 @@ def test_the_predicted_covariance_over_many_units():
 
 
 ANGLES_LABELS = tuple(str(i) for i in range(9))
+
+
+def test_the_expanded_uncertainty_of_a_root_mean_square_over_few_changes():
+    """Stations that a few coefficients move together: k of Satterthwaite's degrees of freedom, against draws.
+
+    Of 2·10⁵ draws a level of 0.01 is exceeded by 2000 ± 45; the two moments leave the tail within a fifth of that.
+    """
+    rng, n = np.random.default_rng(5), 200_000
+    few = rng.normal(size=(9, 2))
+    covariance = few @ few.T + 0.01 * np.eye(9)
+    errors = rng.normal(size=(n, 2)) @ few.T + 0.1 * rng.normal(size=(n, 9))
+    squares = errors.var(axis=1, ddof=1) / predicted_sd(covariance) ** 2
+    assert squares.mean() == pytest.approx(1.0, abs=5.0 * squares.std() / np.sqrt(n))
+    freedom = effective_freedom(covariance)
+    assert freedom < 3.0
+    assert freedom == pytest.approx(2.0 / squares.var(), rel=0.05)  # variance of χ²_ν/ν
+    level = 0.01
+    assert np.mean(squares > chdtri(freedom, level) / freedom) == pytest.approx(level, rel=0.2)
+    assert np.mean(squares > 4.0) > 1.5 * level, "k = 2 would refuse more than that"
+    assert effective_freedom(np.eye(9)) == pytest.approx(8.0)

@@ -15,6 +15,7 @@ from procedures.bench.device import DeviceIdentity, StatusWord
 from procedures.bench.errors import Disconnected, OutOfRange
 from procedures.bench.supply import SupplyLimits, SupplyReading
 from procedures.bench.turntable import TableReading
+from procedures.core.constant_rate import ConstantRate
 from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
@@ -135,6 +136,9 @@ class LineTable(_Line):
 
     async def command_turn(self, turn: Turn) -> None:
         await self.ask("turn", moving=True)
+
+    async def command_rate(self, rate: ConstantRate) -> None:
+        await self.ask("rate", moving=True)
 
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
         raise OutOfRange("no sinusoids")

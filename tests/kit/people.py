@@ -95,7 +95,7 @@ def cheap_passwords() -> Generator[None]:
 @contextmanager
 def house(folder: Path, **more: Any) -> Generator[House]:
     """Open a service without accounts; it drives nothing, and its bench is known."""
-    settings = Settings(database_url=f"sqlite:///{folder / 'bench.sqlite'}", port=free_port(), **more)
+    settings = Settings(**{"database_url": f"sqlite:///{folder / 'bench.sqlite'}", "port": free_port(), **more})
     register_bench(settings)
     with cheap_passwords(), serving(settings, drive=False), connect(settings, None, drive=False) as owner:
         made = House(settings, owner)

@@ -1,10 +1,12 @@
 """Roles and teams at work: rights follow a reservation's team, and a running job nobody's token."""
 
 from collections.abc import Generator
+from contextlib import ExitStack
 
 import httpx
 import pytest
 
+from bench_service.app import open_service
 from bench_service.cli.processes.serving import serving
 from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s, pause
@@ -123,6 +125,65 @@ def test_jobs_of_a_team_do_not_wait_for_its_other_reservation(people: dict[str, 
     finally:
         for one in (bench, unit.json()["id"]):
             people["admin"].delete(f"/api/v1/reservations/{one}")
+
+
+PLAN = {"name": "of-alpha", "steps": [{"name": "look", "procedure": "no_operation"}]}
+
+
+@pytest.fixture(scope="module")
+def engineers(home: House) -> dict[str, httpx.Client]:
+    """Engineers of alpha, beta and of no team."""
+    made = {name: home.program(f"eng-{name}", "engineer", team=name) for name in ("alpha", "beta")}
+    return {**made, "none": home.program("eng-none", "engineer")}
+
+
+def test_a_campaign_run_and_its_jobs_belong_to_the_team_that_started_it(
+    home: House, people: dict[str, httpx.Client], engineers: dict[str, httpx.Client]
+) -> None:
+    assert engineers["alpha"].post("/api/v1/campaigns", json=PLAN).status_code == 201
+    changed = {**PLAN, "description": "changed"}
+    for stranger in ("beta", "none"):
+        refused = engineers[stranger].put("/api/v1/campaigns/of-alpha", json=changed)
+        assert (refused.status_code, "team alpha" in refused.json()["detail"]) == (403, True)
+    assert engineers["alpha"].put("/api/v1/campaigns/of-alpha", json=changed).status_code == 200
+    run = engineers["alpha"].post("/api/v1/campaigns/of-alpha/runs", json={"unit": "SIM-0001"}).json()
+    assert run["team"] == "alpha"
+    path = f"/api/v1/campaign-runs/{run['id']}"
+    with ExitStack() as closing:  # as the process does that drives the bench
+        open_service(home.settings, closing, drive=False).campaigns.conductor.look()
+    job = people["admin"].get(path).json()["steps"][0]["job"]
+    assert people["admin"].get(f"/api/v1/jobs/{job}").json()["team"] == "alpha"
+    for stranger in (people["bea"], people["ben"]):
+        for verb in (f"/api/v1/jobs/{job}/cancel", f"/api/v1/jobs/{job}/pause", f"{path}/cancel"):
+            refused = stranger.post(verb)
+            assert (refused.status_code, refused.json()["type"]) == (403, "/problems/NotAllowed"), verb
+    assert people["bea"].get(path).status_code == 200, "everybody who is let in reads"
+    assert people["al"].patch(f"/api/v1/jobs/{job}", json={"priority": 2}).status_code == 200
+    assert people["amy"].post(f"{path}/cancel").status_code == 202
+
+
+def test_a_label_does_not_make_a_job_another_teams(people: dict[str, httpx.Client]) -> None:
+    """The team of a job is stored with it: what a client writes into a label gives no right and takes none."""
+    labels = {"campaign_run": "a run of alpha", "team": "alpha"}
+    job = people["ben"].post("/api/v1/jobs", json={**JOB, "labels": labels}).json()
+    assert job["team"] == ""
+    assert people["ben"].post("/api/v1/jobs", json={**JOB, "team": "alpha"}).status_code == 422
+    assert people["al"].post(f"/api/v1/jobs/{job['id']}/cancel").status_code == 202
+
+
+def test_runs_of_a_schedule_are_of_the_schedules_team(
+    people: dict[str, httpx.Client], engineers: dict[str, httpx.Client]
+) -> None:
+    assert people["admin"].post("/api/v1/campaigns", json={**PLAN, "name": "nightly"}).status_code == 201
+    when = {"cron": "* * * * *", "time_zone": "UTC", "campaign": "nightly", "unit": "SIM-0001", "enabled": False}
+    schedule = engineers["beta"].post("/api/v1/schedules", json=when).json()
+    assert schedule["team"] == "beta"
+    path = f"/api/v1/schedules/{schedule['id']}"
+    for stranger in ("alpha", "none"):
+        assert engineers[stranger].patch(path, json={"enabled": True}).status_code == 403
+        assert engineers[stranger].delete(path).status_code == 403
+    assert engineers["none"].put("/api/v1/campaigns/nightly", json={**PLAN, "name": "nightly"}).status_code == 200
+    assert engineers["beta"].delete(path).status_code == 204
 
 
 def test_a_job_goes_on_when_its_submitters_token_is_revoked(tmp_path_factory: pytest.TempPathFactory) -> None:

@@ -75,7 +75,18 @@ def test_a_bench_file_says_which_device_is_real(tmp_path: Path) -> None:
     }
     assert found.accuracy.measured
     assert found.accuracy.pointing_sd_arcsec == 0.5
-    assert "does not feel the real chamber's air" in found.no_thermal_jobs
+    assert found.no_thermal_jobs == "", "a simulated unit follows the real chamber's air"
+
+
+def test_a_real_unit_feels_no_simulated_chamber(tmp_path: Path) -> None:
+    text = TEXT[: TEXT.index("[chamber]")]
+    link = '[unit_link]\ndriver = "framed"\naddress = "tcp://127.0.0.1:7000"\nframe = "gl017.toml"\n'
+    shipped = {**line_devices.SHIPPED, ("unit_link", "framed"): SHIPPED["unit_link", "framed"]}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry, "SHIPPED", shipped)
+        file = read_bench_file(_file(tmp_path, text + '[chamber]\ndriver = "simulated"\n' + link))
+        found = described(file, SimulatedDriver("east").description)
+    assert "nothing warms or cools the unit" in found.no_thermal_jobs
 
 
 def test_commanded_angles_are_used_where_the_encoders_are_not_declared_better(tmp_path: Path) -> None:

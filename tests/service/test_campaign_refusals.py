@@ -68,6 +68,7 @@ NEVER_JUDGED = [{"quantity": "gyro.b_x", "at_least": 50, "last": 5}]
         (named("x"), "steps", "at least 1 item"),
         (named("Big Name", {}), "name", "pattern"),
         (named("x", {}, surprise=1), "surprise", "Extra inputs"),
+        (named("x", CALIBRATION, decision={"false_alarm": 0.001}), "decision.false_alarm", "a level of 0.0005 each"),
     ],
 )  # fmt: skip
 def test_a_campaign_that_cannot_be(sqlite_client: Client, campaign: dict[str, Any], field: str, said: str) -> None:

@@ -77,3 +77,21 @@ def test_the_units_page_shows_them(client: Client, made: list[dict]) -> None:
         assert ("href", f"/results/{correction['result']}") in unit.attributes
     assert unit.words.count("Make it current") == 2
     assert "beta_4" in unit.words
+
+
+def test_one_is_rejected_approved_and_ends_through_rest(client: Client, made: list[dict]) -> None:
+    one = f"{UNIT}/corrections/{made[0]['id']}"
+    bare = client.http.post(f"{one}/reject", json={})
+    assert bare.status_code == 422
+    assert bare.json()["errors"][0]["field"] == "remark"
+    rejected = client.http.post(f"{one}/reject", json={"by": "Ann", "remark": "the source was not warm"}).json()
+    assert (rejected["approval"], rejected["decisions"][0]["remark"]) == ("rejected", "the source was not warm")
+    assert "was rejected by Ann" in rejected["unusable"]
+    unit = client.http.get(UNIT).json()
+    assert unit["converter"] is None
+    assert any("was rejected by Ann" in why for why in unit["withheld"])
+    assert "the source was not warm" in page(client, "/units/SIM-0001").words
+    until = "2099-01-01T00:00:00Z"
+    approved = client.http.post(f"{one}/approve", json={"by": "Ann", "valid_until": until}).json()
+    assert (approved["approval"], approved["unusable"], approved["valid_until"]) == ("approved", "", until)
+    assert client.http.get(UNIT).json()["converter"] == made[0]["id"]

@@ -9,10 +9,11 @@ from typing import Any
 
 import pytest
 
-from bench_service.bench import session
+from bench_service.bench import driven
+from bench_service.bench.driven import ShuttingDown
 from bench_service.bench.heartbeat import HeartbeatFile
 from bench_service.bench.processes import Driving
-from bench_service.bench.session import BenchSession, ShuttingDown
+from bench_service.bench.session import BenchSession
 from bench_service.bench.stop.channel import StopChannel
 from bench_service.bench.supervisor import Supervisor
 from bench_service.cli.asking.client import connect
@@ -81,7 +82,7 @@ def test_a_worker_sees_its_devices_and_its_own_end(
     postgres: OwnPostgres, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
     silent = what == "a device falls silent"
-    monkeypatch.setattr(session, "TIME_LIMITS", IMPATIENT if silent else session.TIME_LIMITS)
+    monkeypatch.setattr(driven, "TIME_LIMITS", IMPATIENT if silent else driven.TIME_LIMITS)
     moving, go_on = Event(), Event()
 
     async def move(*_: object) -> None:
@@ -130,7 +131,7 @@ def test_a_living_worker_gives_the_station_up_and_the_job_goes_on_after(
     postgres: OwnPostgres, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where the thread that drives the bench is the one that waits, because it stores samples."""
-    monkeypatch.setattr(session, "HANGS_S", 1.0)
+    monkeypatch.setattr(driven, "HANGS_S", 1.0)
     record, begun = BenchSession.record, Event()
 
     def recorded(driving: BenchSession, index: int) -> Any:

@@ -59,10 +59,16 @@ def test_the_decision_rule(value: float, rule: str, passed: bool, said: str) -> 
     found = decided(made, DecisionRule.model_validate({"rule": rule}))
     assert found.passed is passed
     assert said in found.note
-    assert "U = 0.2 1 (k = 2)" in found.note
+    assert "U = 0.2 (k = 2)" in found.note
 
 
 def test_a_value_without_uncertainty_says_so() -> None:
     found = decided(check("value", 0.99, Limit("1", maximum=1.0)), DecisionRule(rule="guarded"))
     assert found.passed
-    assert "uncertainty is not known" in found.note
+    assert "no stated uncertainty" in found.note
+
+
+def test_a_limit_may_have_a_rule_of_its_own() -> None:
+    made = check("value", 0.9, Limit("1", maximum=1.0), 0.1)
+    assert decided(made, DecisionRule(), "guarded").passed is False
+    assert decided(made, DecisionRule(rule="guarded"), "simple").passed is True

@@ -1,6 +1,6 @@
 """A mixed bench behind the service: a job over real wires, what its recordings and its result say, and certificates."""
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +9,7 @@ import pytest
 from bench_service.cli.asking.client import connect
 from bench_service.drivers.interface import registry
 from bench_service.settings import Settings
+from bench_service.wall_clock import monotonic_s, pause
 from tests.kit import line_devices
 from tests.kit.line_devices import LineDevice, bench_text, served
 from tests.service.client import Client
@@ -19,10 +20,15 @@ PLAN = {"positions": [[0, 90, 0, 1], [45, 0, -30, 1]], "delay_from": "rest", "se
 
 
 @pytest.fixture(scope="module")
-def east(tmp_path_factory: pytest.TempPathFactory) -> Generator[tuple[Client, LineDevice]]:
+def chamber() -> LineDevice:
+    return line_devices.chamber()
+
+
+@pytest.fixture(scope="module")
+def east(tmp_path_factory: pytest.TempPathFactory, chamber: LineDevice) -> Generator[tuple[Client, LineDevice]]:
     """A service on a mixed bench whose table has an overdue certificate, under the policy that warns."""
     folder = tmp_path_factory.mktemp("east")
-    table, supply, chamber = line_devices.table(), line_devices.supply(), line_devices.chamber()
+    table, supply = line_devices.table(), line_devices.supply()
     with pytest.MonkeyPatch.context() as patch, served(table, supply, chamber):
         patch.setattr(registry, "SHIPPED", line_devices.SHIPPED)
         path = folder / "east.toml"
@@ -99,11 +105,39 @@ def test_an_encoder_that_disagrees_fails_the_job(east: tuple[Client, LineDevice]
     assert "find out why before anything else moves" in job["error"]["message"]
 
 
-def test_thermal_jobs_are_refused_with_the_reason(east: tuple[Client, LineDevice]) -> None:
+def test_a_simulated_unit_follows_the_real_chambers_air(east: tuple[Client, LineDevice], chamber: LineDevice) -> None:
+    """By hand: the real chamber's air jumps, and the unit's case sensor goes after it; a thermal job is planned too."""
     client, _ = east
-    answer = client.http.post("/api/v1/jobs", json={"procedure": "thermal_cycle", "unit": "SIM-0001", "parameters": {}})
-    assert answer.status_code == 422, answer.text
-    assert "does not feel the real chamber's air" in answer.text
+    preview = client.http.post(
+        "/api/v1/jobs/preview", json={"procedure": "thermal_cycle", "unit": "SIM-0001", "parameters": {}}
+    )
+    assert "does not feel" not in preview.text
+    manual = "/api/v1/benches/east/manual"
+    lease = client.http.post(manual, json={"reason": "heat", "by": "ann"}).json()["id"]
+
+    def case_c() -> float | None:
+        live = client.http.get("/api/v1/benches/east").json()["live"]
+        sensors = {s["name"]: s["value"] for s in (live["manual"] or {"sensors": []})["sensors"]}
+        return sensors.get("temperature_case")
+
+    def once(ready: Callable[[], Any], seconds: float = 20.0) -> Any:
+        deadline = monotonic_s() + seconds
+        while not (found := ready()):
+            assert monotonic_s() < deadline
+            pause(0.05)
+        return found
+
+    try:
+        client.http.post(f"{manual}/{lease}/demands", json={"kind": "supply_on", "by": "ann"})
+        first = once(case_c)
+        assert first == pytest.approx(22.0, abs=1.0)
+        chamber.state["air"] = 82.0
+        # 60 K between air and case warm the case of the shipped truth by some 0.1 K/s; its power alone does far less.
+        once(lambda: (case_c() or 0.0) > first + 0.3)
+    finally:
+        chamber.state["air"] = 22.0
+        client.http.post(f"{manual}/{lease}/end", json={})
+        once(lambda: client.http.get(f"{manual}/{lease}").json()["ended_at"])
 
 
 def test_an_overdue_certificate_refuses_a_job_where_the_policy_says_so(

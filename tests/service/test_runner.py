@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from bench_service.bench.session import ShuttingDown
+from bench_service.bench.driven import ShuttingDown
 from bench_service.campaigns.stores import Stores
 from bench_service.drivers.device_register import DeviceRegister
 from bench_service.drivers.simulated import SimulatedDriver

@@ -1,5 +1,6 @@
 """Static launches through REST: from raw counts to noise coefficients, and what the unit's record then says."""
 
+import math
 from collections.abc import Generator
 from math import ceil
 from pathlib import Path
@@ -89,10 +90,16 @@ def test_the_unit_learns_its_noise_and_its_dwell(
     assert before["gyro"]["noise_origin"] != origin
     assert (unit["gyro"]["noise_origin"], unit["accelerometer"]["noise_origin"]) == (origin, origin)
     assert unit["gyro"]["bias_run_to_run_sd"] == before["gyro"]["bias_run_to_run_sd"]
-    found = {c["channel"]: {m["process"]: m["mean"] or 0.0 for m in c["means"]} for c in result["document"]["channels"]}
+    found = {c["channel"]: {m["process"]: m for m in c["means"]} for c in result["document"]["channels"]}
     for triad in ("gyro", "accelerometer"):
-        for axis, noise in zip("xyz", unit[triad]["noise"], strict=True):
-            assert {p: noise[p] for p in found[f"{triad}_{axis}"]} == found[f"{triad}_{axis}"]
+        for number, axis in enumerate("xyz"):
+            noise, means = unit[triad]["noise"][number], found[f"{triad}_{axis}"]
+            assert unit[triad]["not_observed"][number] == [p for p, m in means.items() if m["mean"] is None]
+            for process, of in means.items():
+                # A launch that does not show a process leaves it anywhere below its limit: a²/3, never zero.
+                each = [v["value"] or v["upper_limit"] / math.sqrt(3.0) for v in of["values"]]
+                assert noise[process] == pytest.approx(math.sqrt(sum(e * e for e in each) / len(each)), rel=1e-12)
+                assert noise[process] > 0.0
     longest = result["document"]["averaging_time_s"]
     assert unit["averaging_time_s"] == 5.0 * ceil(longest / 5.0)
     preview = client.http.post(

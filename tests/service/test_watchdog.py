@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bench_service.bench import session
+from bench_service.bench import driven
 from bench_service.bench.watchdog import TimeLimits, Watchdog
 from bench_service.campaigns.stores import Stores
 from bench_service.drivers.device_faults import FaultPlan
@@ -42,8 +42,8 @@ released = Event()
 
 @pytest.fixture
 def stores(sqlite_url: str, monkeypatch: pytest.MonkeyPatch) -> Generator[Stores]:
-    monkeypatch.setattr(session, "TIME_LIMITS", IMPATIENT)
-    monkeypatch.setattr(session, "UNWIND_S", 0.4)
+    monkeypatch.setattr(driven, "TIME_LIMITS", IMPATIENT)
+    monkeypatch.setattr(driven, "UNWIND_S", 0.4)
     released.clear()
     made, database = open_stores(sqlite_url)
     yield made

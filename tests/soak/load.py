@@ -1,7 +1,9 @@
 """Mixed load on a service for a stated time: jobs, calibrations, imports, analyses, exports, pages, stops."""
 
+import html
 import itertools
 import random
+import re
 from collections import Counter
 from collections.abc import Callable
 from threading import Event, Lock, Thread
@@ -18,6 +20,12 @@ QUEUED_MOST = 20
 RELEASES = 25
 """Attempts at the release of a bench."""
 PAGES = ("/", "/benches/sim/stops", "/metrics", "/readyz", "/api/v1/jobs", "/api/v1/recordings", "/api/v1/database")
+ROWS, RATE_HZ = 3000, 20.0
+"""Of an imported recording: 150 s, of which a noise analysis needs 120."""
+WATCHED = 20
+"""Pieces that a listener reads of the stream of events before it leaves."""
+NEEDED = ("job", "calibration", "import", "analysis", "export", "page", "figure", "listener", "stop")
+"""Kinds of request of which each must have succeeded: a load that is refused shows nothing."""
 
 
 class Load:
@@ -32,11 +40,17 @@ class Load:
         self.answers: Counter[str] = Counter()
         self.faults: Counter[str] = Counter()
         self._recordings: list[str] = []
+        self._results: list[str] = []
         self._threads = [Thread(target=self._work, args=(seed + n,), daemon=True) for n in range(CLIENTS)]
 
     def begin(self) -> None:
         for thread in self._threads:
             thread.start()
+
+    @property
+    def never(self) -> list[str]:
+        """Kinds of request of which none has succeeded."""
+        return [name for name in NEEDED if not any(f"{name} {status}" in self.answers for status in (200, 201, 202))]
 
     def end(self) -> None:
         self._ending.set()
@@ -52,6 +66,8 @@ class Load:
             ("analysis", self._analysis, 2),
             ("export", self._export, 3),
             ("page", self._page, 6),
+            ("figure", self._figure, 1),
+            ("listener", self._listener, 1),
             ("stop", self._stop, 1),
         ]
         turns = list(itertools.chain.from_iterable([(name, act)] * share for name, act, share in acts))
@@ -70,7 +86,7 @@ class Load:
             return
         refused = answer.status_code == 503 and "Retry-After" in answer.headers
         with self._mutex:
-            self.answers[name] += 1
+            self.answers[f"{name} {answer.status_code}"] += 1
             if answer.status_code >= 500 and not refused:
                 self.faults[f"{name}: {answer.status_code} {answer.text[:100]}"] += 1
 
@@ -90,7 +106,7 @@ class Load:
 
     def _import(self, client: httpx.Client, chance: random.Random) -> httpx.Response:
         turn = chance.randrange(1000)
-        rows = "\n".join(f"{i / 100:.2f},{(i * 7 + turn) % 97}.5" for i in range(3000))
+        rows = "\n".join(f"{i / RATE_HZ:.2f},{chance.gauss(turn / 1000, 1.0):.6f}" for i in range(ROWS))
         files = [("files", ("a.csv", f"t,x\n{rows}\n".encode()))]
         answer = client.post("/api/v1/recordings", files=files, data={"description": DESCRIPTION})
         if answer.status_code == 201:
@@ -106,7 +122,29 @@ class Load:
         recording = self._some(chance)
         if recording is None:
             return None
-        return client.post("/api/v1/analyses", json={"method": "noise_analysis", "recordings": [recording]})
+        answer = client.post("/api/v1/analyses", json={"method": "noise_analysis", "recordings": [recording]})
+        if answer.status_code == 201:
+            with self._mutex:
+                self._results = [*self._results[-50:], answer.json()["id"]]
+        return answer
+
+    def _figure(self, client: httpx.Client, chance: random.Random) -> httpx.Response | None:
+        """A result's page and its first figure."""
+        with self._mutex:
+            result = chance.choice(self._results) if self._results else None
+        if result is None:
+            return None
+        page = client.get(f"/results/{result}")
+        image = re.search(r'"(/results/[^"]+\.svg\?[^"]+)"', page.text)
+        return page if image is None else client.get(html.unescape(image[1]))
+
+    def _listener(self, client: httpx.Client, chance: random.Random) -> httpx.Response:
+        """A browser's stream of events for a while; it beats every second."""
+        with client.stream("GET", "/api/v1/feed") as stream:
+            for _ in zip(stream.iter_raw(), range(chance.randrange(1, WATCHED)), strict=False):
+                if self._ending.is_set():
+                    break
+        return stream
 
     def _export(self, client: httpx.Client, chance: random.Random) -> httpx.Response | None:
         recording = self._some(chance)

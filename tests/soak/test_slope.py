@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.soak.slope import slope
+from tests.soak.__main__ import LEVEL_MB, judged
+from tests.soak.slope import Slope, slope
 
 MINUTES = np.arange(45.0)
 TRIALS = 400
@@ -39,3 +40,10 @@ def test_samples_of_a_minute_count_as_one() -> None:
 def test_a_short_soak_gives_no_slope() -> None:
     with pytest.raises(ValueError, match="8 are needed"):
         slope(np.arange(0.0, 5.0, 0.1), np.zeros(50))
+
+
+def test_level_is_an_interval_below_the_bound_and_neither_growth_nor_ignorance() -> None:
+    assert judged("memory", Slope(0.1 * LEVEL_MB, -LEVEL_MB, 0.9 * LEVEL_MB)) == []
+    assert judged("memory", Slope(-LEVEL_MB, -2 * LEVEL_MB, 0.0)) == []
+    assert "grows" in judged("memory", Slope(2 * LEVEL_MB, 1.5 * LEVEL_MB, 2.5 * LEVEL_MB))[0]
+    assert "does not tell" in judged("memory", Slope(0.5 * LEVEL_MB, -LEVEL_MB, 2 * LEVEL_MB))[0]

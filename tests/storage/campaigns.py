@@ -46,10 +46,15 @@ class Laboratory:
         analyses = AnalysisService(self.stores, Catalogue(), self.stores.jobs.get, "abc")
         return Conductor(self.stores, self.submit, self.cancel, analyses, fire)
 
-    def submit(self, request: JobRequest, key: str) -> Job:
+    def submit(self, request: JobRequest, key: str, *, team: str) -> Job:
         self.requests.append(request)
         job = self._new_job(
-            procedure=request.procedure, unit=request.unit, seed=request.seed, labels=request.labels, stations=()
+            procedure=request.procedure,
+            unit=request.unit,
+            seed=request.seed,
+            labels=request.labels,
+            stations=(),
+            team=team,
         )
         return self.stores.jobs.add(job, Idempotency(f"jobs:{key}", fingerprint(request)))
 

@@ -218,7 +218,7 @@ def test_runs_of_one_bench_are_done_one_after_another(laboratory: Laboratory) ->
 
 
 def test_a_process_that_cannot_submit_waits(laboratory: Laboratory, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(request: JobRequest, key: str) -> Job:
+    def refuse(request: JobRequest, key: str, *, team: str) -> Job:
         raise NotDriving("nobody drives")
 
     with monkeypatch.context() as patched:

@@ -103,13 +103,13 @@ def test_a_job_that_a_slower_process_submitted_for_nothing_is_taken_back(
     stores.campaigns.add_run(run)
     submit = slow.submit
 
-    def refuse(request: JobRequest, key: str) -> Job:
+    def refuse(request: JobRequest, key: str, *, team: str) -> Job:
         raise BadParameter("dwell_s", -1, "not in this process's catalogue")
 
-    def overtaken(request: JobRequest, key: str) -> Job:
+    def overtaken(request: JobRequest, key: str, *, team: str) -> Job:
         """The other process is refused, and ends the run, before this one's submit comes through."""
         fast.conductor().advance(run.id)
-        return submit(request, key)
+        return submit(request, key, team=team)
 
     monkeypatch.setattr(fast, "submit", refuse)
     monkeypatch.setattr(slow, "submit", overtaken)

@@ -3,17 +3,20 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from datetime import timedelta
 
 import pytest
 
+from bench_service import wall_clock
 from bench_service.campaigns.stores import Stores
+from bench_service.model.calibrations import Act, Approval, Decider
 from bench_service.model.errors import IdempotencyConflict, NotFound
 from bench_service.model.records import Idempotency, StoredResult
 from procedures.core.errors import BadParameter
 from procedures.core.thermal_correction import Form
 from procedures.core.unit import Unit
 from procedures.core.unit_correction import UnitCorrection
-from tests.correction_samples import converter, thermal
+from tests.correction_samples import converter, gyros, thermal, thermometers
 from tests.storage.conftest import CHANNELS
 
 NewResult = Callable[..., StoredResult]
@@ -134,3 +137,33 @@ def test_a_unit_comes_back_with_its_current_corrections(stores: Stores, new_resu
 def test_a_correction_says_what_it_is() -> None:
     with pytest.raises(BadParameter, match="kind"):
         UnitCorrection("converter", thermal(1).value)
+
+
+def test_people_approve_reject_and_end_a_correction(stores: Stores, new_result: NewResult) -> None:
+    """A rejected or expired one is withheld from the unit, with the way out; an approval gives it back."""
+    stores.units.put_unit(Unit("U-1", 100.0, CHANNELS))
+    stores.results.add(new_result(), corrections=[thermal(1), thermometers(2), gyros(3)])
+    unit = stores.units.unit("U-1")
+    assert unit.thermometers == thermometers(2).thermometers
+    assert unit.gyro_correction == gyros(3).gyros
+    assert unit.correction_id("gyros") is not None
+    known = stores.corrections.current("U-1", "thermometers")
+    assert known is not None
+    key = Idempotency("k", "f")
+    rejected = stores.corrections.reject("U-1", known.id, Decider("Ann", "the chamber's door stood open"), key)
+    assert stores.corrections.reject("U-1", known.id, Decider("Ann", "again"), key) == rejected
+    assert (rejected.approval, rejected.current, len(rejected.decisions)) == (Approval.REJECTED, True, 1)
+    unit = stores.units.unit("U-1")
+    assert unit.thermometers is None
+    assert unit.thermometers_id is None
+    assert "was rejected by Ann: the chamber's door stood open" in unit.why_withheld("thermometers")
+    assert unit.thermal_correction is not None
+    past = wall_clock.now() - timedelta(days=1)
+    expired = stores.corrections.approve("U-1", known.id, Decider("Bo"), past)
+    assert [d.act for d in expired.decisions] == [Act.REJECTED, Act.APPROVED]
+    assert "expired" in stores.units.unit("U-1").why_withheld("thermometers")
+    stores.corrections.approve("U-1", known.id, Decider("Bo"), past + timedelta(days=30))
+    (back,) = stores.units.units()
+    assert back.thermometers == thermometers(2).thermometers
+    with pytest.raises(NotFound, match="unit U-2 has none"):
+        stores.corrections.reject("U-2", known.id, Decider("Ann", "no"))

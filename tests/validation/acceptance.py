@@ -1,14 +1,18 @@
 """The campaign `acceptance`: do sound units pass, and are faults found and named?
 
-``python -m tests.validation.acceptance [--seeds N] [--fault-seeds M] [--workers N]`` (``make validate``). Launches and
-thermal legs are scaled (`acceptance_rig.SCALED`). Exit code 1 where the passes or the detections are fewer than 95 % of
-the seeds allow: by the binomial distribution at 1 %.
+``python -m tests.validation.acceptance [--seeds N] [--each E] [--whole K] [--fault-seeds M] [--only FAULT]``
+(``make validate``). Launches and thermal legs are scaled (`acceptance_rig.SCALED`), the table follows exactly
+(`light_bench`), and E runs share the static launches, the converter and the thermal cycle of one unit, the first of
+them with the inspection of its recordings; K runs are whole, with the servo, each with its own. A fault of a later
+launch is put into runs that were sound so far.
+Exit code 1 where passes or detections are fewer than 95 % of the runs allow: by the binomial distribution at 1 %.
 """
 
 import argparse
 import os
 import sys
 from collections import Counter
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
@@ -17,13 +21,18 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: one thread a
 from scipy.stats import binom
 
 from bench_service.campaigns.campaign import Campaign
+from bench_service.campaigns.shipped import shipped
 from procedures.core.limits import Verdict
-from tests.validation.acceptance_faults import Fault, faults
-from tests.validation.acceptance_rig import course, scaled, told
+from tests.validation import light_bench
+from tests.validation.acceptance_faults import AFTER, Fault, faults
+from tests.validation.acceptance_rig import Course, course, scaled, told
 
 SHARE, LEVEL = 0.95, 0.01
-BASE = 1000
-"""Seeds of runs are this far apart: each step takes the next one."""
+BASE, NEXT = 1_000_000, 1000
+"""Seeds of units are `BASE` apart, of their runs `NEXT`: each step takes the next one."""
+NONE = Fault("none")
+Ended = tuple[str, list[str]]
+"""Verdict of a run, and all that failed in it."""
 
 
 def least(seeds: int) -> int:
@@ -31,38 +40,78 @@ def least(seeds: int) -> int:
     return int(binom.ppf(LEVEL, seeds, SHARE))
 
 
-def one(number: int, campaign: Campaign, fault: str | None) -> tuple[str, list[str], bool]:
-    """Verdict, all that failed, and whether that names the fault."""
-    wanted = Fault("none") if fault is None else next(f for f in faults(campaign) if f.name == fault)
-    run = course(campaign, BASE * (number + 1), wanted)
-    said = told(run)
-    named = any(all(word in sentence for word in wanted.names) for sentence in said)
-    return (run.verdict or Verdict.ERROR).value, said, named
+def ended(found: Course) -> Ended:
+    """What became of a run."""
+    return (found.run.verdict or Verdict.ERROR).value, told(found.run)
+
+
+def sound(unit: int, campaign: Campaign, each: int) -> list[Ended]:
+    """Runs of one sound unit that share its launches and its thermal cycle."""
+    first = course(campaign, BASE * (unit + 1), NONE, until="scale_1")
+    seeds = [BASE * (unit + 1) + NEXT * (k + 1) for k in range(each)]
+    return [ended(course(campaign, seed, NONE, first, inspected=k == 0)) for k, seed in enumerate(seeds)]
+
+
+def whole(unit: int, campaign: Campaign) -> Ended:
+    """One run without any sharing."""
+    return ended(course(campaign, BASE * (unit + 1), NONE))
+
+
+def faulty(unit: int, campaign: Campaign, wanted: Sequence[str]) -> list[tuple[str, str, list[str], bool]]:
+    """Runs of one unit with each of some faults: verdict, all that failed, and whether that names the fault."""
+    seed, found = BASE * (unit + 1), [f for f in faults(campaign) if f.name in wanted]
+    late = [f for f in found if f.late]
+    before = course(campaign, seed, NONE, until=AFTER) if late else None
+    runs = [(f, ended(course(campaign, seed, f, before if f.late else None))) for f in found]
+    return [(f.name, verdict, said, names(f, said)) for f, (verdict, said) in runs]
+
+
+def names(fault: Fault, said: Iterable[str]) -> bool:
+    """Whether one sentence has all words of a fault."""
+    return any(all(word in sentence for word in fault.names) for sentence in said)
+
+
+def tell(runs: Sequence[Ended], title: str) -> bool:
+    """Print how many passed, and by which checks the others failed."""
+    passed = sum(verdict == "pass" for verdict, _ in runs)
+    print(f"{title}: {passed} of {len(runs)} pass, at least {least(len(runs))} wanted", flush=True)
+    for sentence, count in Counter(s for _, said in runs for s in said).most_common():
+        print(f"  {count} x {sentence}")
+    return passed >= least(len(runs))
 
 
 def main() -> int:
     """Sound units, then each fault."""
     parser = argparse.ArgumentParser(description="The campaign acceptance on sound and faulty units")
     parser.add_argument("--seeds", type=int, default=200)
+    parser.add_argument("--each", type=int, default=4, help="runs that share one unit's launches and thermal cycle")
+    parser.add_argument("--whole", type=int, default=0, help="runs as the campaign ships")
     parser.add_argument("--fault-seeds", type=int, default=60)
+    parser.add_argument("--only", action="append", default=[], help="this fault alone")
     parser.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1))
     options = parser.parse_args()
     campaign, held = scaled(), True
-    with ProcessPoolExecutor(options.workers) as pool:
-        found = list(pool.map(partial(one, campaign=campaign, fault=None), range(options.seeds)))
-        passed = sum(verdict == "pass" for verdict, _, _ in found)
-        print(f"sound unit: {passed} of {len(found)} pass, at least {least(len(found))} wanted")
-        for sentence, count in Counter(s for _, said, _ in found for s in said).most_common():
+    if options.whole:
+        with ProcessPoolExecutor(options.workers) as pool:
+            ships = partial(whole, campaign=shipped()["acceptance"])
+            held &= tell(list(pool.map(ships, range(options.whole))), "sound unit, whole")
+    with ProcessPoolExecutor(options.workers, initializer=light_bench.use) as pool:
+        units = range(-(-options.seeds // options.each))
+        found = [one for of in pool.map(partial(sound, campaign=campaign, each=options.each), units) for one in of]
+        held &= tell(found[: options.seeds], "sound unit") if options.seeds else True
+        every = [f for f in faults(campaign) if not options.only or f.name in options.only]
+        wanted = [f.name for f in every if f.resolved]
+        drawn = list(pool.map(partial(faulty, campaign=campaign, wanted=wanted), range(options.fault_seeds)))
+    for fault in every:
+        if not fault.resolved:
+            print(f"{fault.name}: not resolved by the plan, {fault.size}")
+            continue
+        of = [one for unit in drawn for one in unit if one[0] == fault.name]
+        detected, named = sum(one[1] != "pass" for one in of), sum(one[3] for one in of)
+        print(f"{fault.name}, {fault.size}: {detected} of {len(of)} found, {named} named by {fault.names}")
+        for sentence, count in Counter(s for one in of for s in one[2]).most_common(4):
             print(f"  {count} x {sentence}")
-        held &= passed >= least(len(found))
-        for fault in faults(campaign):
-            drawn = list(pool.map(partial(one, campaign=campaign, fault=fault.name), range(options.fault_seeds)))
-            detected = sum(verdict != "pass" for verdict, _, _ in drawn)
-            named = sum(good for _, _, good in drawn)
-            print(f"{fault.name}, {fault.size}: {detected} of {len(drawn)} found, {named} named by {fault.names}")
-            for sentence, count in Counter(s for _, said, _ in drawn for s in said).most_common(4):
-                print(f"  {count} x {sentence}")
-            held &= min(detected, named) >= least(len(drawn))
+        held &= min(detected, named) >= least(len(of))
     print("as claimed" if held else "NOT as claimed")
     return 0 if held else 1
 

@@ -7,13 +7,19 @@ below; exchanged, dead and stuck channels have no size.
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag, null_space
+from scipy.special import chdtri
 
 from bench_service.campaigns.campaign import Campaign
 from bench_service.campaigns.power import beyond, smallest_step
 from procedures import catalog, methods
+from procedures.analysis.calibration.plan import triad_plan
+from procedures.analysis.calibration.suspect_flaw import free_residuals, smallest_size
+from procedures.analysis.least_squares.whitening import whitener
+from procedures.catalog import calibration_12_orientations as twelve
 from procedures.core import units
 from procedures.core.limits import PlannedCheck
-from procedures.procedure import PredictedUncertainty
+from procedures.procedure import Context, PredictedUncertainty
 from simulators.truth import Array, BenchTruth, TriadTruth, UnitTruth
 from tests.kit.procedures import simulated_context
 from tests.validation.acceptance_rig import Fault
@@ -21,6 +27,8 @@ from tests.validation.acceptance_rig import Fault
 POWER = 0.99
 """Probability with which a fault of the smallest size is to be found."""
 LATE = ("scale_3", "calibration_3", "verification_3")
+AFTER = LATE[0]
+"""First step with a fault of the third launch."""
 
 
 def _planned(campaign: Campaign) -> dict[str, PlannedCheck]:
@@ -52,11 +60,76 @@ def faults(campaign: Campaign) -> list[Fault]:
         _late("gyro scale step", gyro, f"{ppm_gyro:.3g} ppm from the third launch", "gyro", 0, 1e-6 * ppm_gyro, 0.0),
         _late("accelerometer scale step", force, f"{ppm_force:.3g} ppm", "accelerometer", 1, 1e-6 * ppm_force, 0.0),
         _late("accelerometer bias step", bias, f"{step:.3g} m/s^2", "accelerometer", 2, 0.0, step),
+        *_of_reference(campaign),
         Fault("noisy gyro", (walk,), truth=_noisy(noise), size=f"{noise:.3g} deg/√h"),
         Fault("axes exchanged", ("gyro_x", "gyro_y"), samples=_exchanged, size="gyro x and y"),
         Fault("dead channel", ("gyro_z",), samples=_dead, size="gyro z, from the first launch"),
         Fault("stuck thermometer", ("temperature_case",), samples=_stuck, size="case"),
     ]
+
+
+def _of_reference(campaign: Campaign) -> list[Fault]:
+    """A wrong azimuth and a loose mounting in the third launch, as the residuals of its calibration would show them.
+
+    A loose mounting: the unit's attitude scatters anew from station to station, with the same spread about each axis,
+    after the whole turns of that launch.
+    """
+    context = simulated_context()
+    step = campaign.step("calibration_3")
+    parameters = {k: v for k, v in step.parameters.items() if k != "thermal_correction"}
+    params = twelve.resolve(twelve.Params.model_validate(parameters), context)
+    level = params.limits.residual_p_value_min
+    effect, covariance, source = _free(params, context, "gyro")
+    azimuth = smallest_size(effect[:, source == "azimuth"][:, 0], covariance, level, POWER) / units.ARCSEC
+    effect, covariance, source = _free(params, context, "accelerometer")
+    loose = _loose(effect[:, source == "pointing"], covariance, level) / units.ARCSEC
+
+    def misread(step_name: str, unit: UnitTruth, bench: BenchTruth) -> tuple[UnitTruth, BenchTruth]:
+        if step_name not in LATE:
+            return unit, bench
+        table = replace(bench.table, azimuth_error_arcsec=bench.table.azimuth_error_arcsec + azimuth)
+        return unit, replace(bench, table=table)
+
+    def scattered(step_name: str, unit: UnitTruth, bench: BenchTruth) -> tuple[UnitTruth, BenchTruth]:
+        if step_name not in LATE[1:]:
+            return unit, bench
+        return unit, replace(bench, table=replace(bench.table, pointing_sd_arcsec=loose))
+
+    return [
+        Fault("wrong azimuth", ("gyro", "wrong azimuth"), misread, size=f"{azimuth / 60.0:.3g} arcmin", late=True),
+        Fault("loose mounting", ("accelerometer", "differ"), scattered, size=f"{loose:.3g} arcsec", late=True),
+    ]
+
+
+def _free(params: twelve.Params, context: Context, triad: str) -> tuple[Array, Array, Array]:
+    """Effect of each flaw of one radian on the residual combinations of a plan (k, P), their covariance, sources."""
+    stations = twelve.schedule(params)
+    site = params.site(context)
+    plan = triad_plan(triad, context.unit, stations, context.bench.axis_motion, site, params.table(site))
+    noise, vectors, table = plan.noise_covariance(), plan.vectors, plan.table
+    if noise is None:
+        raise ValueError("the default unit's noise is known")
+    design = np.column_stack([np.ones(len(vectors)), vectors])
+    basis = null_space((design / np.linalg.norm(design, axis=0)).T)
+    free = free_residuals(np.zeros(3 * basis.shape[1]), np.zeros((1, 1)), basis, plan.matrix, table)
+    declared = free.per_radian * table.sd
+    covariance = block_diag(*[basis.T @ c @ basis for c in noise]) + declared @ declared.T
+    return free.per_radian, covariance, np.array(table.source)
+
+
+def _loose(effect: Array, covariance: Array, level: float) -> float:
+    """Spread of each turn at each station [rad] whose chi-square is refused with `POWER`, by draws and bisection."""
+    dice = np.random.default_rng(0)
+    weights = whitener(covariance)
+    noise = dice.normal(size=(4000, len(covariance)))
+    turns = dice.normal(size=(4000, effect.shape[1])) @ (weights @ effect).T
+    bound = float(chdtri(len(covariance), level))
+    low, high = 0.0, 100.0 * units.ARCSEC
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        found = float(np.mean(np.sum((noise + middle * turns) ** 2, axis=1) > bound))
+        low, high = (middle, high) if found < POWER else (low, middle)
+    return high
 
 
 def _noise(planned: PlannedCheck) -> float:
@@ -79,7 +152,7 @@ def _late(name: str, check: str, size: str, triad: str, axis: int, scale: float,
         changed = replace(old, matrix=rows, bias=biases)
         return replace(unit, **{triad: changed}), bench
 
-    return Fault(name, (check,), truth=truth, size=size)
+    return Fault(name, (check,), truth=truth, size=size, late=True)
 
 
 def _noisy(deg_sqrt_h: float):

@@ -29,14 +29,18 @@ from procedures.procedure import Context, DatedCalibration, Evidence, Outcome
 from simulators.truth import Array, BenchTruth, UnitTruth, default_bench, default_unit
 from simulators.world import WorldConfig, build
 from tests.kit.procedures import recorded
+from tests.validation import light_bench
 
 AT = datetime(2026, 1, 1, tzinfo=UTC)
 SCALED: dict[str, dict[str, Any]] = {
-    "static": {"launches": 2, "duration_s": 3600.0, "sample_rate_hz": 20.0},
+    "static": {"sample_rate_hz": 5.0},
     "converter": {"temperatures_c": [-40.0, -20.0, 0.0, 20.0, 40.0, 60.0], "record_s": 20.0},
     "thermal": {"sample_rate_hz": 1.0},
 }
-"""Two launches of an hour at 20 Hz, six soaks of the converter, thermal legs whole at 1 Hz; the rest as it ships."""
+"""Launches and thermal legs as long as they ship, at 5 and 1 Hz, and six soaks of the converter: what limits the
+campaign are processes that only hours show."""
+RATE_HZ = 100.0
+"""Sample rate of the light bench's unit; it ships with 400 Hz."""
 Truth = Callable[[str, UnitTruth, BenchTruth], tuple[UnitTruth, BenchTruth]]
 Samples = Callable[[str, tuple[str, ...], Array], Array]
 
@@ -51,6 +55,10 @@ class Fault:
     truth: Truth = lambda _step, unit, bench: (unit, bench)
     samples: Samples = lambda _step, _channels, raw: raw
     size: str = ""
+    late: bool = False
+    """True if it begins with the third launch: the run is sound until then."""
+    resolved: bool = True
+    """False if the plan cannot find it at any size that the table allows; `size` then says why."""
 
 
 def scaled() -> Campaign:
@@ -60,34 +68,73 @@ def scaled() -> Campaign:
     return campaign.model_copy(update={"steps": tuple(steps)})
 
 
-def course(campaign: Campaign, seed: int, fault: Fault) -> CampaignRun:
-    """One run from its first step to its verdict; the seed of a step is the run's and the step's number."""
-    driver = SimulatedDriver("sim")
-    unit = driver.mounted()[0]
-    made: dict[str, list[TriadCalibration]] = {}
+@dataclass(frozen=True)
+class Course:
+    """A run on its way: its record, the unit as the steps so far left it, and the calibrations that they made."""
+
+    run: CampaignRun
+    unit: Unit
+    made: dict[str, tuple[TriadCalibration, ...]]
+
+
+def begun(campaign: Campaign, unit: Unit) -> Course:
+    """A run before its first step."""
     steps = tuple(StepRun(s.name, s.does) for s in campaign.steps)
-    run = CampaignRun("run", campaign, unit.serial, "sim", JobState.RUNNING, AT, steps, simulated=True, seed=seed)
-    while (index := run.current) is not None:
+    return Course(
+        CampaignRun("run", campaign, unit.serial, "sim", JobState.RUNNING, AT, steps, simulated=True, seed=0), unit, {}
+    )
+
+
+def course(
+    campaign: Campaign,
+    seed: int,
+    fault: Fault,
+    before: Course | None = None,
+    until: str = "",
+    inspected: bool = True,
+) -> Course:
+    """Steps up to the one named `until`, or to the verdict; the seed of a step is the run's and the step's number.
+
+    `inspected`: recordings go through the inspection, which is most of an analysis and has a validation of its own.
+    """
+    driver = SimulatedDriver("sim")
+    now = begun(campaign, mounted(driver)) if before is None else before
+    while (index := now.run.current) is not None:
         step = campaign.steps[index]
-        if why := gates.closed(run, index):
-            run = transitions.left_out(run, index, why, AT)
+        if step.name == until:
+            return now
+        if why := gates.closed(now.run, index):
+            now = replace(now, run=transitions.left_out(now.run, index, why, AT))
             continue
         try:
-            if step.method is not None:
-                outcome = _compared(
-                    step.does, step.parameters, [c for n in step.calibrations_of for c in made[n]], unit
-                )
-            else:
-                context = Context(unit, driver.description)
-                outcome, unit, made[step.name] = _measured(
-                    step.name, step.does, step.parameters, seed + index, fault, context
-                )
+            now = _stepped(now, index, seed, fault, driver, inspected)
         except DomainError as error:
-            run = transitions.failed(run, index, StepState.FAILED, f"{type(error).__name__}: {error}", AT, final=True)
-            continue
-        judgement = Judgement(outcome.verdict, outcome.checks, outcome.warnings)
-        run = transitions.judged(run, index, judgement, step.name, AT)
-    return run if run.verdict is not None else transitions.ended(run, AT)
+            why = f"{type(error).__name__}: {error}"
+            now = replace(now, run=transitions.failed(now.run, index, StepState.FAILED, why, AT, final=True))
+    return now if now.run.verdict is not None else replace(now, run=transitions.ended(now.run, AT))
+
+
+def mounted(driver: SimulatedDriver) -> Unit:
+    """The default unit, at the rate that its truth has here."""
+    return replace(driver.mounted()[0], sample_rate_hz=truth_of_unit().sample_rate_hz)
+
+
+def truth_of_unit() -> UnitTruth:
+    """The default unit's truth, at the rate of the light bench where that is in use."""
+    return replace(default_unit(), sample_rate_hz=RATE_HZ) if light_bench.in_use() else default_unit()
+
+
+def _stepped(now: Course, index: int, seed: int, fault: Fault, driver: SimulatedDriver, inspected: bool) -> Course:
+    step, unit, made = now.run.campaign.steps[index], now.unit, now.made
+    if step.method is not None:
+        of = [c for name in step.calibrations_of for c in made[name]]
+        outcome = _compared(step.does, step.parameters, of, unit)
+    else:
+        context = Context(unit, driver.description)
+        outcome, unit, found = _measured(step.name, step.does, step.parameters, seed + index, fault, context, inspected)
+        made = {**made, step.name: tuple(found)}
+    judgement = Judgement(outcome.verdict, outcome.checks, outcome.warnings)
+    return Course(transitions.judged(now.run, index, judgement, step.name, AT), unit, made)
 
 
 def _compared(name: str, parameters: dict[str, Any], calibrations: list[TriadCalibration], unit: Unit) -> Outcome:
@@ -97,13 +144,14 @@ def _compared(name: str, parameters: dict[str, Any], calibrations: list[TriadCal
 
 
 def _measured(
-    step: str, name: str, parameters: dict[str, Any], seed: int, fault: Fault, context: Context
+    step: str, name: str, parameters: dict[str, Any], seed: int, fault: Fault, context: Context, inspected: bool
 ) -> tuple[Outcome, Unit, list[TriadCalibration]]:
     """A procedure's outcome, and the unit as its result leaves it where it passes."""
     procedure = catalog.discover()[name]
     params = procedure.resolve(procedure.params.model_validate(parameters), context)
     recordings = asyncio.run(_recorded(procedure, procedure.schedule(params), step, seed, fault))
-    outcome = analyse_procedure(procedure, recordings, params, context)
+    judge = analyse_procedure if inspected else _uninspected
+    outcome = judge(procedure, recordings, params, context)
     unit, calibrations = context.unit, list(procedure.calibrations(outcome))
     if outcome.verdict is Verdict.PASS:
         known = {c.triad: c for c in (*unit.calibrations, *calibrations)}
@@ -114,9 +162,13 @@ def _measured(
     return outcome, procedure.learns(outcome, unit, step), calibrations
 
 
+def _uninspected(procedure: Any, recordings: list[MemoryRecording], params: Any, context: Context) -> Outcome:
+    return procedure.analyse(recordings, params, context)
+
+
 async def _recorded(procedure: Any, stations: Any, step: str, seed: int, fault: Fault) -> list[MemoryRecording]:
     needs = BenchNeeds.of(stations)
-    unit, bench = fault.truth(step, default_unit(), default_bench())
+    unit, bench = fault.truth(step, truth_of_unit(), default_bench())
     world = WorldConfig(unit, bench, seed, needs.sample_rate_hz, thermal=needs.temperatures, currents=needs.currents)
     devices = build(world)
     found: list[MemoryRecording] = []

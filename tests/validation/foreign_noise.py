@@ -128,6 +128,9 @@ def main() -> int:
     options = parser.parse_args()
     if options.records < 20:
         parser.error("at least 20 records")
+    kinds = {name: make for name, make in {**CLEAN, **FOREIGN}.items() if options.kind in name}
+    if not kinds:
+        parser.error(f"no kind's name contains {options.kind!r}; the kinds: {', '.join([*CLEAN, *FOREIGN])}")
     table = Table(
         title=f"Claims about foreign noise, {options.records} records a kind of 20 to 60 min", title_style="bold"
     )
@@ -148,11 +151,10 @@ def main() -> int:
     for column in columns:
         table.add_column(column, justify="left" if column == "kind" else "right")
     failed: list[str] = []
-    for number, (name, make) in enumerate({**CLEAN, **FOREIGN}.items()):
-        if options.kind not in name:
-            continue
+    numbers = {name: number for number, name in enumerate([*CLEAN, *FOREIGN])}
+    for name, make in kinds.items():
         seeds = track(range(options.records), name, console=Console(stderr=True))
-        claims = [claim(make(np.random.default_rng((options.seed, number, seed)))) for seed in seeds]
+        claims = [claim(make(np.random.default_rng((options.seed, numbers[name], seed)))) for seed in seeds]
         table.add_row(*row(name, claims))
         failed += failures(name, claims)
     console = Console(width=150)

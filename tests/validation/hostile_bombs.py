@@ -12,6 +12,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event, Thread
 
 import httpx
 import numpy as np
@@ -25,6 +26,7 @@ MB = 1_000_000
 CHANNEL = {"name": "gyro_x", "column": "x", "quantity": "angular_rate", "unit": "rad/s"}
 DESCRIPTION = {"unit": "BOMB-1", "rate_hz": 100.0, "channels": [CHANNEL]}
 POLL_S = 0.02
+PRESS_S = 0.1
 QUIET_S = 2.0
 MOST_SETTLING = 60
 
@@ -129,7 +131,15 @@ class Cost:
     """The longest answer of /healthz meanwhile."""
     quiet_s: float
     """The longest one in `QUIET_S` before: what the machine itself makes of it."""
+    stop_s: float
+    """The longest answer to a stop meanwhile, with the wait for the safe bench and the database."""
+    stop_quiet_s: float
     words: str
+
+    @property
+    def late_s(self) -> float:
+        """Delay of /healthz or of the stop, whichever is longer, beyond what it takes in quiet [s]."""
+        return max(self.delay_s - self.quiet_s, self.stop_s - self.stop_quiet_s)
 
 
 def measured(service: Service, bomb: Bomb, data: bytes) -> Cost:
@@ -153,9 +163,8 @@ def measured(service: Service, bomb: Bomb, data: bytes) -> Cost:
         )
         took_s = monotonic_s() - begun
     words = "" if answer.status_code == 201 else answer.json()["detail"][:100]
-    return Cost(
-        len(data) / MB, answer.status_code, took_s, seen["memory_mb"] - idle, seen["delay_s"], seen["quiet_s"], words
-    )
+    delays = (seen[name] for name in ("delay_s", "quiet_s", "stop_s", "stop_quiet_s"))
+    return Cost(len(data) / MB, answer.status_code, took_s, seen["memory_mb"] - idle, *delays, words)
 
 
 def _settle(pid: int) -> None:
@@ -186,22 +195,59 @@ def _watching(service: Service) -> Generator[dict[str, float]]:
         found.update(json.loads(watching.stdout.read()))
 
 
+@dataclass
+class _Longest:
+    """The longest answers in the quiet time before the import, and since."""
+
+    begun_s: float
+    quiet_s: float = 0.0
+    later_s: float = 0.0
+
+    def take(self, asked_s: float) -> None:
+        """Take an answer that has just come."""
+        took_s = monotonic_s() - asked_s
+        if asked_s - self.begun_s < QUIET_S:
+            self.quiet_s = max(self.quiet_s, took_s)
+        else:
+            self.later_s = max(self.later_s, took_s)
+
+
 def _watch(url: str, pid: int) -> None:
-    """Ask for /healthz and look at the memory until the standard input ends; print the longest and the most."""
-    begun, most, quiet, delay = monotonic_s(), 0.0, 0.0, 0.0
+    """Ask for /healthz, press the stop and look at the memory until the standard input ends; print what was longest."""
+    most, ending = 0.0, Event()
     with httpx.Client(base_url=url, timeout=60) as client:
         client.get("/healthz").raise_for_status()
+        _press(client, None)
+        health, stops = _Longest(monotonic_s()), _Longest(monotonic_s())
+        pressing = Thread(target=_press_again, args=(url, stops, ending))
+        pressing.start()
         print("watching", flush=True)
         while not select.select([sys.stdin], [], [], POLL_S)[0]:
-            asked = monotonic_s()
+            asked_s = monotonic_s()
             client.get("/healthz").raise_for_status()
-            took = monotonic_s() - asked
-            if asked - begun < QUIET_S:
-                quiet = max(quiet, took)
-            else:
-                delay = max(delay, took)
+            health.take(asked_s)
             most = max(most, memory_mb(pid))
-    print(json.dumps({"memory_mb": most, "delay_s": delay, "quiet_s": quiet}))
+    ending.set()
+    pressing.join()
+    found = {"delay_s": health.later_s, "quiet_s": health.quiet_s}
+    print(json.dumps({"memory_mb": most, **found, "stop_s": stops.later_s, "stop_quiet_s": stops.quiet_s}))
+
+
+def _press_again(url: str, longest: _Longest, ending: Event) -> None:
+    with httpx.Client(base_url=url, timeout=60) as client:
+        while not ending.wait(PRESS_S):
+            _press(client, longest)
+
+
+def _press(client: httpx.Client, longest: _Longest | None) -> None:
+    """Press the stop, and release it again without a clock."""
+    asked_s = monotonic_s()
+    answer = client.post("/api/v1/benches/sim/stop", json={"reason": "an import", "by": "test"}).raise_for_status()
+    if longest is not None:
+        longest.take(asked_s)
+    path = f"/api/v1/benches/sim/stops/{answer.json()['stop']}/release"
+    while client.post(path, json={"by": "test", "remark": "none"}).status_code in (404, 409):
+        pause(POLL_S)  # the database does not have it yet, or the bench is being made safe
 
 
 def memory_mb(root: int) -> float:

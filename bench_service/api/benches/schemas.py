@@ -46,6 +46,7 @@ class StopView(BaseModel):
     released_at: datetime | None = Field(description="null: it stands")
     released_by: str
     remark: str = Field(description="Remark of the person who released it")
+    entered_at: datetime | None = Field(description="When the database took it: later than `at` where it was away")
 
     @classmethod
     def of(cls, stop: BenchStop) -> "StopView":

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Path, Query, Response
 from pydantic import Field
 
+from bench_service.api.access.teams import TeamOfCampaign, TeamOfRun
 from bench_service.api.campaigns.schemas import (
     CampaignMade,
     CampaignPage,
@@ -14,7 +15,7 @@ from bench_service.api.campaigns.schemas import (
     CampaignRunView,
     CampaignView,
 )
-from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
+from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Me, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.fields import NAME, Labels, Request
 from bench_service.campaigns import junit
@@ -58,9 +59,14 @@ def list_campaigns(service: Service, after: After = None, limit: Limit = 50) -> 
 
 
 @router.post("/campaigns", status_code=201, responses=problems(404, 409, 413, 507))
-def add_campaign(body: Campaign, service: Service, response: Response, key: IdempotencyKey = None) -> CampaignMade:
-    """Store a new campaign. Every step is examined first: impossible steps are refused, doubtful ones give warnings."""
-    campaign = service.campaigns.add(body, key)
+def add_campaign(
+    body: Campaign, service: Service, response: Response, me: Me, key: IdempotencyKey = None
+) -> CampaignMade:
+    """Store a new campaign, for the team of the account or token that asks.
+
+    Every step is examined first: impossible steps are refused, doubtful ones give warnings.
+    """
+    campaign = service.campaigns.add(body, key, me.team)
     response.headers["Location"] = f"/api/v1/campaigns/{campaign.name}"
     return CampaignMade.of(campaign, service.campaigns.examine(campaign))
 
@@ -71,7 +77,7 @@ def read_campaign(name: CampaignName, service: Service) -> CampaignView:
     return CampaignView.of(service.campaigns.campaign(name))
 
 
-@router.put("/campaigns/{name}", responses=problems(404, 409, 413, 507))
+@router.put("/campaigns/{name}", responses=problems(404, 409, 413, 507), dependencies=[TeamOfCampaign])
 def replace_campaign(name: CampaignName, body: Campaign, service: Service) -> CampaignMade:
     """Replace a stored campaign; runs requested before keep the version that they have."""
     if body.name != name:
@@ -94,11 +100,14 @@ def preview_campaign(name: CampaignName, body: CampaignOn, service: Service) -> 
     responses={**problems(404, 409, 413, 507), **made(202, "run_id", *OF_A_RUN)},
 )
 def start_campaign(
-    name: CampaignName, body: RunSubmission, service: Service, response: Response, key: IdempotencyKey = None
+    name: CampaignName, body: RunSubmission, service: Service, response: Response, me: Me, key: IdempotencyKey = None
 ) -> CampaignRunView:
-    """Queue a run of the campaign. A bench does one campaign run at a time, in the order of the requests."""
+    """Queue a run of the campaign, for the team of the account or token that asks.
+
+    A bench does one campaign run at a time, in the order of the requests.
+    """
     request = copied(RunRequest, body, campaign=name)
-    run = service.campaigns.start(request, key)
+    run = service.campaigns.start(request, key, me.team)
     response.headers["Location"] = f"/api/v1/campaign-runs/{run.id}"
     return CampaignRunView.of(run)
 
@@ -123,7 +132,9 @@ def read_campaign_run(run_id: str, service: Service) -> CampaignRunView:
     return CampaignRunView.of(service.stores.campaigns.run(run_id))
 
 
-@router.post("/campaign-runs/{run_id}/cancel", status_code=202, responses=problems(404, 409, 507))
+@router.post(
+    "/campaign-runs/{run_id}/cancel", status_code=202, responses=problems(404, 409, 507), dependencies=[TeamOfRun]
+)
 def cancel_campaign_run(run_id: str, service: Service) -> CampaignRunView:
     """Cancel a campaign run: its job ends as soon as the bench is safe; steps that did not begin are left out."""
     return CampaignRunView.of(service.campaigns.cancel_run(run_id))

@@ -5,8 +5,9 @@ from typing import Annotated
 from fastapi import APIRouter, Response
 from pydantic import Field
 
+from bench_service.api.access.teams import TeamOfSchedule
 from bench_service.api.campaigns.schemas import SchedulePage, ScheduleView
-from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
+from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Me, Service
 from bench_service.api.http.errors import made, problems
 from bench_service.api.http.fields import NAME, Labels, Request
 from bench_service.campaigns.schedule import Missed, Overlap
@@ -61,11 +62,14 @@ def list_schedules(service: Service, after: After = None, limit: Limit = 50) -> 
     "", status_code=201, responses={**problems(404, 409, 413, 507), **made(201, "schedule_id", *OF_A_SCHEDULE)}
 )
 def add_schedule(
-    body: ScheduleSubmission, service: Service, response: Response, key: IdempotencyKey = None
+    body: ScheduleSubmission, service: Service, response: Response, me: Me, key: IdempotencyKey = None
 ) -> ScheduleView:
-    """Schedule a campaign at given times. A time that never comes is refused, and a run that could not begin now."""
+    """Schedule a campaign at given times, for the team of the account or token that asks.
+
+    A time that never comes is refused, and a run that could not begin now.
+    """
     request = copied(ScheduleRequest, body)
-    schedule = service.campaigns.schedules.add(request, key)
+    schedule = service.campaigns.schedules.add(request, key, me.team)
     response.headers["Location"] = f"/api/v1/schedules/{schedule.id}"
     return ScheduleView.of(schedule)
 
@@ -76,13 +80,15 @@ def read_schedule(schedule_id: str, service: Service) -> ScheduleView:
     return ScheduleView.of(service.campaigns.schedules.get(schedule_id))
 
 
-@router.patch("/{schedule_id}", responses=problems(404, 413, 507))
+@router.patch("/{schedule_id}", responses=problems(404, 413, 507), dependencies=[TeamOfSchedule])
 def change_schedule(schedule_id: str, body: ScheduleChange, service: Service) -> ScheduleView:
     """Switch a schedule off or on; starts that pass while it is off are not made up."""
     return ScheduleView.of(service.campaigns.schedules.enable(schedule_id, body.enabled))
 
 
-@router.delete("/{schedule_id}", status_code=204, response_model=None, responses=problems(404, 507))
+@router.delete(
+    "/{schedule_id}", status_code=204, response_model=None, responses=problems(404, 507), dependencies=[TeamOfSchedule]
+)
 def remove_schedule(schedule_id: str, service: Service) -> None:
     """Delete one schedule; its runs are kept."""
     service.campaigns.schedules.remove(schedule_id)

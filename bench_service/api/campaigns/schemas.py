@@ -102,6 +102,7 @@ class CampaignRunView(BaseModel):
     simulated: bool
     seed: int | None = Field(description="Base: a step's seed is the base + its number + 1000 a retry")
     labels: Labels
+    team: str = Field(description="Team whose members act on it and on its jobs; empty: everybody")
     duration_s: float = Field(description="Bench time by the plans")
     deadline_at: datetime | None = Field(description="When its window closes")
     schedule: str | None
@@ -153,6 +154,7 @@ class ScheduleView(BaseModel):
     start_within_s: float
     overlap: Overlap
     labels: Labels
+    team: str = Field(description="Team whose members change it and act on its runs; empty: everybody")
     created_at: datetime
     next_at: datetime | None = Field(description="UTC; null while disabled")
     last_at: datetime | None = Field(description="The last planned start that was seen")

@@ -67,7 +67,10 @@ def made(status: int, parameter: str, *operations: str) -> dict[int | str, dict[
 
 
 def install(app: FastAPI) -> None:
-    """Answer every error of the table, of validation and of routing with a problem document."""
+    """Answer every error of the table, of validation and of routing with a problem document.
+
+    Every handler is asynchronous: another one would wait for a thread of the pool, and a stop's refusal with it.
+    """
     app.add_exception_handler(RequestValidationError, _on_request_validation)
     app.add_exception_handler(ValidationError, _on_parameter_validation)
     app.add_exception_handler(HTTPException, _on_http)
@@ -83,7 +86,7 @@ def problem_of(request: Request, error: DomainError | ServiceError | ValidationE
     return _problem(request, status_of(error), str(error), type(error).__name__, *_details(error))
 
 
-def _on_known(request: Request, error: Exception) -> Response:
+async def _on_known(request: Request, error: Exception) -> Response:
     response = respond(request, status_of(error), str(error), type(error).__name__, *_details(error))
     if isinstance(error, Overloaded):
         response.headers["Retry-After"] = RETRY_AFTER_S
@@ -104,7 +107,7 @@ def _details(error: Exception) -> tuple[list[FieldError], list[str]]:
     return fields, list(error.lost) if isinstance(error, Undetermined) else []
 
 
-def _on_request_validation(request: Request, error: Exception) -> Response:
+async def _on_request_validation(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     if first["type"] == "json_invalid" and first["loc"][0] == "body":
@@ -113,7 +116,7 @@ def _on_request_validation(request: Request, error: Exception) -> Response:
     return _invalid(request, error.errors(), prefix="")
 
 
-def _on_parameter_validation(request: Request, error: Exception) -> Response:
+async def _on_parameter_validation(request: Request, error: Exception) -> Response:
     assert isinstance(error, ValidationError)
     return _invalid(request, error.errors(include_url=False), prefix="parameters")
 
@@ -140,7 +143,7 @@ def _follows(error: Any, errors: Sequence[Any]) -> bool:
     )
 
 
-def _on_http(request: Request, error: Exception) -> Response:
+async def _on_http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     status = error.status_code
     if status == 400 and (allowed := _UNREAD.get(type(error.__cause__))) is not None:
@@ -153,7 +156,7 @@ def _on_http(request: Request, error: Exception) -> Response:
     return response
 
 
-def _on_unknown(request: Request, error: Exception) -> Response:
+async def _on_unknown(request: Request, error: Exception) -> Response:
     response = respond(request, 500, "a defect of the service; its log has the details", "InternalError")
     response.headers.update(SECURITY_HEADERS)  # this answer is made outside of all that adds to answers
     return response

@@ -136,6 +136,7 @@ class JobView(BaseModel):
     deadline_at: datetime | None = Field(description="No station begins later")
     labels: Labels
     requested_by: str = Field(description="Who asked for it, as far as the client said")
+    team: str = Field(description="Team of its campaign run, whose members act on it; empty: its reservation's counts")
     requested_parameters: dict[str, Any]
     parameters: dict[str, Any]
     simulated: bool

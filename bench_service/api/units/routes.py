@@ -7,6 +7,8 @@ from fastapi import APIRouter, Path, Response
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, Service
 from bench_service.api.http.errors import problems
 from bench_service.api.http.printed import PDF, PRINTED, printed
+from bench_service.api.units.calibration_schemas import CalibrationApproval, CalibrationRejection
+from bench_service.api.units.calibrations import DeciderOf
 from bench_service.api.units.schemas import (
     CorrectionPage,
     CorrectionView,
@@ -78,3 +80,37 @@ def choose_correction(serial: str, correction_id: str, service: Service, key: Id
     """Make a correction set the one that new jobs use; jobs that began before keep theirs."""
     asked = None if key is None else Idempotency(f"corrections:{key}", fingerprint([serial, correction_id]))
     return CorrectionView.of(service.stores.corrections.make_current(serial, correction_id, asked))
+
+
+@router.post("/{serial}/corrections/{correction_id}/approve", responses=problems(404, 409, 413, 507))
+def approve_correction(
+    serial: str,
+    correction_id: str,
+    body: CalibrationApproval,
+    service: Service,
+    decider: DeciderOf,
+    key: IdempotencyKey = None,
+) -> CorrectionView:
+    """Approve a correction set, and say until when it is valid."""
+    by = decider(body.by, body.remark)
+    asked = None if key is None else _asked("approve", key, serial, correction_id, body)
+    return CorrectionView.of(service.stores.corrections.approve(serial, correction_id, by, body.valid_until, asked))
+
+
+@router.post("/{serial}/corrections/{correction_id}/reject", responses=problems(404, 409, 413, 507))
+def reject_correction(
+    serial: str,
+    correction_id: str,
+    body: CalibrationRejection,
+    service: Service,
+    decider: DeciderOf,
+    key: IdempotencyKey = None,
+) -> CorrectionView:
+    """Reject a correction set: no new job uses it, also where it is current."""
+    by = decider(body.by, body.remark)
+    asked = None if key is None else _asked("reject", key, serial, correction_id, body)
+    return CorrectionView.of(service.stores.corrections.reject(serial, correction_id, by, asked))
+
+
+def _asked(act: str, key: str, *about: object) -> Idempotency:
+    return Idempotency(f"corrections-{act}:{key}", fingerprint(list(about)))

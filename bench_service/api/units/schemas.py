@@ -5,11 +5,16 @@ from datetime import datetime
 from pydantic import BaseModel, Field
 
 from bench_service.api.http.fields import Request
+from bench_service.api.units.calibration_schemas import DecisionView
 from bench_service.evidence.corrections import StoredCorrection
 from bench_service.mapping import copied
+from bench_service.model.calibrations import Approval
+from bench_service.wall_clock import now
 from procedures.core.converter import ConverterTriad
+from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.recording import Channel
 from procedures.core.thermal_correction import ThermalCorrection
+from procedures.core.thermometers import ThermometerCorrection
 from procedures.core.unit import TriadRecord, Unit
 from procedures.core.unit_correction import CorrectionKind
 
@@ -38,6 +43,8 @@ class UnitView(BaseModel):
     withheld: list[str] = Field(description="Why a current calibration may not be used, and the way out")
     thermal_correction: str | None = Field(description="Id of the current correction of the kind `thermal`")
     converter: str | None = Field(description="Id of the current correction of the kind `converter`")
+    thermometers: str | None = Field(description="Id of the current correction of the kind `thermometers`")
+    gyro_correction: str | None = Field(description="Id of the current correction of the kind `gyros`")
 
     @classmethod
     def of(cls, unit: Unit) -> "UnitView":
@@ -49,6 +56,8 @@ class UnitView(BaseModel):
             withheld=[entry.why for entry in unit.withheld],
             thermal_correction=unit.thermal_correction_id,
             converter=unit.converter_id,
+            thermometers=unit.thermometers_id,
+            gyro_correction=unit.gyro_correction_id,
         )
 
 
@@ -64,11 +73,25 @@ class CorrectionView(BaseModel):
     simulated: bool
     thermal: ThermalCorrection | None = Field(description="Thesis 4.1, of the kind `thermal`; else null")
     converter: ConverterTriad | None = Field(description="Models of x, y, z, of the kind `converter`; else null")
+    thermometers: ThermometerCorrection | None = Field(description="Sensors, of the kind `thermometers`; else null")
+    gyros: GyroThermalCorrection | None = Field(description="Polynomials of x, y, z, of the kind `gyros`; else null")
+    approval: Approval
+    valid_until: datetime | None
+    unusable: str = Field(description="Why it may not be used now, and the way out; empty where it may")
+    decisions: list[DecisionView]
     results: list[str] | None = Field(None, description="Results that rest on it; only where one is asked for")
 
     @classmethod
     def of(cls, stored: StoredCorrection, results: tuple[str, ...] | None = None) -> "CorrectionView":
-        return copied(cls, stored, stored.correction, result=stored.result_id, results=results)
+        return copied(
+            cls,
+            stored,
+            stored.correction,
+            result=stored.result_id,
+            unusable=stored.unusable(now()),
+            decisions=[DecisionView.of(d) for d in stored.decisions],
+            results=results,
+        )
 
 
 class CorrectionPage(BaseModel):

@@ -9,6 +9,7 @@ from itertools import accumulate
 
 import numpy as np
 
+from bench_service.bench.live.devices import DeviceReadings
 from bench_service.bench.live.values import (
     BenchLive,
     LiveBoard,
@@ -16,12 +17,10 @@ from bench_service.bench.live.values import (
     LiveDevices,
     LiveJob,
     LiveSamples,
-    LiveStatus,
 )
 from bench_service.model.job import Job
 from bench_service.wall_clock import monotonic_s, now
 from procedures.bench import Bench
-from procedures.bench.device import Status
 from procedures.bench.errors import BenchError
 from procedures.bench.imu import Stream
 from procedures.core.arrays import Array
@@ -46,7 +45,7 @@ class LiveTap:
         self._opened_at_s = self._looked_at_s = monotonic_s()
         self._channels: tuple[Channel, ...] = ()
         self._rate_hz = 1.0
-        self._status: dict[tuple[str, str], LiveStatus] = {}
+        self._readings = DeviceReadings(bench)
         self._stretches: deque[tuple[float, float, Array]] = deque(maxlen=STRETCHES)
 
     def station(self, index: int) -> None:
@@ -98,37 +97,10 @@ class LiveTap:
         )
 
     async def _devices(self) -> LiveDevices | None:
-        bench = self._bench
         try:
-            table, supply = await bench.turntable.read(), await bench.supply.read()
-            chamber = None if bench.chamber is None else await bench.chamber.read()
-            return LiveDevices(
-                table.angles.outer_deg,
-                table.angles.middle_deg,
-                table.angles.inner_deg,
-                table.moving,
-                supply.on,
-                chamber,
-                self._statuses(
-                    turntable=table.status,
-                    supply=supply.status,
-                    chamber=() if chamber is None else chamber.status,
-                    unit=bench.imu.status(),
-                ),
-            )
+            return await self._readings.read()
         except BenchError:  # the procedure raises it where it matters
             return None
-
-    def _statuses(self, **found: Status) -> tuple[LiveStatus, ...]:
-        """The status words with the moment from which each is as it is."""
-        words = {(device, word.name): word for device, status in found.items() for word in status}
-        kept: dict[tuple[str, str], LiveStatus] = {}
-        for (device, name), word in words.items():
-            old = self._status.get((device, name))
-            same = old is not None and (old.raw, old.bits) == (word.raw, word.bits)
-            kept[device, name] = old if same and old else LiveStatus(device, name, word.raw, word.bits, now())
-        self._status = kept
-        return tuple(kept.values())
 
     def _said(self) -> LiveSamples | None:
         if not self._stretches:

@@ -55,6 +55,12 @@ class LiveDevices:
     """Reading of the chamber; None: the bench has none."""
     status: tuple[LiveStatus, ...] = ()
     """Status words of all devices, as they were last read."""
+    rates_deg_s: tuple[float, float, float] | None = None
+    """Rates of outer, middle and inner axis; None: the controller tells none."""
+    voltage_v: float | None = None
+    """Measured voltage of the unit's supply."""
+    current_a: float | None = None
+    """Measured current of the unit's supply."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +106,35 @@ class LiveJob:
 
 
 @dataclass(frozen=True)
+class LiveSensor:
+    """A channel of the unit: its mean over the last samples, in nominal units."""
+
+    name: str
+    unit: str
+    value: float
+
+
+@dataclass(frozen=True)
+class LiveManual:
+    """Manual mode of the bench."""
+
+    lease: str
+    holder: str
+    reason: str
+    until: datetime
+    bench_time_s: float
+    """Time of the bench's clock."""
+    doing: str
+    """The motion that is under way; empty: the table rests."""
+    sensors: tuple[LiveSensor, ...] = ()
+    """The unit's channels; empty while it is off, or before its first samples."""
+    sensors_at_s: float | None = None
+    """Bench time of their samples' end: during a move to angles a simulated unit is not read."""
+    sensors_problem: str = ""
+    """The reason why the unit was not read; empty: it was, or it is off."""
+
+
+@dataclass(frozen=True)
 class BenchLive:
     """The newest live state of a bench, as its driver wrote it."""
 
@@ -113,6 +148,8 @@ class BenchLive:
     devices: LiveDevices | None = None
     """State of the devices; None: no process has opened the bench, or they do not answer."""
     samples: LiveSamples | None = None
+    manual: LiveManual | None = None
+    """Manual mode; None: the bench is not in it."""
 
     def seen_s(self, at: datetime) -> float:
         """Age of this state [s]."""
@@ -164,7 +201,7 @@ class LiveBoard:
     def of_bench(self, bench_id: str) -> BenchLive | None:
         """The newest live state of a bench; None: it never had a driver. Raises `StorageFailure`."""
         if bench_id == self.own and self._said is not None:
-            return self._said if self._said.job else replace(self._said, at=self._clock())
+            return self._said if self._said.job or self._said.manual else replace(self._said, at=self._clock())
         return self._store.get(bench_id)
 
     def all(self) -> tuple[BenchLive, ...]:
@@ -203,14 +240,14 @@ class Heartbeat:
         self._board.news.set()
         self._thread.join()
         if (said := self._board.said()) is not None:
-            self._write(replace(said, at=now(), driving=False, job=None, devices=None, samples=None))
+            self._write(replace(said, at=now(), driving=False, job=None, devices=None, samples=None, manual=None))
 
     def _run(self) -> None:
         while not self._ending.is_set():
             self._board.news.clear()
             said = self._board.said()
             if said is not None:
-                self._write(said if said.job else replace(said, at=now()))
+                self._write(said if said.job or said.manual else replace(said, at=now()))
             self._board.news.wait(BEAT_S)
             self._ending.wait(PUBLISH_S)
 

@@ -19,8 +19,19 @@ def worker(
     context: typer.Context,
     bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
     bench_file: BenchFile = None,
+    analyse: Annotated[
+        bool, typer.Option("--analyse", help="Drive no bench: run batches of analyses, on any machine")
+    ] = False,
+    at_once: Annotated[int, typer.Option(min=1, max=256, help="With --analyse: processes, one thread each")] = 1,
 ) -> None:
     """Run the jobs of a bench, without HTTP, until SIGTERM or SIGINT. Its running job is left for the next start."""
+    if analyse:
+        from bench_service.cli.processes.analysing import analyse_until_ended
+
+        if bench is not None or bench_file is not None:
+            raise Refused("--analyse: such a worker drives no bench; leave --bench and --bench-file out")
+        analyse_until_ended(context.obj, at_once, announce)
+        return
     from bench_service.cli.processes.working import work
 
     settings = of_bench(context.obj, bench, bench_file)
@@ -79,7 +90,7 @@ def queue(
     from bench_service.cli.printing.tables import queue_table
 
     with connect(context.obj, server, drive=False) as client:
-        path = f"/api/v1/benches/{segment(_bench_of(client, context.obj, bench))}/queue"
+        path = f"/api/v1/benches/{segment(bench_of(client, context.obj, bench))}/queue"
         found = call(client, "GET", path, ("bench", "entries"))
     if as_json:
         print(json.dumps(found, indent=2))
@@ -101,7 +112,7 @@ def release(
 ) -> None:
     """Release a stop of a bench, once the bench is known to be safe; its jobs go on when no stop stands."""
     with connect(context.obj, server, drive=False) as client:
-        name = _bench_of(client, context.obj, bench)
+        name = bench_of(client, context.obj, bench)
         path = f"/api/v1/benches/{segment(name)}"
         if stop_id is None:
             stop_id = _only_stop(call(client, "GET", path, ("stops",))["stops"], name)
@@ -112,7 +123,7 @@ def release(
     console.print(f"stop {stop_id} of bench {name} is released{left}", soft_wrap=True)
 
 
-def _bench_of(client: "httpx.Client", settings: Settings, bench: str | None) -> str:
+def bench_of(client: "httpx.Client", settings: Settings, bench: str | None) -> str:
     """Return the bench that is meant: the given one, the only one, or that of the settings. Raises `Refused`."""
     if bench is not None:
         return bench

@@ -10,6 +10,7 @@ from bench_service.cli.asking.client import RESULT, call, check, connect, segmen
 from bench_service.cli.asking.lists import newest, show
 from bench_service.cli.completion import method_names
 from bench_service.cli.files import check_folder, whole_file
+from bench_service.cli.groups.batches import selection_of, submit
 from bench_service.cli.options import NO_ITEMS, AsJson, Limit, Server, Set, console, parameter
 
 Labelled = Annotated[list[str], typer.Option("--label", help="Only of jobs with name or name=text; may be repeated")]
@@ -25,10 +26,23 @@ def analyse(
     recording: Annotated[list[str], typer.Option(help="Id of a recording; may be repeated")] = NO_ITEMS,
     calibration: Annotated[list[str], typer.Option(help="Id of a calibration; may be repeated")] = NO_ITEMS,
     set_: Set = NO_ITEMS,
+    where: Annotated[
+        list[str],
+        typer.Option(
+            help="A batch over recordings that meet it: unit, procedure, job, verdict, since, until, text, simulated, "
+            "label or id = value; may be repeated"
+        ),
+    ] = NO_ITEMS,
+    each: Annotated[str, typer.Option(help="With --where, analysed together: recording, job or unit")] = "recording",
+    priority: Annotated[int, typer.Option(min=0, max=100, help="With --where: among batches, smaller first")] = 10,
+    wait: Annotated[bool, typer.Option(help="With --where: watch the batch until its end")] = True,
     server: Server = None,
     as_json: AsJson = False,
 ) -> int:
-    """Run a method on stored recordings or calibrations; prints its coefficients, checks and verdict."""
+    """Run a method on stored recordings or calibrations; prints its coefficients, checks and verdict.
+
+    With --where: over all recordings that meet the conditions, each on its own, as a batch.
+    """
     from bench_service.cli.asking.watching import exit_code
 
     body = {
@@ -38,6 +52,9 @@ def analyse(
         "parameters": dict(map(parameter, set_)),
     }
     with connect(context.obj, server, drive=False) as client:
+        if where:
+            more = {"selection": selection_of(where), "each": each, "priority": priority}
+            return submit(client, {**body, **more}, wait or server is None, as_json)
         result = call(client, "POST", "/api/v1/analyses", RESULT, json=body)
     _print_result(method, result, as_json)
     return exit_code(result["verdict"])
@@ -113,6 +130,9 @@ def recordings(
 def results(
     context: typer.Context,
     result: Annotated[str | None, typer.Argument(help="Id of one result, to be shown whole")] = None,
+    budget: Annotated[
+        str | None, typer.Option(help="With an id: only the uncertainty budget of this coefficient (gyro.K11)")
+    ] = None,
     name: Annotated[str | None, typer.Option(help="Only of this procedure or method")] = None,
     unit: Annotated[str | None, typer.Option(help="Only of this unit")] = None,
     verdict: Verdict = None,
@@ -131,10 +151,22 @@ def results(
     with connect(context.obj, server, drive=False) as client:
         if result is not None:
             found = call(client, "GET", f"/api/v1/results/{segment(result)}", (*RESULT, "name"))
+            if budget is not None and not as_json:
+                _print_budget(found, budget)
+                return
             _print_result(found["name"], found, as_json)
             return
         page = newest(client, "/api/v1/results", limit, {**query, "label": label, "text": text})
     show(page if as_json else page["items"], as_json, result_table)
+
+
+def _print_budget(result: dict[str, Any], coefficient: str) -> None:
+    from bench_service.cli.printing.tables import budget_table
+
+    try:
+        console.print(budget_table(result["document"], coefficient))
+    except KeyError as error:
+        raise typer.BadParameter(f"{coefficient} is not among {error.args[0]}", param_hint="--budget") from error
 
 
 def _print_result(name: str, result: dict[str, Any], as_json: bool) -> None:

@@ -11,7 +11,7 @@ from bench_service.cli.printing.moments import moment
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.units import DISPLAY
 
-CURRENT = ("gyro_calibration", "accelerometer_calibration", "thermal_correction", "converter")
+CURRENT = ("gyro_calibration", "accelerometer_calibration", "thermal_correction", "converter", "thermometers")
 """Fields of a unit that name what is current of it."""
 
 
@@ -42,14 +42,39 @@ def coefficient_table(triads: list[dict[str, Any]], truths: list[dict[str, Any]]
 def check_table(document: dict[str, Any]) -> Table:
     """Table of checks, each value next to its limit."""
     table = Table(title="Checks")
-    for column in ("check", "value", "limit", "unit", "outcome"):
+    for column in ("check", "value", "U", "limit", "unit", "outcome"):
         table.add_column(column, justify="left" if column in ("check", "unit", "outcome") else "right")
     for check in document.get("checks", []):
         limit = check["limit"]
         bounds = [f"≥ {limit['minimum']:.4g}"] if limit["minimum"] is not None else []
         bounds += [f"≤ {limit['maximum']:.4g}"] if limit["maximum"] is not None else []
-        outcome = Text("pass", style="green") if check["passed"] else Text("fail", style="red")
-        table.add_row(check["name"], f"{check['value']:.4g}", ", ".join(bounds), limit["unit"], outcome)
+        made = check.get("decision") or {}
+        said = made.get("outcome") or ("pass" if check["passed"] else "fail")
+        outcome = Text(said, style="green" if check["passed"] else "red")
+        expanded = "" if made.get("expanded_uncertainty") is None else f"{made['expanded_uncertainty']:.2g}"
+        table.add_row(check["name"], f"{check['value']:.4g}", expanded, ", ".join(bounds), limit["unit"], outcome)
+    if (statement := document.get("statement")) is not None:
+        table.caption = f"{statement['outcome']}; decision rule: {statement['rule']}; U: expanded uncertainty"
+    return table
+
+
+def budget_table(document: dict[str, Any], coefficient: str) -> Table:
+    """Uncertainty budget of one coefficient, named as in the result ("gyro.K11"). Raises `KeyError` with the names."""
+    found = {b["coefficient"]: b for triad in document.get("triads", []) for b in triad.get("budgets", [])}
+    if coefficient not in found:
+        raise KeyError(", ".join(found) or "none: the result has no budget")
+    budget = found[coefficient]
+    table = Table(title=f"Uncertainty budget of {coefficient}, {budget['unit']}")
+    for column in ("source", "value", "unit", "distribution", "divisor", "sensitivity", "contribution", "ν"):
+        table.add_column(column, justify="left" if column in ("source", "unit", "distribution") else "right")
+    for row in budget["rows"]:
+        figures = (f"{row[name]:.3g}" for name in ("divisor", "sensitivity", "contribution"))
+        freedom = "∞" if row["degrees_of_freedom"] is None else f"{row['degrees_of_freedom']:.3g}"
+        table.add_row(row["source"], f"{row['value']:.3g}", row["unit"], row["distribution"], *figures, freedom)
+    freedom = "∞" if budget["degrees_of_freedom"] is None else f"{budget['degrees_of_freedom']:.3g}"
+    total = f"{budget['standard_uncertainty']:.3g}"
+    table.add_row("root sum of squares", "", "", "", "", "", total, freedom, style="bold")
+    table.caption = f"U = {budget['expanded_uncertainty']:.3g} {budget['unit']}, k = {budget['coverage_factor']:.3g}"
     return table
 
 
@@ -117,6 +142,16 @@ def result_table(results: list[dict[str, Any]]) -> Table:
         table.add_row(
             one["id"], Text(one["name"]), Text(one["unit"] or "–"), one["verdict"], job, moment(one["created_at"])
         )
+    return table
+
+
+def batch_table(batches: list[dict[str, Any]]) -> Table:
+    """Table of batches of analyses, newest first."""
+    table = _table("batch", "method", "state", "analyses", "done", "reused", "failed", "submitted")
+    for one in batches:
+        numbers = (str(one["counts"][state]) for state in ("done", "reused", "failed"))
+        made = moment(one["created_at"])
+        table.add_row(one["id"], Text(one["method"]), one["state"], str(one["total"]), *numbers, made)
     return table
 
 
@@ -205,4 +240,33 @@ def _table(*columns: str, title: str | None = None) -> Table:
     table = Table(title=title)
     for number, column in enumerate(columns):
         table.add_column(column, no_wrap=number == 0)
+    return table
+
+
+def live_table(bench: str, live: dict[str, Any]) -> Table:
+    """Table of a bench's live readings; one row a reading."""
+    table = Table(title=f"bench {bench}, {moment(live['at'])}")
+    table.add_column("reading")
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("unit")
+    devices, manual = live["devices"], live["manual"]
+    rates = devices["rates_deg_s"] or (None, None, None)
+    for axis, rate in zip(("outer", "middle", "inner"), rates, strict=True):
+        table.add_row(f"{axis} angle", f"{devices[f'{axis}_deg']:.4f}", "deg")
+        if rate is not None:
+            table.add_row(f"{axis} rate", f"{rate:.4f}", "deg/s")
+    table.add_row("table", "moves" if devices["moving"] else "rests", "")
+    chamber = devices["chamber"]
+    if chamber is not None:
+        table.add_row("air", f"{chamber['air_c']:.2f}", "°C")
+        target = "off" if chamber["target_c"] is None else f"{chamber['target_c']:.2f}"
+        table.add_row("set point", target, "°C")
+    table.add_row("supply", "on" if devices["unit_on"] else "off", "")
+    for name, unit in (("voltage_v", "V"), ("current_a", "A")):
+        if devices[name] is not None:
+            table.add_row(f"supply {name.partition('_')[0]}", f"{devices[name]:.3f}", unit)
+    for sensor in [] if manual is None else manual["sensors"]:
+        table.add_row(sensor["name"], f"{sensor['value']:.6g}", sensor["unit"])
+    for word in devices["status"]:
+        table.add_row(f"{word['device']} {word['name']}", word["raw"], ", ".join(word["bits"]))
     return table

@@ -3,6 +3,7 @@
 import errno
 import signal
 import socket
+import sys
 import threading
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
@@ -14,6 +15,7 @@ import uvicorn
 from bench_service.api.access.identify import Proxies, behind_proxies
 from bench_service.api.http.door import Door, may_listen
 from bench_service.app import create_app, open_service
+from bench_service.cli.processes.allocator import few_arenas
 from bench_service.cli.processes.connections import AT_ONCE, BoundedConnections, lengthen_queue, raise_descriptors
 from bench_service.cli.processes.logs import set_up
 from bench_service.cli.processes.private_files import protect
@@ -26,6 +28,9 @@ from bench_service.wall_clock import pause
 
 EMBEDDED = "embedded"
 """Name that commands give to a service in their own process, which they reach over a socket file."""
+SWITCH_S = 0.0005
+"""Time after which a thread that computes gives way to another one [s]. A stop passes through several threads, and with
+the interpreter's 5 ms each of these handovers may wait so long while a job runs at full speed."""
 GRACE_S = 3
 """Time that open connections may take to end at shutdown [s]."""
 
@@ -66,7 +71,9 @@ def _opened(
     settings: Settings, drive: bool, socket_file: Path | None, level: str
 ) -> Generator[tuple[uvicorn.Server, BenchService]]:
     set_up(settings, level)
+    sys.setswitchinterval(SWITCH_S)
     protect(settings)
+    few_arenas()
     BoundedConnections.most = raise_descriptors()
     if socket_file is None:
         check_address(settings)

@@ -17,7 +17,7 @@ from bench_service.drivers.interface.sections import (
     Wire,
 )
 from procedures.bench import BenchDescription
-from procedures.bench.chamber import ChamberLimits
+from procedures.bench.chamber import ChamberAccuracy, ChamberLimits
 from procedures.bench.current_source import CurrentSourceLimits
 from procedures.bench.declared_device import DeclaredCertificate, DeclaredDevice
 from procedures.bench.description import AxisLimits, TableAccuracy
@@ -57,6 +57,7 @@ def described(
         simulated=any(file.simulated(kind) for kind in ("turntable", "supply", "unit_link", "chamber")),
         title=rest.bench.title,
         chamber=_chamber(sections.get("chamber"), simulated),
+        chamber_accuracy=_chamber_accuracy(sections.get("chamber"), simulated),
         current_source=_current(sections.get("current_source"), simulated),
         supply=_supply(sections["supply"], simulated),
         sinusoidal=table.sinusoidal if real_table or simulated is None else simulated.sinusoidal,
@@ -67,11 +68,12 @@ def described(
 
 
 def _no_thermal_jobs(file: BenchFile) -> str:
-    """The reason why no job that reads temperatures runs on a bench whose unit and chamber do not share their air."""
-    if "chamber" not in file.devices or file.within("unit_link") == file.within("chamber"):
+    """The reason why no job that reads temperatures runs on a bench whose real unit feels no air.
+
+    A simulated unit follows the air of a real chamber (`bench_service.drivers.wired.mixed_air`).
+    """
+    if "chamber" not in file.devices or file.within("unit_link") or not file.within("chamber"):
         return ""
-    if file.within("unit_link"):
-        return "the unit is simulated and the chamber is real: the simulated unit does not feel the real chamber's air"
     return "the unit is real and the chamber is simulated: nothing warms or cools the unit"
 
 
@@ -123,6 +125,15 @@ def _chamber(section: DeviceSection | None, simulated: BenchDescription | None) 
         min(declared.ramp_c_min, own.ramp_c_min),
         own.ambient_c,
     )
+
+
+def _chamber_accuracy(section: DeviceSection | None, simulated: BenchDescription | None) -> ChamberAccuracy | None:
+    """Accuracy as the section declares it, else that of a simulated chamber."""
+    if not isinstance(section, ChamberSection):
+        return None
+    if section.accuracy is not None:
+        return ChamberAccuracy(**section.accuracy.model_dump())
+    return None if simulated is None or isinstance(section, Wire) else simulated.chamber_accuracy
 
 
 def _supply(section: DeviceSection, simulated: BenchDescription | None) -> SupplyLimits | None:

@@ -4,15 +4,18 @@ Not confirmed on a device. Limits go out before a demand, a demand before its mo
 """
 
 import asyncio
+from collections.abc import Callable
 from math import sqrt
 
 from bench_service.drivers.devices.acutrol_link import AcutrolSection
 from bench_service.drivers.devices.acutrol_watch import POLL_S, STOPPED, WatchedTable
 from bench_service.drivers.devices.table_axes import AXES, TurnProgress, angles_of, declared, steps, wrapped
 from bench_service.drivers.interface.driver import DeviceDriver, Found, narrowed
+from procedures.bench.description import BenchDescription
 from procedures.bench.device import DeviceIdentity
 from procedures.bench.errors import DeviceFault, NotSettled, OutOfRange, Stopped
 from procedures.bench.turntable import TableReading
+from procedures.core.constant_rate import ConstantRate
 from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
@@ -38,7 +41,9 @@ class AcutrolTurntable(WatchedTable):
         """Read encoders and status words; see the port."""
         states, status = await self._states(), await self._link.status()
         moving = self._under_way() or any(abs(s.rate_deg_s) > self._section.rest_rate_deg_s for s in states)
-        return TableReading(self._clock.now_s(), angles_of([s.position_deg for s in states]), moving, status)
+        outer, middle, inner = (s.rate_deg_s for s in states)
+        angles = angles_of([s.position_deg for s in states])
+        return TableReading(self._clock.now_s(), angles, moving, status, rates_deg_s=(outer, middle, inner))
 
     async def move_to(self, angles: TableAngles) -> None:
         """Move all axes, settle; see the port."""
@@ -57,24 +62,45 @@ class AcutrolTurntable(WatchedTable):
 
     async def command_turn(self, turn: Turn) -> None:
         """Begin whole turns of one axis; see the port. They are followed from here on, while time passes elsewhere."""
-        index = AXES.index(turn.axis)
-        demand = self._begin()
+        index, demand = AXES.index(turn.axis), self._begin()
+        rate = turn.rate_deg_s if turn.turns > 0 else -turn.rate_deg_s
+        start = await self._begin_rate(
+            index, rate, turn.ramp_s, demand, lambda bench, here: bench.violations(here, turn)
+        )
+        self._turning = asyncio.create_task(self._follow(turn, index, start, demand))
+
+    async def command_rate(self, rate: ConstantRate) -> None:
+        """Begin a constant rate of one axis; see the port. It is watched and ended from here on."""
+        index, demand = AXES.index(rate.axis), self._begin()
+        start = await self._begin_rate(
+            index, rate.rate_deg_s, rate.ramp_s, demand, lambda bench, here: bench.rate_violations(here, rate)
+        )
+        self._turning = asyncio.create_task(self._follow_rate(rate, index, start, demand))
+
+    async def _begin_rate(
+        self,
+        index: int,
+        rate_deg_s: float,
+        ramp_s: float,
+        demand: int,
+        violations: Callable[[BenchDescription, TableAngles], tuple[str, ...]],
+    ) -> list[float]:
+        """Begin a rate of an axis within limits, from rest; the angles where the axes stood. Ends the demand if not."""
         try:
             states = await self._require_ready()
-            here = angles_of([state.position_deg for state in states])
-            self._require_allowed(declared(narrowed(self._section, self._link.own)).violations(here, turn))
-            rate = turn.rate_deg_s if turn.turns > 0 else -turn.rate_deg_s
+            here = [state.position_deg for state in states]
+            self._require_allowed(violations(declared(narrowed(self._section, self._link.own)), angles_of(here)))
             await self._prepare_brake(demand)
             self._can_brake = False
-            await self._link.limit("rate", index, turn.rate_deg_s, turn.rate_deg_s / turn.ramp_s)
+            await self._link.limit("rate", index, abs(rate_deg_s), abs(rate_deg_s) / ramp_s)
             self._require_current(demand)
-            await self._link.demand("rate", index, rate)
+            await self._link.demand("rate", index, rate_deg_s)
             self._require_current(demand)
             await self._link.mode("rate", [index])
+            return here
         except BaseException:
             self._end(demand)
             raise
-        self._turning = asyncio.create_task(self._follow(turn, index, [s.position_deg for s in states], demand))
 
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
         """Refuse; see the port: how this controller begins a sinusoid is not known. Raises `OutOfRange`."""
@@ -101,8 +127,9 @@ class AcutrolTurntable(WatchedTable):
         if await self._rests():
             return
         longest = max(axis.rate_deg_s / axis.acceleration_deg_s2 for axis in self._axes())
+        braked: list[int] = []
         try:
-            await self._brake()
+            await self._brake(braked)
         except DeviceFault:  # an open interlock refuses, and brakes by itself: rest is what counts
             await self._wait_for_rest(None, longest, self._demand)
             return
@@ -111,8 +138,9 @@ class AcutrolTurntable(WatchedTable):
             await self._link.mode("off")
             return
         for index, state in enumerate(await self._link.states()):
-            await self._link.demand("position", index, state.position_deg)
-        await self._link.mode("position")
+            if index in braked or await self._link.mode_of(index) != "position":  # an axis that holds goes on holding
+                await self._link.demand("position", index, state.position_deg)
+                await self._link.mode("position", [index])
 
     async def _prepare_brake(self, demand: int) -> None:
         """Set the limits of rate mode before a motion, so that a stop needs two statements an axis."""
@@ -123,11 +151,12 @@ class AcutrolTurntable(WatchedTable):
             await self._link.limit("rate", index, axis.rate_deg_s, axis.acceleration_deg_s2)
         self._can_brake = True
 
-    async def _brake(self) -> None:
-        """Take the rate away from each axis that moves, the fastest one first."""
+    async def _brake(self, braked: list[int]) -> None:
+        """Take the rate away from each axis that moves, the fastest one first, and note it as `braked`."""
         states = await self._link.states()
         moving = [k for k, state in enumerate(states) if abs(state.rate_deg_s) > self._section.rest_rate_deg_s]
         for index in sorted(moving, key=lambda k: -abs(states[k].rate_deg_s)):
+            braked.append(index)
             await self._link.demand("rate", index, 0.0)
             await self._link.mode("rate", [index])
 
@@ -161,17 +190,7 @@ class AcutrolTurntable(WatchedTable):
         try:
             sign = 1.0 if turn.turns > 0 else -1.0
             progress = TurnProgress(start[index], sign * turn.rate_deg_s, self._clock.now_s())
-            until_stop = abs(turn.angle_deg) - 0.5 * turn.rate_deg_s * turn.ramp_s
-            while True:
-                states, now = await self._link.states(), self._clock.now_s()
-                left_s = (until_stop - sign * progress.read(states[index].position_deg, now)) / turn.rate_deg_s
-                if left_s <= POLL_S:
-                    break
-                await self._clock.sleep(min(POLL_S, left_s))
-            await self._clock.sleep(max(0.0, left_s))
-            self._require_current(demand)
-            await self._link.demand("rate", index, 0.0)
-            stopped = self._clock.now_s()
+            stopped = await self._stop_after(progress, index, turn.angle_deg, turn.ramp_s, demand)
             await self._wait_for_rest(None, turn.ramp_s, demand)
             rested = self._clock.now_s()
             not_turned = progress.rate_deg_s * (rested - stopped - 0.5 * turn.ramp_s)
@@ -183,6 +202,38 @@ class AcutrolTurntable(WatchedTable):
             raise
         finally:
             self._end(demand)
+
+    async def _follow_rate(self, rate: ConstantRate, index: int, start: list[float], demand: int) -> None:
+        """End a rate once its angle is covered, and hold the axis where it comes to rest."""
+        try:
+            progress = TurnProgress(start[index], rate.rate_deg_s, self._clock.now_s())
+            await self._stop_after(progress, index, rate.angle_deg, rate.ramp_s, demand)
+            await self._wait_for_rest(None, rate.ramp_s, demand)
+            self._require_current(demand)
+            await self._link.demand("position", index, (await self._link.states())[index].position_deg)
+            await self._link.mode("position", [index])
+        except BaseException:
+            await self._stop_axis(index)
+            raise
+        finally:
+            self._end(demand)
+
+    async def _stop_after(
+        self, progress: TurnProgress, index: int, angle_deg: float, ramp_s: float, demand: int
+    ) -> float:
+        """Take the rate away so that the axis rests once it has covered an angle; the bench time of that [s]."""
+        rate, sign = abs(progress.rate_deg_s), 1.0 if angle_deg > 0.0 else -1.0
+        until_stop = abs(angle_deg) - 0.5 * rate * ramp_s
+        while True:
+            states, now = await self._link.states(), self._clock.now_s()
+            left_s = (until_stop - sign * progress.read(states[index].position_deg, now)) / rate
+            if left_s <= POLL_S:
+                break
+            await self._clock.sleep(min(POLL_S, left_s))
+        await self._clock.sleep(max(0.0, left_s))
+        self._require_current(demand)
+        await self._link.demand("rate", index, 0.0)
+        return self._clock.now_s()
 
     async def _return(self, turn: Turn, index: int, start: list[float], left_deg: float, demand: int) -> None:
         """Lead the axis that has turned by what is left of its turns, the others compared with where they stood."""

@@ -120,10 +120,19 @@ class ChamberBounds(Section):
         return self
 
 
+class ChamberTrust(Section):
+    """Accuracy of the chamber; see `procedures.bench.chamber.ChamberAccuracy`."""
+
+    place_sd_c: NonNegative
+    soak_sd_c: NonNegative = 0.0
+
+
 class ChamberSection(DeviceSection):
     """Section ``[chamber]`` of a bench file."""
 
     limits: ChamberBounds | None = None
+    accuracy: ChamberTrust | None = None
+    """Standard uncertainties by its certificate; needed to calibrate a unit's thermometers. None: not declared."""
     limiter_c: Finite | None = None
     """Setting of the independent over-temperature limiter, for the record."""
     on_safe: Literal["ambient", "hold", "off"] = "ambient"

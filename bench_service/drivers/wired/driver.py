@@ -22,6 +22,7 @@ from bench_service.drivers.wired.devices import WiredDevices, safe_state
 from bench_service.drivers.wired.entered_environment import EnteredEnvironment
 from bench_service.drivers.wired.guarded import LaunchedUnit, LaunchingSupply
 from bench_service.drivers.wired.mixed import CatchUp, MixedClock, TwinSupply, TwinTurntable
+from bench_service.drivers.wired.mixed_air import AiredClock, AiredUnit, RealAir
 from bench_service.drivers.wired.opening import opened, survey
 from bench_service.drivers.wired.parallel import named
 from bench_service.model.errors import NotMounted
@@ -168,13 +169,16 @@ class BenchFileDriver:
         description = _free_axes(self._description) if has_table else self._description
         world = self._simulated.world(unit, seed, needs, description, wall)
         seen = ObservedBench(world, CatchUp(world.clock))
-        bench.clock = MixedClock(wall, world.clock)
+        bench.clock = clock = MixedClock(wall, world.clock)
         simulated_unit = self._file.within("unit_link")
         bench.turntable = _or_twin(bench.turntable, seen.turntable, world.turntable, simulated_unit, TwinTurntable)
         bench.supply = _or_twin(bench.supply, seen.supply, world.supply, simulated_unit, TwinSupply)
         bench.imu = bench.imu or seen.imu
         if self._file.within("chamber"):
             bench.chamber = seen.chamber
+        elif simulated_unit and bench.chamber is not None and world.chamber is not None:
+            air = RealAir(bench.chamber, clock, world.chamber.follow)
+            bench.clock, bench.imu = AiredClock(clock, air), AiredUnit(bench.imu, air)  # pyright: ignore[reportAttributeAccessIssue]
         if self._file.within("current_source"):
             bench.current_source = seen.current_source
         bench.operator = seen.operator

@@ -9,6 +9,7 @@ from bench_service.drivers.interface.sections import DeviceSection
 from bench_service.drivers.wired.read_back import unsafe_reading
 from procedures.bench.errors import DeviceFault
 from procedures.bench.imu import Stream
+from procedures.core.constant_rate import ConstantRate
 from procedures.core.recording import Station
 from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
@@ -43,6 +44,10 @@ class GuardedTurntable(Guarded):
     async def command_turn(self, turn: Turn) -> None:
         await self._need_home()
         await self._device.command_turn(turn)
+
+    async def command_rate(self, rate: ConstantRate) -> None:
+        await self._need_home()
+        await self._device.command_rate(rate)
 
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
         await self._need_home()

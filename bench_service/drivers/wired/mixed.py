@@ -12,6 +12,7 @@ from typing import Any, Protocol
 from procedures.bench.device import DeviceIdentity
 from procedures.bench.supply import SupplyLimits, SupplyReading
 from procedures.bench.turntable import TableReading
+from procedures.core.constant_rate import ConstantRate
 from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
@@ -84,6 +85,10 @@ class TwinTurntable:
     async def command_turn(self, turn: Turn) -> None:
         await self._real.command_turn(turn)
         await self._below.command_turn(turn)
+
+    async def command_rate(self, rate: ConstantRate) -> None:
+        await self._real.command_rate(rate)
+        await self._below.command_rate(rate)
 
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
         await self._real.command_sinusoid(sinusoid)

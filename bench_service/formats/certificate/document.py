@@ -30,11 +30,17 @@ UNITS = {
     "count/(rad/s)": r"\second\radian\tothe{-1}",
     "count/(m/s^2)": r"\second\tothe{2}\metre\tothe{-1}",
 }
-CONFORMITY = {"pass": "pass", "fail": "fail"}
-"""Verdict -> its word in a certificate; others have none there, and are said in text."""
+CONFORMITY = {
+    "pass": "pass",
+    "conditional pass": "conditionalPass",
+    "conditional fail": "conditionalFail",
+    "fail": "fail",
+}
+"""Verdict, or outcome of a statement of conformity -> its word in a certificate; others have none and are text."""
 FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
 """Characters that XML cannot hold."""
 DECISION_RULE = "simple acceptance: the value is compared with its limit, its uncertainty is not taken off"
+"""Rule of results that were stored before their rule was."""
 
 
 def certificate(document: Mapping[str, Any], text: str, laboratory: Laboratory, software: str) -> Element:
@@ -139,8 +145,10 @@ def _measurement(parent: Element, triad: Mapping[str, Any], laboratory: Laborato
     _coefficients(_si(quantity, "realListXMLList"), triad)
     meta = _dcc(_dcc(parent, "measurementMetaData"), "metaData")
     _worded(meta, "name", "verdict")
-    _worded(meta, "description", f"verdict {triad['validity']['verdict']}; decision rule: {DECISION_RULE}")
-    conformity = CONFORMITY.get(triad["validity"]["verdict"] or "")
+    statement = lineage.get("statement") or {}
+    outcome, rule = statement.get("outcome") or triad["validity"]["verdict"], statement.get("rule") or DECISION_RULE
+    _worded(meta, "description", f"verdict {outcome}; decision rule: {rule}")
+    conformity = CONFORMITY.get(outcome or "")
     if conformity is not None:
         _dcc(meta, "conformity", conformity)
 

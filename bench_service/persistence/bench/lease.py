@@ -26,6 +26,10 @@ from bench_service.persistence.database import TCP, Database, storage_errors
 PASSING_S = 5.0
 """Time for which a process that starts waits for a supervisor that is just making the bench safe [s]."""
 SUPERVISOR = "supervisor"
+ANALYSES = "analyses"
+"""Role of a worker that analyses. A host of such workers may vanish with its network, so the server looks after the
+connection too and drops one that does not answer for ten seconds: the tasks of that worker go to another one."""
+_SERVER_LOOKS = "-c tcp_keepalives_idle=5 -c tcp_keepalives_interval=2 -c tcp_keepalives_count=3"
 
 
 class BenchLease(ABC):
@@ -166,6 +170,7 @@ class ServerLease(BenchLease):
             isolation_level="AUTOCOMMIT",
             connect_args={
                 **TCP,
+                **({"options": _SERVER_LOOKS} if role == ANALYSES else {}),
                 "application_name": f"bench {bench_id} {role} pid {os.getpid()} on {socket.gethostname()}"[:63],
             },
         )

@@ -58,11 +58,12 @@ class SqlBenchRegistry:
             rows = session.scalars(select(BenchRow).order_by(BenchRow.id)).all()
         return tuple(BENCH.validate_python(row.document) for row in rows)
 
-    def stop_bench(self, stop: BenchStop) -> None:
-        def once() -> None:
+    def stop_bench(self, stop: BenchStop) -> BenchStop:
+        def once() -> BenchStop:
             with self._database.write() as session:
-                if session.get(BenchStopRow, stop.id) is not None:
-                    return
+                stored = session.get(BenchStopRow, stop.id)
+                if stored is not None:
+                    return _stop_of_row(stored)
                 self._database.one_at_a_time(session, f"stop bench {stop.bench}")
                 standing = select(func.count()).select_from(BenchStopRow).where(BenchStopRow.bench == stop.bench)
                 if (session.scalar(standing.where(_STANDS)) or 0) >= MOST_STANDING:
@@ -70,9 +71,11 @@ class SqlBenchRegistry:
                         f"{MOST_STANDING} stops of bench {stop.bench!r} stand already and keep it from working; this "
                         "one is stored once one of them is released"
                     )
-                session.add(_row_of_stop(stop))
+                row = _row_of_stop(stop)
+                session.add(row)
+                return _stop_of_row(row)
 
-        again_after_conflict(once)
+        return again_after_conflict(once)
 
     def stop_bench_once(self, stop: BenchStop) -> None:
         same = select(BenchStopRow.id).where(BenchStopRow.bench == stop.bench, BenchStopRow.reason == stop.reason)
@@ -121,7 +124,10 @@ def standing_stops(session: Session, bench_id: str, limit: int | None = None) ->
 
 
 def _row_of_stop(stop: BenchStop) -> BenchStopRow:
-    return BenchStopRow(**{name: getattr(stop, name) for name in _FIELDS})
+    fields = {name: getattr(stop, name) for name in _FIELDS}
+    return BenchStopRow(
+        **{**fields, "entered_at": wall_clock.now()}
+    )  # now, not before: a lock may have been waited for
 
 
 def _stop_of_row(row: BenchStopRow) -> BenchStop:

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from sqlalchemy import select
 
 from bench_service.evidence.recordings import DamagedChunk
-from bench_service.model.errors import DamagedDatabase
+from bench_service.model.errors import DamagedDatabase, DamagedRecording
 from bench_service.persistence.database import Database
+from bench_service.persistence.evidence.raw_places import payload_elsewhere
 from bench_service.persistence.tables.evidence import ChunkRow
 
 ALTERED = "its bytes do not have the hash that they were stored with"
@@ -40,4 +41,10 @@ def _fault(database: Database, recording_id: str, number: int) -> str:
         return str(error)
     if row is None:
         return MISSING
+    if not row.payload:
+        try:
+            payload_elsewhere(database, recording_id, number, row.sha256)
+        except DamagedRecording as error:
+            return str(error)
+        return ""
     return "" if hashlib.sha256(row.payload).hexdigest() == row.sha256 else ALTERED

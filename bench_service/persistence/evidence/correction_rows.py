@@ -1,26 +1,45 @@
 """Conversion of corrections to rows and back, and their place in a unit's history. No transaction begins here."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 from pydantic import TypeAdapter
-from sqlalchemy import select, update
+from sqlalchemy import ColumnElement, select, update
 from sqlalchemy.orm import Session
 
 from bench_service import wall_clock
 from bench_service.evidence.corrections import StoredCorrection
 from bench_service.mapping import copied
+from bench_service.model.calibrations import Act, Approval, Decision
 from bench_service.model.errors import NotFound
 from bench_service.model.records import StoredResult
-from bench_service.persistence.tables.evidence import CorrectionRow, ResultCorrectionRow
+from bench_service.persistence.tables.evidence import CorrectionDecisionRow, CorrectionRow, ResultCorrectionRow
 from procedures.core.unit_correction import UnitCorrection
 
 CORRECTION = TypeAdapter(UnitCorrection)
 
 
-def correction_of_row(row: CorrectionRow) -> StoredCorrection:
-    """Convert a row to its correction."""
-    correction = CORRECTION.validate_python(row.document)
-    return copied(StoredCorrection, row, current=row.is_current, correction=correction)
+def correction_of_row(row: CorrectionRow, decisions: Sequence[CorrectionDecisionRow] = ()) -> StoredCorrection:
+    """Convert a row with its decisions, oldest first, to its correction."""
+    return copied(
+        StoredCorrection,
+        row,
+        current=row.is_current,
+        correction=CORRECTION.validate_python(row.document),
+        approval=Approval(row.approval),
+        decisions=tuple(copied(Decision, d, calibration_id=d.correction_id, act=Act(d.act)) for d in decisions),
+    )
+
+
+def corrections_where(session: Session, *conditions: ColumnElement[bool]) -> list[StoredCorrection]:
+    """Corrections under some conditions with their decisions, oldest first."""
+    rows = session.scalars(select(CorrectionRow).where(*conditions).order_by(CorrectionRow.id)).all()
+    decisions: dict[str, list[CorrectionDecisionRow]] = defaultdict(list)
+    if rows:
+        of = CorrectionDecisionRow.correction_id.in_([row.id for row in rows])
+        for decision in session.scalars(select(CorrectionDecisionRow).where(of).order_by(CorrectionDecisionRow.id)):
+            decisions[decision.correction_id].append(decision)
+    return [correction_of_row(row, decisions[row.id]) for row in rows]
 
 
 def check_corrections(session: Session, result: StoredResult) -> None:
@@ -64,6 +83,8 @@ def add_corrections(
                 is_current=make_current,
                 simulated=result.simulated,
                 document=CORRECTION.dump_python(correction, mode="json"),
+                approval=Approval.OPEN.value,
+                valid_until=None,
             )
         )
         session.flush()

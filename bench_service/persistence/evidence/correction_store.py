@@ -1,17 +1,21 @@
 """Correction sets in SQL: history and choice. They come in with the result that gives them (`result_store`)."""
 
-from sqlalchemy import select
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import select, update
 from sqlalchemy.orm import Session
 
 from bench_service import wall_clock
 from bench_service.evidence.corrections import StoredCorrection
+from bench_service.model.calibrations import Act, Decider
 from bench_service.model.errors import NotFound
 from bench_service.model.records import Idempotency, Page
 from bench_service.persistence.database import Database
-from bench_service.persistence.evidence.correction_rows import correction_of_row, retire_current
+from bench_service.persistence.evidence.correction_rows import corrections_where, retire_current
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.pages import page
-from bench_service.persistence.tables.evidence import CorrectionRow, ResultCorrectionRow
+from bench_service.persistence.tables.evidence import CorrectionDecisionRow, CorrectionRow, ResultCorrectionRow
 from procedures.core.unit_correction import CorrectionKind
 
 
@@ -28,19 +32,18 @@ class SqlCorrectionStore:
         if kind is not None:
             query = query.where(CorrectionRow.kind == kind)
         with self._database.read() as session:
-            return page(session, query, CorrectionRow.id, after, limit, correction_of_row)
+            found = page(session, query, CorrectionRow.id, after, limit, lambda row: row.id)
+            known = {c.id: c for c in corrections_where(session, CorrectionRow.id.in_(found.items))}
+            return Page(tuple(known[i] for i in found.items), found.next)
 
     def get(self, unit: str, correction_id: str) -> StoredCorrection:
         with self._database.read() as session:
-            return correction_of_row(_found(session, unit, correction_id))
+            return _one(session, unit, correction_id)
 
     def current(self, unit: str, kind: CorrectionKind) -> StoredCorrection | None:
-        query = select(CorrectionRow).where(
-            CorrectionRow.unit == unit, CorrectionRow.kind == kind, CorrectionRow.is_current
-        )
+        of_kind = (CorrectionRow.unit == unit, CorrectionRow.kind == kind, CorrectionRow.is_current)
         with self._database.read() as session:
-            row = session.scalar(query)
-            return None if row is None else correction_of_row(row)
+            return next(iter(corrections_where(session, *of_kind)), None)
 
     def used_by(self, correction_id: str) -> tuple[str, ...]:
         query = (
@@ -62,9 +65,66 @@ class SqlCorrectionStore:
                     retire_current(session, unit, row.kind)
                     row.is_current = True
                     session.flush()
-                return correction_of_row(row)
+                return _one(session, unit, correction_id)
 
         return again_after_conflict(once)
+
+    def approve(
+        self,
+        unit: str,
+        correction_id: str,
+        by: Decider,
+        valid_until: datetime | None,
+        idempotency: Idempotency | None = None,
+    ) -> StoredCorrection:
+        until = {} if valid_until is None else {"valid_until": valid_until}
+        return self._decided(unit, correction_id, by, Act.APPROVED, idempotency, {"approval": "approved", **until})
+
+    def reject(
+        self, unit: str, correction_id: str, by: Decider, idempotency: Idempotency | None = None
+    ) -> StoredCorrection:
+        return self._decided(unit, correction_id, by, Act.REJECTED, idempotency, {"approval": "rejected"})
+
+    def _decided(
+        self,
+        unit: str,
+        correction_id: str,
+        by: Decider,
+        act: Act,
+        idempotency: Idempotency | None,
+        values: dict[str, Any],
+    ) -> StoredCorrection:
+        """Change a correction and note the decision in one transaction, unless its key is known."""
+        kind = f"correction {act.value}"
+
+        def once() -> StoredCorrection:
+            with self._database.write() as session:
+                _found(session, unit, correction_id)
+                if made_before(session, idempotency, kind) is None:
+                    at = wall_clock.now()
+                    remember(session, idempotency, kind, correction_id, at)
+                    session.execute(update(CorrectionRow).where(CorrectionRow.id == correction_id).values(**values))
+                    session.add(
+                        CorrectionDecisionRow(
+                            id=wall_clock.new_id(),
+                            correction_id=correction_id,
+                            act=act.value,
+                            at=at,
+                            by=by.by,
+                            proven=by.proven,
+                            remark=by.remark,
+                        )
+                    )
+                    session.flush()
+                    session.expire_all()
+                return _one(session, unit, correction_id)
+
+        return again_after_conflict(once)
+
+
+def _one(session: Session, unit: str, correction_id: str) -> StoredCorrection:
+    _found(session, unit, correction_id)
+    return corrections_where(session, CorrectionRow.id == correction_id)[0]
 
 
 def _lock_all(session: Session, unit: str, kind: str) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from bench_service.mapping import copied
+from bench_service.model.raw_data import RawState
 from bench_service.model.records import NewRecording, RecordingState, StoredRecording
 from bench_service.persistence.tables.evidence import RecordingRow
 from procedures.core.measured import Measured
@@ -36,7 +37,7 @@ def info_of_row(row: RecordingRow) -> RecordingInfo:
 def stored_of_row(row: RecordingRow) -> StoredRecording:
     """Convert a row to its recording."""
     info, state = info_of_row(row), RecordingState(row.state)
-    return copied(StoredRecording, row, info=info, state=state, dtype=row.sample_type)
+    return copied(StoredRecording, row, info=info, state=state, dtype=row.sample_type, raw=RawState(row.raw))
 
 
 def row_of_new(new: NewRecording, recording_id: str, created_at: datetime, chunk_rows: int) -> RecordingRow:
@@ -57,5 +58,8 @@ def row_of_new(new: NewRecording, recording_id: str, created_at: datetime, chunk
         stored_bytes=0,
         content_hash="",
         checkpoint=None,
+        raw=RawState.STORED.value,
+        raw_changed_at=None,
+        archive=None,
         measured=None,
     )

@@ -20,6 +20,7 @@ from bench_service.model.search import EVERYTHING, Search
 from bench_service.persistence.database import Database
 from bench_service.persistence.evidence.chunk_check import damaged_chunks
 from bench_service.persistence.evidence.chunk_reader import ChunkReader
+from bench_service.persistence.evidence.raw_places import require_raw
 from bench_service.persistence.evidence.recording_rows import info_of_row, stored_of_row
 from bench_service.persistence.evidence.recording_writer import SqlRecordingWriter
 from bench_service.persistence.pages import page
@@ -47,7 +48,11 @@ class StoredSamples:
 
     def blocks(self) -> Iterator[RawArray]:
         """Yield the raw samples in order, a chunk at a time."""
-        return self._reader.blocks([c.name for c in self.info.channels], 0, self.info.count)
+        return self.since(0)
+
+    def since(self, start: int) -> Iterator[RawArray]:
+        """Yield the raw samples from sample `start` on, in order, a chunk at a time."""
+        return self._reader.blocks([c.name for c in self.info.channels], start, self.info.count)
 
 
 class SqlRecordingStore:
@@ -90,6 +95,7 @@ class SqlRecordingStore:
     def load(self, recording_id: str) -> StoredSamples:
         with self._database.read() as session:
             row = _found(session, recording_id)
+            require_raw(row)
             return StoredSamples(info_of_row(row), self._reader(row))
 
     def read(
@@ -98,6 +104,7 @@ class SqlRecordingStore:
         """Read samples, see the port; `start` and `stop` beyond the ends are taken as the ends."""
         with self._database.read() as session:
             row = _found(session, recording_id)
+            require_raw(row)
             info = info_of_row(row)
             reader = self._reader(row)
         names = [c.name for c in info.channels] if channels is None else list(channels)
@@ -105,9 +112,16 @@ class SqlRecordingStore:
             info.column(name)
         return reader.blocks(names, max(0, start), min(stop, info.count))
 
+    def so_far(self, job_id: str) -> StoredSamples | None:
+        query = select(RecordingRow).where(RecordingRow.job_id == job_id, RecordingRow.state == _OPEN)
+        with self._database.read() as session:
+            row = session.scalars(query.order_by(RecordingRow.created_at.desc()).limit(1)).first()
+            return None if row is None or not row.samples else StoredSamples(info_of_row(row), self._reader(row))
+
     def damage(self, recording_id: str, start: int, stop: int) -> Iterator[DamagedChunk]:
         with self._database.read() as session:
             row = _found(session, recording_id)
+            require_raw(row)
             rows, count = row.chunk_rows, row.samples
         return damaged_chunks(self._database, recording_id, rows, max(0, start), min(stop, count))
 

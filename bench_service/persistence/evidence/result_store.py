@@ -30,6 +30,7 @@ from bench_service.persistence.evidence.result_values import newest_first, of_ve
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.pages import page
 from bench_service.persistence.searching import find_results
+from bench_service.persistence.tables.batches import ResultContentRow
 from bench_service.persistence.tables.evidence import (
     CalibrationRow,
     RecordingRow,
@@ -55,6 +56,8 @@ class SqlResultStore:
         by_rule: bool = True,
         idempotency: Idempotency | None = None,
         corrections: Sequence[UnitCorrection] = (),
+        content: str | None = None,
+        reuse: bool = True,
     ) -> StoredResult:
         if (calibrations or corrections) and result.unit is None:
             raise ValueError("a calibration or correction needs the unit that it belongs to")
@@ -68,11 +71,19 @@ class SqlResultStore:
                 known = made_before(session, idempotency, "result")
                 if known is not None:
                     return _results(session, [_found(session, known)])[0]
+                same = None if content is None else session.get(ResultContentRow, content)
+                if same is not None and reuse:
+                    return _results(session, [_found(session, same.result_id)])[0]
                 remember(session, idempotency, "result", result.id, result.created_at)
                 _check_lineage(session, result)
                 document, taken = without_coefficients(result.document, calibrations)
                 session.add(row_of_result(result, document))
                 session.flush()
+                if (
+                    content is not None and same is None
+                ):  # a rival with the same content waits here, and then finds this result
+                    session.add(ResultContentRow(content=content, result_id=result.id))
+                    session.flush()
                 session.add_all([*quantity_rows(result, taken), *lineage_rows(result), *correction_lineage(result)])
                 add_calibrations(session, result, calibrations, by_rule)
                 add_corrections(session, result, corrections, by_rule)
@@ -86,6 +97,11 @@ class SqlResultStore:
     def get(self, result_id: str) -> StoredResult:
         with self._database.read() as session:
             return _results(session, [_found(session, result_id)])[0]
+
+    def of_content(self, content: str) -> StoredResult | None:
+        with self._database.read() as session:
+            same = session.get(ResultContentRow, content)
+            return None if same is None else _results(session, [_found(session, same.result_id)])[0]
 
     def list(
         self,

@@ -5,15 +5,15 @@ from collections.abc import Sequence
 from typing import Any
 
 from pydantic import TypeAdapter
-from sqlalchemy import bindparam, select
-from sqlalchemy.orm import aliased
+from sqlalchemy import select
 
 from bench_service import wall_clock
+from bench_service.evidence.corrections import StoredCorrection
 from bench_service.model.calibrations import StoredCalibration
 from bench_service.model.errors import NotFound
 from bench_service.persistence.database import Database
 from bench_service.persistence.evidence.calibration_rows import calibrations_where
-from bench_service.persistence.evidence.correction_rows import CORRECTION
+from bench_service.persistence.evidence.correction_rows import corrections_where
 from bench_service.persistence.idempotency import again_after_conflict
 from bench_service.persistence.tables.evidence import CalibrationRow, CorrectionRow, UnitRow
 from procedures.core.unit import Unit, WithheldCalibration
@@ -27,6 +27,10 @@ _JOINED = {
     "thermal_correction_id",
     "converter",
     "converter_id",
+    "thermometers",
+    "thermometers_id",
+    "gyro_correction",
+    "gyro_correction_id",
 }
 """Fields of a unit that are stored in other tables."""
 
@@ -48,58 +52,49 @@ class SqlUnitStore:
 
     def unit(self, serial: str) -> Unit:
         with self._database.read() as session:
-            row = session.execute(_UNIT, {"serial": serial}).one_or_none()
-            if row is None:
+            document = session.scalar(select(UnitRow.document).where(UnitRow.serial == serial))
+            if document is None:
                 raise NotFound("unit", serial)
-            current = calibrations_where(session, CalibrationRow.unit == serial, CalibrationRow.is_current)
-        return _unit(current, *row)
+            calibrations = calibrations_where(session, CalibrationRow.unit == serial, CalibrationRow.is_current)
+            corrections = corrections_where(session, CorrectionRow.unit == serial, CorrectionRow.is_current)
+        return _unit(document, calibrations, corrections)
 
     def units(self) -> tuple[Unit, ...]:
         with self._database.read() as session:
-            rows = session.execute(_UNITS.order_by(UnitRow.serial)).all()
-            current = calibrations_where(session, CalibrationRow.is_current)
-        of_unit: dict[str, list[StoredCalibration]] = defaultdict(list)
-        for calibration in current:
-            of_unit[calibration.unit].append(calibration)
-        return tuple(_unit(of_unit[row[0]["serial"]], *row) for row in rows)
-
-
-_THERMAL, _CONVERTER = aliased(CorrectionRow), aliased(CorrectionRow)
-_UNITS = (
-    select(
-        UnitRow.document,
-        _THERMAL.document,
-        _THERMAL.id,
-        _CONVERTER.document,
-        _CONVERTER.id,
-    )
-    .outerjoin(_THERMAL, (_THERMAL.unit == UnitRow.serial) & (_THERMAL.kind == "thermal") & _THERMAL.is_current)
-    .outerjoin(
-        _CONVERTER, (_CONVERTER.unit == UnitRow.serial) & (_CONVERTER.kind == "converter") & _CONVERTER.is_current
-    )
-)
-
-_UNIT = _UNITS.where(UnitRow.serial == bindparam("serial"))
+            documents = session.scalars(select(UnitRow.document).order_by(UnitRow.serial)).all()
+            calibrations = calibrations_where(session, CalibrationRow.is_current)
+            corrections = corrections_where(session, CorrectionRow.is_current)
+        calibrated: dict[str, list[StoredCalibration]] = defaultdict(list)
+        corrected: dict[str, list[StoredCorrection]] = defaultdict(list)
+        for calibration in calibrations:
+            calibrated[calibration.unit].append(calibration)
+        for correction in corrections:
+            corrected[correction.unit].append(correction)
+        return tuple(_unit(d, calibrated[d["serial"]], corrected[d["serial"]]) for d in documents)
 
 
 def _unit(
-    current: Sequence[StoredCalibration],
-    document: dict[str, Any],
-    thermal: dict[str, Any] | None,
-    thermal_id: str | None,
-    converter: dict[str, Any] | None,
-    converter_id: str | None,
+    document: dict[str, Any], calibrations: Sequence[StoredCalibration], corrections: Sequence[StoredCorrection]
 ) -> Unit:
+    """The unit with its current calibrations and corrections; those that may not be used are withheld."""
     at = wall_clock.now()
-    doubts = {c.id: c.unusable(at) for c in current}
-    usable = sorted((c for c in current if not doubts[c.id]), key=lambda c: c.triad != "gyro")
+    doubts = {c.id: c.unusable(at) for c in (*calibrations, *corrections)}
+    usable = sorted((c for c in calibrations if not doubts[c.id]), key=lambda c: c.triad != "gyro")
+    of_kind = {c.correction.kind: c for c in corrections if not doubts[c.id]}
+    thermal, converter, thermometers = (of_kind.get(kind) for kind in ("thermal", "converter", "thermometers"))
+    gyros = of_kind.get("gyros")
+    subjects = [*((c.triad, c) for c in calibrations), *((c.correction.kind, c) for c in corrections)]
     joined: dict[str, Any] = {
         "calibrations": tuple(c.value for c in usable),
         "calibration_ids": tuple(c.id for c in usable),
-        "withheld": tuple(WithheldCalibration(c.triad, c.id, doubts[c.id]) for c in current if doubts[c.id]),
-        "thermal_correction": None if thermal is None else CORRECTION.validate_python(thermal).thermal,
-        "thermal_correction_id": thermal_id,
-        "converter": None if converter is None else CORRECTION.validate_python(converter).converter,
-        "converter_id": converter_id,
+        "withheld": tuple(WithheldCalibration(s, c.id, doubts[c.id]) for s, c in subjects if doubts[c.id]),
+        "thermal_correction": thermal and thermal.correction.thermal,
+        "thermal_correction_id": thermal and thermal.id,
+        "converter": converter and converter.correction.converter,
+        "converter_id": converter and converter.id,
+        "thermometers": thermometers and thermometers.correction.thermometers,
+        "thermometers_id": thermometers and thermometers.id,
+        "gyro_correction": gyros and gyros.correction.gyros,
+        "gyro_correction_id": gyros and gyros.id,
     }
     return UNIT.validate_python({**document, **joined})

@@ -15,6 +15,7 @@ from bench_service.persistence.bench.registry_store import standing_stops
 from bench_service.persistence.database import Database
 from bench_service.persistence.jobs.job_changes import append_event, found_job, move_job
 from bench_service.persistence.jobs.job_rows import failure_document, job_of_row
+from bench_service.persistence.jobs.manual_store import open_lease
 from bench_service.persistence.jobs.reservation_store import active_reservations, reservation_of_row
 from bench_service.persistence.tables.columns import columns
 from bench_service.persistence.tables.jobs import JobRow, ReservationRow
@@ -121,9 +122,11 @@ def _queue(
     session: Session, bench: str, at: datetime, entries: tuple[QueueEntry, ...], running: str | None = None
 ) -> BenchQueue:
     """Combine these entries with everything that may keep them from starting."""
+    manual = open_lease(session, bench)
     if not entries:
-        return BenchQueue(bench, at, (), running)
-    return BenchQueue(bench, at, entries, running, standing_stops(session, bench), active_reservations(session, at))
+        return BenchQueue(bench, at, (), running, manual=manual)
+    stops, reservations = standing_stops(session, bench), active_reservations(session, at)
+    return BenchQueue(bench, at, entries, running, stops, reservations, manual)
 
 
 def _running(session: Session, bench: str) -> str | None:

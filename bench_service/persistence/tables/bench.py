@@ -41,6 +41,7 @@ class BenchStopRow(Table):
     released_at: Mapped[datetime | None]
     released_by: Mapped[str]
     remark: Mapped[str]
+    entered_at: Mapped[datetime | None]
 
 
 class BenchLiveRow(Table):

@@ -15,6 +15,7 @@ class CampaignRow(Table):
     __tablename__ = "campaigns"
 
     name: Mapped[str] = mapped_column(Id, primary_key=True)
+    team: Mapped[str] = mapped_column(server_default="")
     document: Mapped[dict[str, Any]]
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]

@@ -1,7 +1,7 @@
 """Every table of the database in one metadata: what migrations compare a database with."""
 
-from bench_service.persistence.tables import access, bench, campaigns, evidence, jobs, telemetry
+from bench_service.persistence.tables import access, batches, bench, campaigns, evidence, jobs, manual, telemetry
 from bench_service.persistence.tables.columns import Table
 
-ROOMS = (access, bench, campaigns, evidence, jobs, telemetry)
+ROOMS = (access, batches, bench, campaigns, evidence, jobs, manual, telemetry)
 METADATA = Table.metadata

@@ -17,12 +17,27 @@ class UnitRow(Table):
     updated_at: Mapped[datetime]
 
 
+class UnitNoteRow(Table):
+    """A remark of a person about a unit."""
+
+    __tablename__ = "unit_notes"
+    __table_args__ = (Index(None, "unit", "id"),)
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    unit: Mapped[str] = mapped_column(Id)
+    at: Mapped[datetime]
+    by: Mapped[str]
+    proven: Mapped[bool]
+    text: Mapped[str]
+
+
 class RecordingRow(Table):
     __tablename__ = "recordings"
     __table_args__ = (
         Index("ix_recordings_job_id_id", "job_id", "id"),
         Index("ix_recordings_unit_id", "unit", "id"),
         Index("ix_recordings_state_stored_bytes", "state", "stored_bytes"),
+        Index("ix_recordings_raw_state_stored_bytes", "raw", "state", "stored_bytes"),
         Index(
             "uq_recordings_complete_station",
             "job_id",
@@ -55,6 +70,9 @@ class RecordingRow(Table):
     source: Mapped[dict[str, Any]]
     checkpoint: Mapped[dict[str, Any] | None] = mapped_column(Document)
     measured: Mapped[dict[str, Any] | None] = mapped_column(Document)
+    raw: Mapped[str] = mapped_column(server_default="stored")
+    raw_changed_at: Mapped[datetime | None]
+    archive: Mapped[str | None]
 
 
 class ChunkRow(Table):
@@ -66,6 +84,22 @@ class ChunkRow(Table):
     samples: Mapped[int]
     sha256: Mapped[str]
     payload: Mapped[bytes] = mapped_column(LargeBinary)
+    """The chunk's bytes; empty once they are in the archive or removed, see the recording's `raw`."""
+
+
+class HoldRow(Table):
+    """A person's hold on the raw data of a recording."""
+
+    __tablename__ = "recording_holds"
+    __table_args__ = (Index("ix_recording_holds_recording_id", "recording_id"),)
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    recording_id: Mapped[str] = mapped_column(Id, ForeignKey("recordings.id"))
+    reason: Mapped[str]
+    by: Mapped[str]
+    held_at: Mapped[datetime]
+    released_at: Mapped[datetime | None]
+    released_by: Mapped[str]
 
 
 class ResultRow(Table):
@@ -187,7 +221,7 @@ class ResultCalibrationRow(Table):
 
 
 class CorrectionRow(Table):
-    """A correction set of a unit, of the kind "thermal" or "converter"; one of a kind is current."""
+    """A correction set of a unit, of the kind "thermal", "converter" or "thermometers"; one of a kind is current."""
 
     __tablename__ = "corrections"
     __table_args__ = (
@@ -210,6 +244,23 @@ class CorrectionRow(Table):
     is_current: Mapped[bool]
     simulated: Mapped[bool]
     document: Mapped[dict[str, Any]]
+    approval: Mapped[str] = mapped_column(server_default="open")
+    valid_until: Mapped[datetime | None]
+
+
+class CorrectionDecisionRow(Table):
+    """A decision about a correction set; rows are added, and never changed or removed."""
+
+    __tablename__ = "correction_decisions"
+    __table_args__ = (Index("ix_correction_decisions_correction_id_id", "correction_id", "id"),)
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    correction_id: Mapped[str] = mapped_column(Id, ForeignKey("corrections.id"))
+    act: Mapped[str]
+    at: Mapped[datetime]
+    by: Mapped[str]
+    proven: Mapped[bool]
+    remark: Mapped[str]
 
 
 class ResultCorrectionRow(Table):

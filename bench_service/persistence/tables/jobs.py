@@ -51,6 +51,7 @@ class JobRow(Table):
     reservation: Mapped[str | None] = mapped_column(Id)
     mounting: Mapped[str | None] = mapped_column(Id)
     requested_by: Mapped[str]
+    team: Mapped[str] = mapped_column(server_default="")
     prompt: Mapped[dict[str, Any] | None] = mapped_column(Document)
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]

@@ -32,10 +32,15 @@ class SqlAuditTrail:
     def add(self, entry: AuditEntry) -> None:
         with self._database.write() as session:
             self._database.one_at_a_time(session, CHAIN)
-            sequence, before = _head(session)
-            stored = json.dumps(entry.detail, allow_nan=False)  # as the engine writes it
-            link = copied(Link, entry, sequence=sequence + 1, detail=stored)
-            session.add(copied(AuditRow, entry, sequence=link.sequence, digest=link.digest_after(before)))
+            _add(session, entry)
+
+    def add_once(self, entry: AuditEntry) -> bool:
+        with self._database.write() as session:
+            self._database.one_at_a_time(session, CHAIN)
+            known = session.get(AuditRow, entry.id) is not None
+            if not known:
+                _add(session, entry)
+            return not known
 
     def list(
         self, *, who: str | None = None, target: str | None = None, after: str | None = None, limit: int = 50
@@ -91,6 +96,13 @@ class SqlAuditTrail:
             session.add(copied(AuditCheckpointRow, made))
             session.execute(delete(AuditRow).where(AuditRow.sequence <= made.last))
             return made
+
+
+def _add(session: Session, entry: AuditEntry) -> None:
+    sequence, before = _head(session)
+    stored = json.dumps(entry.detail, allow_nan=False)  # as the engine writes it
+    link = copied(Link, entry, sequence=sequence + 1, detail=stored)
+    session.add(copied(AuditRow, entry, sequence=link.sequence, digest=link.digest_after(before)))
 
 
 def _head(session: Session) -> tuple[int, str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from sqlalchemy import func, or_, select
 
 from bench_service.model.job import FINAL
+from bench_service.model.raw_data import HERE
 from bench_service.model.records import RecordingState
 from bench_service.persistence.database import Database
 from bench_service.persistence.tables.columns import columns
@@ -42,7 +43,8 @@ class SqlTallyStore:
     def recorded_bytes(self) -> int:
         listed = (RecordingState.COMPLETE.value, RecordingState.INTERRUPTED.value)
         with self._database.read() as session:
-            found = session.scalar(select(func.sum(RecordingRow.stored_bytes)).where(RecordingRow.state.in_(listed)))
+            total = select(func.sum(RecordingRow.stored_bytes)).where(RecordingRow.state.in_(listed))
+            found = session.scalar(total.where(RecordingRow.raw.in_([state.value for state in HERE])))
         return int(found or 0)
 
     def free_bytes(self) -> int | None:

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Verdict
+from bench_client.results.shared import Check, Statement, Verdict
 
 
 class MethodsAllanDeviationCurve(Part):
@@ -27,6 +27,8 @@ class AllanDeviationDocument(Part):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
+    statement: Statement | None = None
+    """None without checks and in results of older versions"""
     statistic: str
     confidence: float
     curves: tuple[MethodsAllanDeviationCurve, ...]

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, TriadSummary, Verdict
+from bench_client.results.shared import Check, Statement, TriadSummary, Verdict
 from bench_client.results.shared_by_two import Form
 
 
@@ -25,6 +25,8 @@ class Calibration12OrientationsDocument(Part):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
+    statement: Statement | None = None
+    """None without checks and in results of older versions"""
     triads: tuple[TriadSummary, ...]
     thermal: ThermalShare | None = None
     """of the accelerometers, where they were corrected"""

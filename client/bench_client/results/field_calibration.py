@@ -3,7 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, TriadCalibration, Verdict
+from bench_client.results.shared import Check, Statement, TriadCalibration, Verdict
 
 
 class FieldTriad(Part):
@@ -30,6 +30,8 @@ class FieldCalibrationDocument(Part):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
+    statement: Statement | None = None
+    """None without checks and in results of older versions"""
     triads: tuple[FieldTriad, ...]
     tilt_deg: tuple[float, ...] | None
     tilt_sd_deg: tuple[float, ...] | None

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Verdict
+from bench_client.results.shared import Check, Statement, Verdict
 
 
 class GyroChannel(Part):
@@ -26,6 +26,8 @@ class GyroHalfTurnsDocument(Part):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
+    statement: Statement | None = None
+    """None without checks and in results of older versions"""
     channels: tuple[GyroChannel, ...]
     pairs: int
     horizontal_rate_rad_s: float

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Verdict
+from bench_client.results.shared import Check, Statement, Verdict
 
 
 class ChannelBias(Part):
@@ -35,6 +35,8 @@ class KalmanCalibrationDocument(Part):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
+    statement: Statement | None = None
+    """None without checks and in results of older versions"""
     biases: tuple[ChannelBias, ...]
 
 

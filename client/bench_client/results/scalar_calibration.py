@@ -3,7 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, TriadCalibration, Verdict
+from bench_client.results.shared import Check, Statement, TriadCalibration, Verdict
 
 
 class Estimate(Part):
@@ -21,6 +21,8 @@ class ScalarCalibrationDocument(Part):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
+    statement: Statement | None = None
+    """None without checks and in results of older versions"""
     calibration: TriadCalibration
     parameters: tuple[Estimate, ...]
     reference: float

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import CalibrationSummaryCoefficient, Check, TriadCalibration, Verdict
+from bench_client.results.shared import CalibrationSummaryCoefficient, Check, Statement, TriadCalibration, Verdict
 
 
 class RatePoint(Part):
@@ -37,6 +37,8 @@ class ScaleFactorWholeTurnsDocument(Part):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
+    statement: Statement | None = None
+    """None without checks and in results of older versions"""
     gyro: WholeTurns
     make_calibration: bool = False
 

@@ -14,6 +14,18 @@ class Limit(Part):
     source: str = ""
 
 
+class Decision(Part):
+    """How one value was decided."""
+
+    rule: str
+    outcome: Literal["pass", "conditional pass", "conditional fail", "fail"]
+    expanded_uncertainty: float | None = None
+    coverage_factor: float | None = None
+    coverage_probability: float | None = None
+    degrees_of_freedom: float | None = None
+    guard_band: float = 0.0
+
+
 class Check(Part):
     """Check of one value against one limit."""
 
@@ -23,9 +35,20 @@ class Check(Part):
     passed: bool
     standard_uncertainty: float | None = None
     note: str = ""
+    degrees_of_freedom: float | None = None
+    decision: Decision | None = None
+    significance: bool = False
 
 
 Verdict = Literal["pass", "fail", "error"]
+
+
+class Statement(Part):
+    """Statement of conformity of a whole result."""
+
+    outcome: Literal["pass", "conditional pass", "conditional fail", "fail"]
+    rule: str
+    conditional: tuple[str, ...] = ()
 
 
 class TriadCalibration(Part):
@@ -102,6 +125,32 @@ class ScalarCheck(Part):
     p_value: float | None
 
 
+class BudgetRow(Part):
+    """One source of uncertainty of one coefficient."""
+
+    source: str
+    value: float
+    unit: str
+    distribution: Literal["normal", "rectangular"]
+    divisor: float
+    sensitivity: float
+    contribution: float
+    degrees_of_freedom: float | None
+
+
+class Budget(Part):
+    """Uncertainty budget of one coefficient."""
+
+    coefficient: str
+    unit: str
+    rows: tuple[BudgetRow, ...]
+    standard_uncertainty: float
+    degrees_of_freedom: float | None
+    coverage_factor: float
+    expanded_uncertainty: float
+    coverage_probability: float = 0.9545
+
+
 class TriadSummary(Part):
     """Complete calibration results of one triad."""
 
@@ -119,3 +168,5 @@ class TriadSummary(Part):
     misfit: float | None = None
     worst: str = ""
     left_out: Magnitudes | None = None
+    suspect: str = ""
+    budgets: tuple[Budget, ...] = ()

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part
-from bench_client.results.shared import Check, TriadCalibration, TriadSummary, Verdict
+from bench_client.results.shared import Check, Statement, TriadCalibration, TriadSummary, Verdict
 
 Form = Literal["both", "switched", "single"]
 
@@ -57,6 +57,8 @@ class MultiPositionCalibrationDocument(Part):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
+    statement: Statement | None = None
+    """None without checks and in results of older versions"""
     triads: tuple[TriadSummary, ...]
     extended: tuple[Extended, ...] = ()
 

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Verdict
+from bench_client.results.shared import Check, Statement, Verdict
 from bench_client.results.shared_by_two import ChannelSummary, LaunchNoise
 
 
@@ -13,6 +13,8 @@ class StaticRunDocument(Part):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
+    statement: Statement | None = None
+    """None without checks and in results of older versions"""
     launches: tuple[LaunchNoise, ...]
     channels: tuple[ChannelSummary, ...]
     averaging_time_s: float | None

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Verdict
+from bench_client.results.shared import Check, Statement, Verdict
 
 
 class ChannelMean(Part):
@@ -36,6 +36,8 @@ class TableProgramDocument(Part):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
+    statement: Statement | None = None
+    """None without checks and in results of older versions"""
     program: str
     dwells: tuple[DwellRecord, ...]
 

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Magnitudes, Verdict
+from bench_client.results.shared import Check, Magnitudes, Statement, Verdict
 
 
 class Change(Part):
@@ -55,6 +55,8 @@ class Verification9OrientationsDocument(Part):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
+    statement: Statement | None = None
+    """None without checks and in results of older versions"""
     triads: tuple[TriadVerification, ...]
 
 

@@ -18,6 +18,8 @@ from procedures.analysis.least_squares.whitening import whiteners
 from procedures.core.arrays import Array
 
 Weighting = Literal["noise_and_table", "noise"]
+MOUNTING = "mounting"
+"""Source of uncertainty that no station of one mounting shows: the repeatability of the seat."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ class TableShare:
 
     def by_source(self) -> dict[str, Array]:
         """Standard uncertainties (12,) of every source that contributes."""
-        parts = {source: self.standard_uncertainty(source) for source in SOURCES}
+        parts = {source: self.standard_uncertainty(source) for source in (*SOURCES, MOUNTING)}
         return {source: part for source, part in parts.items() if np.any(part > 0.0)}
 
 
@@ -127,7 +129,16 @@ def _times_each(gain: Array, matrices: Array) -> Array:
     return np.matmul(gain.transpose(1, 0, 2), matrices).transpose(1, 0, 2)
 
 
-def table_share(plan: Estimator, of_table: Array, table: TableErrors) -> TableShare:
-    """The table's flaws carried through the outputs `of_table` F (n, 3, P) and the estimator into the coefficients."""
+def table_share(plan: Estimator, of_table: Array, table: TableErrors, matrix: Array) -> TableShare:
+    """The table's flaws carried through the outputs `of_table` F (n, 3, P) and the estimator into the coefficients.
+
+    With the repeatability of the seat: a unit of `matrix` K (3, 3) that sits turned by a small δ has ``K·(1 − [δ]×)``.
+    """
     flaws = of_table.transpose(1, 0, 2).reshape(3 * of_table.shape[0], of_table.shape[2])
-    return TableShare(plan.gain.reshape(12, -1) @ flaws, table.source)
+    per_sd, source = plan.gain.reshape(12, -1) @ flaws, table.source
+    if table.seat_sd_rad > 0.0:
+        turned = -np.cross(np.eye(3)[:, None, :], np.eye(3)[None, :, :]).transpose(0, 2, 1)
+        seat = np.zeros((3, 4, 3))
+        seat[:, 1:] = np.einsum("ij,ajk->ika", matrix, turned) * table.seat_sd_rad
+        per_sd, source = np.hstack([per_sd, seat.reshape(12, 3)]), (*source, *(MOUNTING,) * 3)
+    return TableShare(per_sd, source)

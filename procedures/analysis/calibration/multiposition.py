@@ -13,8 +13,9 @@ from scipy.linalg import block_diag, null_space
 from procedures.analysis.calibration.estimator import Estimator, TableShare, Weighting, estimator, table_share
 from procedures.analysis.calibration.magnitude import magnitude_gradient
 from procedures.analysis.calibration.noise_scale import noise_factor
+from procedures.analysis.calibration.suspect_flaw import LOOKS_SOUND, FreeResiduals, free_residuals
 from procedures.analysis.calibration.table_errors import TableErrors
-from procedures.analysis.least_squares.chi_square import chi_square, judged_p_value
+from procedures.analysis.least_squares.chi_square import chi_square, judged_p_value, tail_probability
 from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration, triad_calibration
 
@@ -47,6 +48,8 @@ class TriadFit:
     degrees_of_freedom: int
     noise_known: bool
     """False where the noise was estimated from the recordings themselves: then chi-square proves nothing."""
+    free: FreeResiduals | None = None
+    """Residuals without what coefficients can explain; None where they are as declared, or the noise is not known."""
 
     @property
     def noise_covariance(self) -> Array:
@@ -99,7 +102,7 @@ def fit_triad(
     what = f"the {triad} coefficients"
     plan = estimator(what, vectors, noise_covariance)
     of_table = table.of_outputs(plan.coefficients(outputs).reshape(3, 4)[:, 1:])
-    free, of_noise, of_flaws = _free_of_coefficients(plan.design, outputs, noise_covariance, of_table)
+    free, of_noise, of_flaws, basis = _free_of_coefficients(plan.design, outputs, noise_covariance, of_table)
     factor = 1.0 if noise_known else noise_factor(free, of_noise, of_flaws)
     if weighting == "noise_and_table" or factor > 1.0:
         flaws = of_table if weighting == "noise_and_table" else None
@@ -108,6 +111,8 @@ def fit_triad(
     residual_sd, magnitude_sd = _expected(
         plan, vectors, coefficients.reshape(3, 4)[:, 1:], noise_covariance * factor, of_table
     )
+    square = chi_square(free, of_noise + of_flaws)
+    doubtful = noise_known and len(free) > 0 and tail_probability(square, len(free)) < LOOKS_SOUND
     return TriadFit(
         triad,
         output_unit,
@@ -115,22 +120,25 @@ def fit_triad(
         weighting,
         coefficients,
         plan,
-        table_share(plan, of_table, table),
+        table_share(plan, of_table, table, coefficients.reshape(3, 4)[:, 1:]),
         noise_covariance * factor,
         of_table,
         outputs - plan.modelled(coefficients),
         residual_sd,
         magnitude_sd,
-        chi_square(free, of_noise + of_flaws),
+        square,
         len(free),
         noise_known,
+        free_residuals(free, of_noise + of_flaws, basis, coefficients.reshape(3, 4)[:, 1:], table)
+        if doubtful
+        else None,
     )
 
 
 def _free_of_coefficients(
     design: Array, outputs: Array, noise_covariance: Array, of_table: Array
-) -> tuple[Array, Array, Array]:
-    """Residual combinations y (k,) of all three channels, free of coefficients, and their (k, k) noise and table parts.
+) -> tuple[Array, Array, Array, Array]:
+    """Residual combinations y (k,) of all three channels, free of coefficients, their (k, k) noise and table parts, Z.
 
     ``y = ZᵀU`` with Z an orthonormal basis of the complement of the design, k = 3(n − 4). It does not depend on the
     weights.
@@ -138,7 +146,7 @@ def _free_of_coefficients(
     basis = null_space((design / np.linalg.norm(design, axis=0)).T)
     flaws = np.einsum("nk,ncp->ckp", basis, of_table).reshape(3 * basis.shape[1], of_table.shape[2])
     of_noise = block_diag(*[basis.T @ c @ basis for c in noise_covariance])
-    return (basis.T @ outputs).T.ravel(), of_noise, flaws @ flaws.T
+    return (basis.T @ outputs).T.ravel(), of_noise, flaws @ flaws.T, basis
 
 
 def _expected(

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 import numpy as np
+from scipy.special import chdtri
 
 from procedures.analysis.calibration.estimator import Estimator, TableShare, Weighting, estimator, table_share
 from procedures.analysis.calibration.magnitude import magnitude_covariance, magnitude_gradient
@@ -12,7 +13,7 @@ from procedures.analysis.calibration.reference import INPUT_UNITS, reference_vec
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.station_plan import dwell_for, windows
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
-from procedures.analysis.calibration.verification import predicted_sd
+from procedures.analysis.calibration.verification import effective_freedom, predicted_sd
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
@@ -93,7 +94,7 @@ class TriadPlan:
 
     def share(self, plan: Estimator) -> TableShare:
         """Contribution of the table's flaws to the coefficients of this plan."""
-        return table_share(plan, self._of_outputs, self.table)
+        return table_share(plan, self._of_outputs, self.table, self.matrix)
 
     @cached_property
     def _of_outputs(self) -> Array:
@@ -265,14 +266,19 @@ def in_run_unresolved(plan: TriadPlan, limit: float, display: str, display_size:
 
 
 IN_RUN_SOURCE = "thesis 4.3, 5.1"
+IN_RUN_LEVEL = 0.001
 
 
-def in_run_check(plan: TriadPlan, maximum: float | None, covariance: Array | None = None) -> PlannedCheck:
+def in_run_check(
+    plan: TriadPlan, maximum: float | None, covariance: Array | None = None, level: float = IN_RUN_LEVEL
+) -> PlannedCheck:
     """Planned check of the error per axis δ/√3 of n stations, its limit in the triad's unit of display.
 
-    δ² is a mean square of n − 1 degrees of freedom; its part of the measurement is what the noise of the dwells leaves,
-    or errors of magnitude with the `covariance` (n, n) given. Without a maximum the limit is the plan's expanded
-    uncertainty, k = 2. Raises `BadParameter` where that is not known.
+    δ² is a mean square of the degrees of freedom of `effective_freedom`; its part of the measurement is what the noise
+    of the dwells leaves, or errors of magnitude with the `covariance` (n, n) given. Without a maximum the limit is the
+    plan's expanded uncertainty: what a sound unit exceeds with the probability `level`, ``k² = χ²_ν(1 − level)/ν``.
+    (k = 2 would not do: where six coefficients that change between launches move all stations, ν is near 2 and one
+    sound unit in fifty exceeds it.) Raises `BadParameter` where the uncertainty is not known.
     """
     display, size = units.DISPLAY[INPUT_UNITS[plan.triad]]
     name = f"{plan.triad} bias in run, δ/√3"
@@ -281,14 +287,18 @@ def in_run_check(plan: TriadPlan, maximum: float | None, covariance: Array | Non
         gradient = magnitude_gradient(plan.vectors, np.linalg.inv(plan.matrix))
         covariance = magnitude_covariance(gradient, planned.noise_covariance)
     floor = None if covariance is None else predicted_sd(covariance) / float(np.sqrt(3.0)) / size
+    freedom = None if covariance is None else effective_freedom(covariance)
+    own = None
     if maximum is not None:
         limit = Limit(display, maximum=maximum, source=IN_RUN_SOURCE)
-    elif floor is not None:
-        limit = Limit(display, maximum=2.0 * floor, source="expanded uncertainty of the plan, k = 2")
+    elif floor is not None and freedom is not None:
+        factor, own = float(np.sqrt(chdtri(freedom, level) / freedom)), level
+        source = f"expanded uncertainty of the plan, k = {factor:.3g} at a level of {level:g} (ν = {freedom:.2g})"
+        limit = Limit(display, maximum=factor * floor, source=source)
     else:
         field = f"limits.{plan.triad}_bias_in_run_{'deg_h' if plan.triad == 'gyro' else 'm_s2'}"
         raise BadParameter(field, None, "a number: the noise is not known, so the plan has no uncertainty to take")
-    return PlannedCheck(name, limit, floor, None if floor is None else float(len(plan.stations) - 1), 0.0)
+    return PlannedCheck(name, limit, floor, freedom, 0.0, own)
 
 
 def _length(dwell_s: float) -> str:

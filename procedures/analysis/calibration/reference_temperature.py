@@ -21,10 +21,12 @@ import numpy as np
 from procedures.analysis.calibration.multiposition import TriadFit
 from procedures.analysis.calibration.station_means import StationMeans
 from procedures.analysis.cells import cell_means
+from procedures.analysis.thermal.gyro_temperatures import GYRO_SENSORS, gyro_temperatures
 from procedures.analysis.thermal.regime import RegimeSettings
 from procedures.core.arrays import Array
 from procedures.core.converter import at_reference
 from procedures.core.errors import BadParameter, UnfitRecording
+from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import Recording
 from procedures.core.thermal_correction import (
@@ -36,6 +38,7 @@ from procedures.core.thermal_correction import (
     ThermalCorrection,
     terms,
 )
+from procedures.core.thermometers import ThermometerCorrection
 from procedures.core.unit import Unit
 
 SENSORS = ("temperature_case", "temperature_converter")
@@ -55,19 +58,29 @@ def require_correctable(thermal_correction: str, dwell_s: float | None, unit: Un
     if thermal_correction != "current":
         return
     if unit.thermal_correction is None:
-        raise BadParameter("thermal_correction", "current", f"none: unit {unit.serial} has no thermal correction yet")
+        why = unit.why_withheld("thermal") or f"unit {unit.serial} has no thermal correction yet"
+        raise BadParameter("thermal_correction", "current", f"none: {why}")
     if dwell_s is not None and dwell_s < LEAST_DWELL_S:
         raise BadParameter("dwell_s", dwell_s, f"at least {LEAST_DWELL_S:g}: temperatures are read beside")
 
 
 @dataclass(frozen=True)
 class StationTemperatures:
-    """Case and converter at the middle of each dwell, lag taken out, each (n, 2) [°C]."""
+    """Sensors at the middle of each dwell, lag taken out, each (n, m) [°C]: those of Δt, then the converter's."""
 
     mean_c: Array
     mean_sd_c: Array
     """Standard uncertainty from the scatter about a straight line."""
     slope_c_s: Array
+
+    @property
+    def static_c(self) -> Array:
+        """Δt's sensor, (n,), or one for each axis, (n, 3)."""
+        return self.mean_c[:, 0] if self.mean_c.shape[1] == 2 else self.mean_c[:, :-1]
+
+    @property
+    def converter_c(self) -> Array:
+        return self.mean_c[:, -1]
 
 
 @dataclass(frozen=True)
@@ -108,25 +121,37 @@ class ThermalShare:
     """Standard uncertainty due to the temperature sensors' noise."""
 
 
-def station_temperatures(recordings: Sequence[Recording], lag_s: tuple[float, float]) -> StationTemperatures:
-    """Case and converter temperature of each recording. Raises `MissingChannel`, `UnfitRecording`, `BadParameter`."""
+def station_temperatures(
+    recordings: Sequence[Recording],
+    lag_s: tuple[float, float],
+    sensors: Sequence[str] = SENSORS,
+    thermometers: ThermometerCorrection | None = None,
+) -> StationTemperatures:
+    """Temperatures of each recording by sensors, the converter's last, corrected by `thermometers` where given.
+
+    `lag_s`: time constants of the sensors of Δt, and of the converter's. Raises `MissingChannel`, `UnfitRecording`,
+    `BadParameter`.
+    """
     rows: list[tuple[Array, Array, Array]] = []
     for recording in recordings:
         info = recording.info
         cell_s = max(LEAST_CELL_S, info.duration_s / CELLS)
         if info.duration_s < 4.0 * cell_s:
             raise BadParameter("dwell_s", info.duration_s, f"at least {4 * LEAST_CELL_S:g} s: temperatures need a line")
-        cells = cell_means(recording, SENSORS, cell_s)
+        cells = cell_means(recording, sensors, cell_s)
         count = cells.rates.shape[1]
         about = (np.arange(count) - 0.5 * (count - 1)) * cells.cell_s
         mean = cells.rates.mean(axis=1)
         slope = cells.rates @ about / np.sum(about**2)
         left = cells.rates - mean[:, None] - slope[:, None] * about
         variance = np.sum(left**2, axis=1) / (count - 2)
-        lag = np.array(lag_s)
+        lag = np.array([*[lag_s[0]] * (len(sensors) - 1), lag_s[1]])
         sd = np.sqrt(variance * (1.0 / count + lag**2 / np.sum(about**2)))
         rows.append((mean + lag * slope, sd, slope))
     mean_c, sd_c, slope_c_s = (np.array(column) for column in zip(*rows, strict=True))
+    if thermometers is not None:
+        columns = zip(sensors, mean_c.T, strict=True)
+        mean_c = np.column_stack([thermometers.corrected(s, c) if thermometers.has(s) else c for s, c in columns])
     return StationTemperatures(mean_c, sd_c, slope_c_s)
 
 
@@ -146,8 +171,9 @@ def bring_to_reference(
             f"these outputs were already brought to {case_c:g} °C (case) and {converter_c:g} °C (converter): a thermal "
             "correction is applied once"
         )
-    found = station_temperatures(recordings, lag_s)
-    case, converter = found.mean_c.T
+    sensors = (*GYRO_SENSORS, SENSORS[1]) if correction.static_sensors == "gyros" else SENSORS
+    found = station_temperatures(recordings, lag_s, sensors, correction.thermometers)
+    case, converter = found.static_c, found.converter_c
 
     def brought(case_c: Array, converter_c: Array) -> Array:
         v = means.outputs
@@ -161,11 +187,13 @@ def bring_to_reference(
     by_sensor = [
         (brought(case + step[0], converter + step[1]) - outputs) / STEP_C for step in ((STEP_C, 0.0), (0.0, STEP_C))
     ]
-    of_sensors = np.sum([(d * found.mean_sd_c[:, [s]]) ** 2 for s, d in enumerate(by_sensor)], axis=0)
+    spreads = (found.mean_sd_c[:, :-1], found.mean_sd_c[:, -1:])
+    of_sensors = np.sum([(d * sd) ** 2 for d, sd in zip(by_sensor, spreads, strict=True)], axis=0)
     staged = means.outputs
     if correction.first_stage is not None:
         staged = at_reference(staged, converter, correction.first_stage)
-    of_correction = [_of_correction(axis, staged[:, i], case, converter) for i, axis in enumerate(correction.axes)]
+    own = [case if case.ndim == 1 else case[:, i] for i in range(3)]
+    of_correction = [_of_correction(axis, staged[:, i], own[i], converter) for i, axis in enumerate(correction.axes)]
     references = correction.axes[0].case_reference_c, correction.axes[0].converter_reference_c
     return AtReference(
         replace(means, outputs=outputs, at_reference_c=references),
@@ -193,6 +221,20 @@ def _of_correction(axis: AxisCorrection, v: Array, case: Array, converter: Array
     return jacobian @ np.array(axis.covariance) @ jacobian.T
 
 
+def gyros_at_reference(
+    recordings: Sequence[Recording], means: StationMeans, correction: GyroThermalCorrection
+) -> tuple[StationMeans, Array]:
+    """Gyro station means ``ω − Σ_k c_k·(T − T_ref)^k``, and the covariance that the coefficients add, (3, n, n).
+
+    Raises `UnfitRecording` where the outputs are no rates, `MissingChannel` without the gyros' sensors.
+    """
+    if means.output_unit != "rad/s":
+        raise UnfitRecording(f"outputs in {means.output_unit} cannot be corrected for temperature: rad/s is needed")
+    own = gyro_temperatures(recordings, correction)
+    covariance = np.array([correction.covariance(axis, own[:, axis]) for axis in range(3)])
+    return replace(means, outputs=correction.apply(means.outputs, own)), covariance
+
+
 def thermal_share(at: AtReference, correction: ThermalCorrection, fit: TriadFit) -> ThermalShare:
     """Effect of the thermal correction on the accelerometers' calibration, through the estimator of the fit."""
 
@@ -205,8 +247,8 @@ def thermal_share(at: AtReference, correction: ThermalCorrection, fit: TriadFit)
     return ThermalShare(
         form,
         "static" if form is Form.SWITCHED else "",
-        tuple(at.temperatures.mean_c[:, 0].tolist()),
-        tuple(at.temperatures.mean_c[:, 1].tolist()),
+        tuple(at.temperatures.mean_c[:, :-1].mean(axis=1).tolist()),
+        tuple(at.temperatures.converter_c.tolist()),
         tuple(tuple(row) for row in at.change_m_s2.tolist()),
         share(at.of_correction),
         share(at.of_sensors),
@@ -215,7 +257,7 @@ def thermal_share(at: AtReference, correction: ThermalCorrection, fit: TriadFit)
 
 def thermal_warnings(at: AtReference, correction: ThermalCorrection) -> tuple[str, ...]:
     """Warnings about the use of a correction at these temperatures."""
-    warnings = _of_range(at.temperatures.mean_c, correction)
+    warnings = _of_range(at.temperatures, correction)
     unknown = [name for name, axis in zip("xyz", correction.axes, strict=True) if not axis.covariance]
     if unknown:
         warnings.append(
@@ -232,11 +274,11 @@ def thermal_warnings(at: AtReference, correction: ThermalCorrection) -> tuple[st
     return tuple(warnings)
 
 
-def _of_range(mean_c: Array, correction: ThermalCorrection) -> list[str]:
-    """Warnings where stations (n, 2) [°C] lie outside the correction's fitted range, or where it has none."""
+def _of_range(temperatures: StationTemperatures, correction: ThermalCorrection) -> list[str]:
+    """Warnings where stations lie outside the correction's fitted range, or where it has none."""
     if correction.fitted_range is None:
         return ["the thermal correction does not say at which temperatures it was fitted: it may be extrapolated here"]
-    beyond = correction.fitted_range.beyond_c(mean_c[:, 0], mean_c[:, 1])
+    beyond = correction.fitted_range.beyond_c(temperatures.static_c, temperatures.converter_c)
     outside = int(np.sum(beyond > EXTRAPOLATED_C))
     if not outside:
         return []

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from procedures.analysis.calibration.budget import Budget
 from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.misfit import residual_misfit
 from procedures.analysis.calibration.multiposition import TriadFit
 from procedures.analysis.calibration.scalar import PARAMETERS, ScalarFit, observable_derivative, scalar_parameters
+from procedures.analysis.calibration.suspect_flaw import suspect
 from procedures.analysis.calibration.verification import Magnitudes
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, coefficient_unit
@@ -81,6 +83,15 @@ class TriadSummary:
     """Station and channel with the greatest residual."""
     left_out: Magnitudes | None = None
     """Magnitudes out of sample, each station corrected by the fit of the others; None where that cannot be made."""
+    suspect: str = ""
+    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared."""
+    budgets: tuple[Budget, ...] = ()
+    """Uncertainty budget of each coefficient; empty in results of older versions."""
+
+    @property
+    def residual_note(self) -> str:
+        """Note for the check of the residuals: where the greatest one is, and what they look like."""
+        return "; ".join(text for text in (f"worst: {self.worst}", self.suspect) if text)
 
 
 def triad_summary(
@@ -111,6 +122,7 @@ def triad_summary(
         misfit.ratio,
         misfit.worst,
         left_out,
+        "" if fit.free is None else suspect(fit.free, labels),
     )
 
 

@@ -33,6 +33,8 @@ class TableUncertainty:
     """Heading of the table's zero, constant."""
     gravity_relative_sd: float = 0.0
     """Relative uncertainty of the reference magnitude; concerns the accelerometers alone."""
+    mounting_sd_arcsec: float = 0.0
+    """Repeatability of the unit's seat about each of its axes: no station of one mounting shows it."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,8 @@ class TableErrors:
     sensitivity: Array
     sd: Array
     source: tuple[str, ...]
+    seat_sd_rad: float = 0.0
+    """Repeatability of the unit's seat about each of its axes: common to all stations, so it is in no column."""
 
     def of_outputs(self, matrix: Array) -> Array:
         """Change of the outputs per standard deviation of each flaw, ``K·∂v/∂p·σ_p``, shape (n, 3, P)."""
@@ -74,7 +78,7 @@ def table_errors(
     sd = np.array([*np.array(angular) * units.ARCSEC, u.gravity_relative_sd])
     pointing = np.full(3 * n, u.pointing_sd_arcsec * units.ARCSEC)
     source = ("orthogonality",) * 2 + ("level",) * 2 + ("azimuth", "gravity") + ("pointing",) * (3 * n)
-    return TableErrors(sensitivity, np.concatenate([sd, pointing]), source)
+    return TableErrors(sensitivity, np.concatenate([sd, pointing]), source, u.mounting_sd_arcsec * units.ARCSEC)
 
 
 def direction_errors(vectors: Array, sd_rad: float, magnitude_relative_sd: float) -> TableErrors:

@@ -1,10 +1,11 @@
 """Analysis of a triad's multiposition calibration, from recordings to summary: means, fit, magnitudes, cross-check."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from procedures.analysis.calibration.budget import budgets, noise_parts, observed_part, thermal_parts
 from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.left_out import left_out_magnitudes
 from procedures.analysis.calibration.multiposition import TriadFit, fit_triad
@@ -12,6 +13,7 @@ from procedures.analysis.calibration.reference import INPUT_UNITS, reference_mag
 from procedures.analysis.calibration.reference_temperature import (
     ThermalShare,
     bring_to_reference,
+    gyros_at_reference,
     thermal_share,
     thermal_warnings,
 )
@@ -29,6 +31,7 @@ from procedures.analysis.calibration.table_errors import TableErrors, TableUncer
 from procedures.analysis.calibration.verification import magnitudes
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
+from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.recording import Recording
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
@@ -50,6 +53,21 @@ def analyse_triad(
     return analyse_means(means, site, uncertainty, record, with_scalar, weighting)[0]
 
 
+def analyse_gyros(
+    recordings: Sequence[Recording],
+    site: Site,
+    uncertainty: TableUncertainty,
+    record: TriadRecord | None,
+    weighting: Weighting = "noise_and_table",
+    correction: GyroThermalCorrection | None = None,
+) -> TriadSummary:
+    """Calibrate the gyros, by a correction for temperature first where there is one. Raises as `analyse_triad`."""
+    means, more = station_means(recordings, "gyro"), None
+    if correction is not None:
+        means, more = gyros_at_reference(recordings, means, correction)
+    return analyse_means(means, site, uncertainty, record, False, weighting, more)[0]
+
+
 def analyse_means(
     means: StationMeans,
     site: Site,
@@ -57,9 +75,9 @@ def analyse_means(
     record: TriadRecord | None,
     with_scalar: bool = False,
     weighting: Weighting = "noise_and_table",
-    more: Array | None = None,
+    more: Mapping[str, Array] | None = None,
 ) -> tuple[TriadSummary, TriadFit]:
-    """Calibrate one triad from its station means; `more` is their covariance from causes other than noise, (3, n, n).
+    """Calibrate one triad from its station means; `more`: covariances (3, n, n) from causes other than noise, by name.
 
     Raises `UnfitRecording`, `Undetermined`.
     """
@@ -78,20 +96,23 @@ def analyse_inputs(
     record: TriadRecord | None,
     with_scalar: bool = False,
     weighting: Weighting = "noise_and_table",
-    more: Array | None = None,
+    more: Mapping[str, Array] | None = None,
 ) -> tuple[TriadSummary, TriadFit]:
     """Calibrate one triad from its station means at known input vectors (n, 3) of one magnitude, `reference` [SI].
 
     `table`: the flaws of what set them; `more` as in `analyse_means`. Raises `UnfitRecording`, `Undetermined`.
     """
     noise, known = noise_of_means(means, record)
-    noise = noise if more is None else noise + more
+    noise = noise + sum((more or {}).values())
     unit = INPUT_UNITS[means.triad]
     fit = fit_triad(means.triad, means.output_unit, unit, vectors, means.outputs, noise, table, known, weighting)
     scalar = _scalar(means, reference, noise, known, fit) if with_scalar else None
     after = magnitudes(means.outputs, fit.calibration(), reference, means.labels, fit.magnitude_sd)
     others = left_out_magnitudes(fit, vectors, means.outputs, reference, means.labels)
-    return triad_summary(fit, after, means.labels, scalar, _slow(means, noise, fit, known), others), fit
+    summary = triad_summary(fit, after, means.labels, scalar, _slow(means, noise, fit, known), others)
+    parts = noise_parts(record, means.windows, means.output_unit) if known and record else [observed_part(fit)]
+    parts += thermal_parts(more or {}, means.output_unit) if known else []
+    return replace(summary, budgets=budgets(fit, parts, table)), fit
 
 
 def _slow(means: StationMeans, noise: Array, fit: TriadFit, known: bool) -> float:
@@ -134,7 +155,8 @@ def analyse_accelerometers(
     if correction is None:
         return analyse_means(means, site, uncertainty, record, *how)[0], None, ()
     brought = bring_to_reference(recordings, means, correction, settings.lag_s)
-    summary, fit = analyse_means(brought.means, site, uncertainty, record, *how, brought.covariance)
+    more = {"thermal correction": brought.of_correction, "thermometers": brought.of_sensors}
+    summary, fit = analyse_means(brought.means, site, uncertainty, record, *how, more)
     return summary, thermal_share(brought, correction, fit), thermal_warnings(brought, correction)
 
 

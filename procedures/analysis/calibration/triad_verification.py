@@ -8,13 +8,18 @@ import numpy as np
 from procedures.analysis.calibration.diagnosis import TriadDiagnosis, diagnose, residual_covariance
 from procedures.analysis.calibration.plan import TriadPlan
 from procedures.analysis.calibration.reference import reference_magnitude, reference_vectors
-from procedures.analysis.calibration.reference_temperature import bring_to_reference, thermal_warnings
+from procedures.analysis.calibration.reference_temperature import (
+    bring_to_reference,
+    gyros_at_reference,
+    thermal_warnings,
+)
 from procedures.analysis.calibration.station_means import StationMeans, require_unit_of, station_means
 from procedures.analysis.calibration.station_noise import outputs_covariance
 from procedures.analysis.calibration.table_errors import TableUncertainty, table_errors
 from procedures.analysis.calibration.verification import Magnitudes, error_covariance, magnitudes
 from procedures.analysis.least_squares.chi_square import chi_square, tail_probability
 from procedures.core.arrays import Array
+from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Recording
 from procedures.core.site import Site
@@ -76,6 +81,20 @@ def verify_triad(
     `UnfitRecording` where the recordings' unit is not the calibration's.
     """
     return _verified(station_means(recordings, triad), site, unit, uncertainty)
+
+
+def verify_gyros(
+    recordings: Sequence[Recording],
+    site: Site,
+    unit: Unit,
+    uncertainty: TableUncertainty = TableUncertainty(),
+    correction: GyroThermalCorrection | None = None,
+) -> TriadVerification:
+    """Verify the gyros, by a correction for temperature first where there is one. Raises as `verify_triad`."""
+    means, more = station_means(recordings, "gyro"), None
+    if correction is not None:
+        means, more = gyros_at_reference(recordings, means, correction)
+    return _verified(means, site, unit, uncertainty, more)
 
 
 def verify_at_reference(

@@ -114,3 +114,16 @@ def predicted_sd(covariance: Array) -> float:
     """
     n = len(covariance)
     return float(np.sqrt(max(0.0, (np.trace(covariance) - covariance.sum() / n) / (n - 1)))) if n > 1 else 0.0
+
+
+def effective_freedom(covariance: Array) -> float:
+    """Effective degrees of freedom of a sample variance over stations whose errors have this covariance (n, n).
+
+    ``ν = (tr P)²/tr P²`` with P the covariance of the errors about their mean (Satterthwaite's, by the first two
+    moments): n − 1 for equal independent errors, fewer where a few coefficients move all stations together.
+    """
+    n = len(covariance)
+    centre = np.eye(n) - 1.0 / n
+    about_mean = centre @ covariance @ centre
+    squares = float(np.sum(about_mean**2))
+    return float(np.trace(about_mean)) ** 2 / squares if squares > 0.0 else float(n - 1)

@@ -20,6 +20,8 @@ WINDOW = 64
 USUAL = 0.8
 """A run is judged against this quantile of the windows of its piece: a channel whose level drifts between two counts
 repeats more often at some times than at others."""
+NEAR = 256
+"""Samples on each side of a run that show how often its channels repeat, and repeat together, at that time."""
 LEAST_PART = 1e-3
 """Least share of repeats that a channel is assumed to have."""
 KEPT = 1000
@@ -34,6 +36,16 @@ class Run:
 
     first_index: int
     length: int
+
+
+@dataclass(frozen=True)
+class Around:
+    """Shares of samples that repeat beside a run."""
+
+    parts: Array
+    """Of each channel, (channels,)."""
+    together: float
+    """Of all channels of the group at once."""
 
 
 @dataclass
@@ -75,7 +87,7 @@ class Stalls:
                 continue
             together = same[rows[0]] if len(rows) == 1 else np.logical_and.reduce(same[rows])
             part = self._usual(same) if part is None else part
-            self._runs(group, together, start, part)
+            self._runs(group, together, start, part, same)
         if part is None and np.isnan(self._part).any():
             self._usual(same)
 
@@ -88,7 +100,7 @@ class Stalls:
         for group in self._groups:
             if group.open:
                 part = np.where(np.isnan(self._part), LEAST_PART, self._part)
-                self._keep(group, self._seen - group.open, group.open, part, shift=1)
+                self._keep(group, self._seen - group.open, group.open, part, None, shift=1)
         larger: list[Run] = []
         several = len(self.repeats) > 1
         for group in self._groups:
@@ -117,13 +129,14 @@ class Stalls:
                 self._part[c] = np.quantile(moving, USUAL)
         return np.where(np.isnan(self._part), LEAST_PART, self._part)
 
-    def _runs(self, group: Group, rows: Mask, start: int, part: Array) -> None:
+    def _runs(self, group: Group, rows: Mask, start: int, part: Array, same: Mask) -> None:
         carried, group.open = group.open, 0
         if rows.all():
             group.open = carried + len(rows)
             return
         first, group.open = int(np.argmin(rows)), int(np.argmin(rows[::-1]))
-        self._keep(group, start - carried, carried + first, part)
+        if carried + first >= SHORTEST:
+            self._keep(group, start - carried, carried + first, part, _around(same, rows, 0, first))
         inner = rows[first : len(rows) - group.open]
         shortest = self._shortest(group, part)
         if not _has_run_of(inner, shortest):
@@ -131,27 +144,42 @@ class Stalls:
         edges = np.flatnonzero(inner[1:] != inner[:-1]) + 1
         begins, ends = edges[::2], edges[1::2]
         for i in np.flatnonzero(ends - begins >= shortest).tolist():
-            self._keep(group, start + first + int(begins[i]), int(ends[i] - begins[i]), part)
+            begin, end = first + int(begins[i]), first + int(ends[i])
+            self._keep(group, start + begin, end - begin, part, _around(same, rows, begin, end))
 
-    def _keep(self, group: Group, first: int, length: int, part: Array, shift: int = 0) -> None:
-        if length < self._shortest(group, part):
+    def _keep(self, group: Group, first: int, length: int, part: Array, around: Around | None, shift: int = 0) -> None:
+        if around is not None:
+            part = np.maximum(part, around.parts)
+        if length < self._shortest(group, part, around.together if around is not None else 0.0):
             return
         if len(group.runs) < KEPT:
             group.runs.append(Run(first + shift, length))
         else:
             group.lost += 1
 
-    def _shortest(self, group: Group, part: Array) -> float:
+    def _shortest(self, group: Group, part: Array, together: float = 0.0) -> float:
         """Least length of a run that is beyond chance, `SHORTEST` at least; infinite where there is no evidence.
 
-        ``N·Π p_c^L < CHANCE`` over the channels that count as evidence, solved for L.
+        ``N·p^L < CHANCE``, solved for L, where p is the product of the shares of the channels that count as evidence,
+        or the share `together` in which all of them repeat at once, if it is greater: noise that the channels have in
+        common moves them together.
         """
         p = part[list(group.rows)]
         witnesses = p[p < BUSY]
         if not len(witnesses) or (len(group.rows) > 1 and len(witnesses) < 2):
             return np.inf
         each = float(np.sum(np.log(np.maximum(witnesses, LEAST_PART))))
+        each = max(each, float(np.log(together))) if together > 0.0 else each
         return max(float(SHORTEST), np.floor((np.log(CHANCE) - np.log(max(self._seen, 1))) / each) + 1.0)
+
+
+def _around(same: Mask, rows: Mask, begin: int, end: int) -> Around | None:
+    """Shares of repeats beside a run; None where the piece has too few samples there."""
+    before, after = slice(max(begin - NEAR, 0), begin), slice(end, end + NEAR)
+    beside = np.hstack([same[:, before], same[:, after]])
+    if beside.shape[1] < NEAR:
+        return None
+    return Around(beside.mean(axis=1), float(np.concatenate([rows[before], rows[after]]).mean()))
 
 
 def _has_run(same: Mask, zeros: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -154,7 +154,6 @@ class FitnessStream:
 
     def _of_repeats(self, found: list[list[Finding]], words: Wording) -> None:
         """Add findings on repeated rows, copied channels, hung links, and channels that stand still."""
-        fed = not self._settings.reads_gravity
         sampled = np.array([c.quantity not in INCREMENTS for c in self._channels])
         groups = self._stalls.finish(sampled | self._copies.fine())
         rows = self._repeats.rows
@@ -169,9 +168,9 @@ class FitnessStream:
             if not group.runs or any(c in held or c in copied for c in group.rows):
                 continue
             if len(group.rows) == len(self._channels):
-                finding = time_flaws.hung(group, words, fed)
+                finding = time_flaws.hung(group, words)
             else:
-                finding = time_flaws.stands_still(group, [self._channels[c].name for c in group.rows], words, fed)
+                finding = time_flaws.stands_still(group, [self._channels[c].name for c in group.rows], words)
             for c in group.rows:
                 if c in live:
                     found[c].append(finding)

@@ -17,8 +17,6 @@ SHORT_RUN = 10
 """Run of repeated rows from which on the data link was hung; a shorter one is a glitch."""
 SHORT_SHARE = 1e-3
 """Share of a channel's samples that may stand still before the channel is refused."""
-FED_SHARE = 0.05
-"""The same where a constant current is fed into the converters: their codes repeat where it stands near one of them."""
 LEAST_CHANGE = float(np.log(1.4))
 """Least change of the noise, in the logarithm; temperature and a level's place between two counts change it less."""
 NOISE_SPREADS = 6.0
@@ -107,8 +105,8 @@ def noise_changes(channel: Channel, found: Sequence[Change], size: int, words: W
     return [Finding(Kind.NOISE_CHANGE, Severity.WARN, told, found[0].index * size, len(found))]
 
 
-def hung(group: Group, words: Wording, fed: bool = False) -> Finding:
-    """Finding on rows that repeat in a run; `fed`: the channels read a constant current, not gravity."""
+def hung(group: Group, words: Wording) -> Finding:
+    """Finding on rows that repeat in a run."""
     longest = max(group.runs, key=lambda run: run.length)
     told = (
         f"{longest.length} rows in a row repeat the one before exactly, from sample {words.at(longest.first_index)}: "
@@ -117,13 +115,12 @@ def hung(group: Group, words: Wording, fed: bool = False) -> Finding:
     count, total = len(group.runs) + group.lost, sum(run.length for run in group.runs)
     if count > 1:
         told += f"; {count} such runs, {words.share(total)} in all, from samples {_places(group, words)}"
-    long = total > FED_SHARE * words.seen if fed else longest.length >= SHORT_RUN
-    severity = Severity.REFUSE if long else Severity.WARN
+    severity = Severity.REFUSE if longest.length >= SHORT_RUN else Severity.WARN
     return Finding(Kind.REPEATED, severity, told, longest.first_index, longest.length, of_row=True)
 
 
-def stands_still(group: Group, names: Sequence[str], words: Wording, fed: bool = False) -> Finding:
-    """Finding on one channel or triad that repeats in runs while others move; `fed` as in `hung`."""
+def stands_still(group: Group, names: Sequence[str], words: Wording) -> Finding:
+    """Finding on one channel or triad that repeats in runs while others move."""
     longest = max(group.runs, key=lambda run: run.length)
     total, count = sum(run.length for run in group.runs), len(group.runs) + group.lost
     times = "once" if count == 1 else f"{count} times"
@@ -133,7 +130,7 @@ def stands_still(group: Group, names: Sequence[str], words: Wording, fed: bool =
     )
     if count > 1:
         told += f"; from samples {_places(group, words)}"
-    severity = Severity.REFUSE if total > (FED_SHARE if fed else SHORT_SHARE) * words.seen else Severity.WARN
+    severity = Severity.REFUSE if total > SHORT_SHARE * words.seen else Severity.WARN
     return Finding(Kind.STANDS_STILL, severity, told, longest.first_index, total)
 
 

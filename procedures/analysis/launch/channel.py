@@ -12,6 +12,7 @@ from procedures.analysis.allan.statistic import ALLAN, OVERLAPPING_ALLAN, Sizes,
 from procedures.analysis.averaging_time import averaging_time
 from procedures.analysis.cells import Cells
 from procedures.analysis.launch.context import ChannelContext
+from procedures.analysis.launch.lines import SpectralLine
 from procedures.analysis.launch.model import found_noise
 from procedures.analysis.launch.results import (
     PROCESSES,
@@ -21,11 +22,11 @@ from procedures.analysis.launch.results import (
     Coefficient,
     Curve,
     Reading,
-    SpectralLine,
     Stage,
 )
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.signal import CleanSignal, Step
+from procedures.analysis.launch.surroundings import correlations, vibration
 from procedures.analysis.noise_fit.comparison import compare
 from procedures.analysis.noise_fit.estimate import Estimate, NoiseFit
 from procedures.analysis.noise_fit.least_squares import fit_allan
@@ -91,6 +92,12 @@ def channel_noise(
         temperature=found.temperature,
         shift=found.shift,
         density=found.density,
+        temperatures=correlations(
+            signal.steps[0].cells[signal.first_cell :],  # with the self-heating: that is what follows a temperature
+            {n: t[signal.first_cell :] for n, t in context.temperatures.items()},
+            cell_s,
+        ),
+        vibration=vibration(found.density, likelihood.lines, likelihood.coefficients(), 0.5 * whole.rate_hz),
     )
 
 
@@ -168,7 +175,8 @@ def _split(series: Array, cell_s: float, rate_unit: str, settings: LaunchSetting
 
 def _band(series: Array, cell_s: float, settings: LaunchSettings) -> BandCurve:
     """The band over all starts, from the cells: it vanishes below one cell; with few terms its minimum is near zero."""
-    sizes = decade_sizes(ALLAN.largest(len(series)) // BAND_TERMS, 1.0 / settings.points_per_decade)
+    step = settings.band_step_decades or 1.0 / settings.points_per_decade
+    sizes = decade_sizes(ALLAN.largest(len(series)) // BAND_TERMS, step)
     stream = BandStream(1.0 / cell_s, len(series), sizes=sizes)
     stream.add(series)
     band = stream.finish()

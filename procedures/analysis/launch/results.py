@@ -6,6 +6,8 @@
 from dataclasses import dataclass
 
 from procedures.analysis.launch.density import Density
+from procedures.analysis.launch.lines import SpectralLine
+from procedures.analysis.launch.surroundings import TemperatureCorrelation, Vibration
 
 PROCESSES = ("quantization", "random_walk", "bias_instability", "rate_random_walk", "rate_ramp")
 """Q [rate·s], N [rate·√s], B [rate], K [rate/√s], R [rate/s]: the attributes of `NoiseCoefficients`."""
@@ -29,15 +31,6 @@ class Reading:
     """Range of cluster times on the plot where a graphical value was read."""
     described: bool = True
     """False: the noise model does not describe the part of the record that determines this; the limit still holds."""
-
-
-@dataclass(frozen=True)
-class SpectralLine:
-    """A line that was removed from the record before its noise was fitted."""
-
-    frequency_hz: float
-    amplitude: float
-    """Amplitude of the sine [rate]."""
 
 
 @dataclass(frozen=True)
@@ -216,6 +209,10 @@ class ChannelNoise:
     shift: LevelShift | None = None
     density: Density | None = None
     """Power spectral density of what the coefficients refer to; None in results of earlier versions."""
+    temperatures: tuple[TemperatureCorrelation, ...] = ()
+    """Correlation with each temperature recorded beside; empty where there is none."""
+    vibration: Vibration | None = None
+    """Root mean square above 1 Hz; None where the launch was not sampled so fast, or in earlier versions."""
 
     def coefficient(self, process: str) -> Coefficient:
         """The coefficient of one of the five processes."""

@@ -27,3 +27,5 @@ class LaunchSettings:
     level: float = 0.01
     """Probability with which an absent process is reported present."""
     points_per_decade: int = 10
+    band_step_decades: float | None = None
+    """Step of the band over all starts; None: that of the curves."""

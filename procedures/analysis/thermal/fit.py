@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import fdtrc
 
 from procedures.analysis.least_squares.determination import require_full_rank
 from procedures.analysis.thermal.correlated import LinearFit, fit_linear, whiten
+from procedures.analysis.thermal.order import LARGEST_ORDER, Order, compare_orders
 from procedures.analysis.thermal.runs import AXES, ThermalRun
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
@@ -32,21 +32,6 @@ from procedures.core.thermal_correction import (
 PASSES = 3
 """Gauss–Newton iterations: the model is linear but for a scale that moves by parts in a hundred."""
 RANK_TOLERANCE = 1e-7
-
-
-@dataclass(frozen=True)
-class Order:
-    """Was the second order the right one? All on the same cells, whitened where the fit was."""
-
-    bic: tuple[float, float, float]
-    """Bayesian information criterion of orders 1, 2, 3: ``n_e·ln(rss/m) + k·ln n_e``, n_e the effective samples."""
-    p_value: tuple[float, float]
-    """F test of order 2 against 1, and of 3 against 2: the chance of as much gain from noise alone."""
-
-    @property
-    def preferred(self) -> int:
-        """The order of the least criterion."""
-        return 1 + int(np.argmin(self.bic))
 
 
 @dataclass(frozen=True)
@@ -187,7 +172,7 @@ class _Problem:
         return np.array([*bias, *scale, *np.zeros(len(self._powers_a) + len(self._powers_b))], dtype=np.float64)
 
     def linear(self, parameters: Array, order: int) -> tuple[list[Array], list[Array]]:
-        """Jacobian of V and measured minus modelled V, run by run; with `order` 3 cubes are appended.
+        """Jacobian of V and measured minus modelled V, run by run; an `order` above 2 appends powers 3, …
 
         ``V = f/(K0 + A) − B0 − B``; ``∂V/∂α = −f·x/(K0 + A)²``, ``∂V/∂β = −x``.
         """
@@ -211,9 +196,9 @@ class _Problem:
             else:
                 heads[:, h:] = of_gain[:, None] / v
             columns = [heads, of_gain[:, None] * of_a, -of_b]
-            if order == 3:
-                cubes = terms(self.form, tuple((s, 3) for s in self.sensors), dt, db, run.dynamic)
-                columns += [of_gain[:, None] * cubes, -cubes]
+            for power in range(3, order + 1):
+                higher = terms(self.form, tuple((s, power) for s in self.sensors), dt, db, run.dynamic)
+                columns += [of_gain[:, None] * higher, -higher]
             designs.append(np.column_stack(columns))
             modelled = force / gain - b0 - of_b @ parameters[h + v + a :]
             values.append(run.output_m_s2[:, self.axis] - modelled)
@@ -268,29 +253,21 @@ def _spread(runs: Sequence[ThermalRun], residuals: Sequence[Array]) -> tuple[flo
 
 
 def _order(problem: _Problem, parameters: Array, fit: LinearFit, weights: Sequence[Array]) -> Order:
-    """Compare orders 1, 2 and 3 on cells weighted and whitened alike, linear about the answer."""
-    designs, values = problem.linear(parameters, 3)
+    """Compare orders 1 … 5 on cells weighted and whitened alike, linear about the answer."""
+    designs, values = problem.linear(parameters, LARGEST_ORDER)
     variances = (
         fit.spectrum.variances if fit.spectrum and fit.whitened else [np.ones(len(r.dynamic)) for r in problem.runs]
     )
-    cubic = np.concatenate([whiten(w[:, None] * d, v) for d, w, v in zip(designs, weights, variances, strict=True)])
+    columns = np.concatenate([whiten(w[:, None] * d, v) for d, w, v in zip(designs, weights, variances, strict=True)])
     # Linear about the answer: order 1 must explain the quadratic part too, so that is put back into the values.
-    square, second = problem.quadratic(), designs[0].shape[1] - 2 * len(problem.sensors)
+    square = problem.quadratic()
     kept = np.concatenate([whiten(w * y, v) for y, w, v in zip(values, weights, variances, strict=True)])
-    kept = kept + cubic[:, square] @ parameters[square]
-    sets = ([i for i in range(second) if i not in square], list(range(second)), list(range(cubic.shape[1])))
-    scaled = cubic / np.linalg.norm(cubic, axis=0)
-    rss = [float(np.sum((kept - scaled[:, s] @ np.linalg.lstsq(scaled[:, s], kept)[0]) ** 2)) for s in sets]
-    m, n_e = len(kept), fit.effective_samples
-    bic = [n_e * float(np.log(r / m)) + len(s) * float(np.log(n_e)) for r, s in zip(rss, sets, strict=True)]
-    independent = float(m) if fit.whitened else n_e
-    p_values = [_f_test(rss[i], rss[i + 1], len(sets[i]), len(sets[i + 1]), independent) for i in (0, 1)]
-    return Order((bic[0], bic[1], bic[2]), (p_values[0], p_values[1]))
-
-
-def _f_test(fewer: float, more: float, k_fewer: int, k_more: int, count: float) -> float:
-    """p-value of ``F = ((rss₁ − rss₂)/(k₂ − k₁))/(rss₂/(m − k₂))``, m independent values; 1 where m is too few."""
-    if count <= k_more:
-        return 1.0
-    statistic = (fewer - more) / (k_more - k_fewer) / (more / (count - k_more))
-    return float(fdtrc(k_more - k_fewer, count - k_more, max(statistic, 0.0)))
+    kept = kept + columns[:, square] @ parameters[square]
+    sensors = len(problem.sensors)
+    second = columns.shape[1] - 2 * (LARGEST_ORDER - 2) * sensors
+    higher = range(second, columns.shape[1])  # power by power, of A and of B
+    sets = [[i for i in range(second) if i not in square], list(range(second))]
+    orders = range(3, LARGEST_ORDER + 1)
+    sets += [[*range(second), *higher[: 2 * (order - 2) * sensors]] for order in orders]
+    independent = float(len(kept)) if fit.whitened else fit.effective_samples
+    return compare_orders(columns, sets, kept, fit.effective_samples, independent)

@@ -159,7 +159,7 @@ class ProfileProgress:
             self._reached_s = t_s
         slopes = self.slopes_c_min
         slow = all(abs(slope) <= criterion.slope_c_min for slope in slopes)
-        if not (there and slow and not self._hidden(t_s)):
+        if not (there and slow and self._windowed(t_s) and not self._hidden(t_s)):
             self._soaked_s = None
         elif self._soaked_s is None:
             self._soaked_s = t_s
@@ -169,6 +169,13 @@ class ProfileProgress:
             self._end(leg, t_s, slopes, air_c)
             return Standing.DONE
         return Standing.LATE if since_s >= leg.longest_s else Standing.UNDER_WAY
+
+    def _windowed(self, t_s: float) -> bool:
+        """Whether the whole window lies after the air's arrival.
+
+        Before it the unit has only begun to follow: its slope is small because of its lag, not because it has soaked.
+        """
+        return self._reached_s is not None and t_s - self._reached_s >= self.profile.criterion.window_s
 
     def _hidden(self, t_s: float) -> str:
         """Warning where a drift beyond the limit may hide in the steps of a sensor's readings, else empty."""

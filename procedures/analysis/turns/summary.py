@@ -113,9 +113,11 @@ def _require_turns(motion: Turning, outputs: Array, labels: Sequence[str]) -> No
     for i, channel in enumerate(motion.channels):
         made = motion.angle_rad[i] * np.sign(motion.axis_b[i, channel])
         if not abs(outputs[i, channel] / made - 1.0) < PLAUSIBLE:
+            others = [a for c, a in enumerate(AXES) if abs(abs(outputs[i, c] / made) - 1.0) < PLAUSIBLE]
+            counted = f"; gyro_{others[0]} counted them: the channels are exchanged" if others else ""
             raise UnfitRecording(
                 f"station {labels[i]}: gyro_{AXES[channel]} counted {outputs[i, channel] / (2.0 * np.pi):.4g} turns "
-                f"where {made / (2.0 * np.pi):.4g} were made"
+                f"where {made / (2.0 * np.pi):.4g} were made{counted}"
             )
 
 

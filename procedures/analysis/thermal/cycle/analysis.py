@@ -7,9 +7,12 @@ from math import isfinite
 import numpy as np
 
 from procedures.analysis.thermal.correlation import correlation
+from procedures.analysis.thermal.cycle.doubts import doubts
 from procedures.analysis.thermal.cycle.fitted_range import extrapolated, range_of
 from procedures.analysis.thermal.cycle.forms import RunSoaks, normalised_triad, soak_table, soaks_of, worth
+from procedures.analysis.thermal.cycle.gyro_correction import correct_gyros
 from procedures.analysis.thermal.cycle.gyros import found, gyro_noises, gyro_temperatures
+from procedures.analysis.thermal.cycle.hysteresis import hysteresis
 from procedures.analysis.thermal.cycle.results import (
     AccelerometerCorrelation,
     AxisFound,
@@ -18,6 +21,7 @@ from procedures.analysis.thermal.cycle.results import (
     ThermalCycle,
 )
 from procedures.analysis.thermal.cycle.runs import CycleSettings, PreparedRun, prepare, with_forces
+from procedures.analysis.thermal.cycle.sensors import as_temperatures, with_delay, with_thermometers
 from procedures.analysis.thermal.cycle.series import CycleSeries
 from procedures.analysis.thermal.cycle.traces import allan_of, leg_regimes, trace
 from procedures.analysis.thermal.fit import AxisFit, fit_correction
@@ -27,18 +31,12 @@ from procedures.core.errors import DomainError
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import AXES
-from procedures.core.thermal_correction import Form, ThermalCorrection
+from procedures.core.thermal_correction import AxisCorrection, Form, ThermalCorrection
+from procedures.core.thermometers import ThermometerCorrection
 
 CURRENT = "the unit's current correction"
-SINGLE_REGIME_SHARE = 0.02
-"""Share of a run in a regime below which that regime is not reported."""
-WORSE = 1.5
-"""A dynamic regime that the fit explains so many times worse than the static one has heat where no sensor is. Tried on
-the rig: 0.8 to 1.0 where every term acts at a sensor, 2.4 to 2.8 where some act at a block without one."""
 SAME_REFERENCE_C = 0.05
 """The converter drifts some 1e-4 m/s² a °C: a smaller difference is below every claim."""
-REFERENCE_WITHIN_C = 8.0
-"""Greatest distance of a reference soak from the reference temperature without a warning."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +48,8 @@ class KnownOfUnit:
     """Calibration of the accelerometers, in m/s²."""
     correction: ThermalCorrection | None = None
     gyro_noise: tuple[NoiseCoefficients, ...] | None = None
+    thermometers: ThermometerCorrection | None = None
+    accelerometer_noise: tuple[NoiseCoefficients, ...] | None = None
 
 
 def analyse_cycle(
@@ -69,25 +69,33 @@ def analyse_cycle(
     Raises `BadParameter`, `Undetermined`, `UnfitRecording`.
     """
     converter = _first_stage(known, judge_current)
+    thermometers = _thermometers(known, judge_current)
+    if judge_current and known.correction is not None:
+        settings = replace(settings, static=known.correction.static_sensors)
     warnings = [*_unknowns(known, converter), *_two_references(converter, settings)]
-    runs = [prepare(s, settings, gravity_m_s2, converter) for _, s in series]
+    temperatures = [as_temperatures(s, thermometers) for _, s in series]
+    settings, following, not_found = with_delay(temperatures, settings)
+    runs = [prepare(s, settings, gravity_m_s2, converter) for s in temperatures]
     if known.calibration is not None:
-        runs, doubts = with_forces(runs, settings, known.calibration)
-        warnings += doubts
+        runs, doubtful = with_forces(runs, settings, known.calibration)
+        warnings += doubtful
     cells = [run.cells for run in runs]
-    lags = (settings.lag_sd_s, settings.lag_sd_s)
-    fitted, fits = fit_correction(cells, settings.reference_c, form, lags)
-    correction = replace(fitted, first_stage=converter, fitted_range=range_of(cells))
+    fitted, fits = fit_correction(cells, settings.reference_c, form, settings.lag_sds_s)
+    correction = replace(fitted, first_stage=converter, fitted_range=range_of(cells), static_sensors=settings.static)
+    correction = with_thermometers(correction, thermometers)
     judged = known.correction if judge_current and known.correction is not None else correction
     soaked = [soaks_of(run, judged.axes[0].case_reference_c) for run in runs]
-    comparable = known.correction if known.correction and known.correction.first_stage == converter else None
+    comparable = known.correction if known.correction and _comparable(known.correction, correction) else None
     forms, refused = _forms(runs, soaked, correction, settings, gravity_m_s2, comparable)
     plain = _plain(judged)
     found_runs = tuple(
         _run(recording, run, judged, plain, soak, settings, gravity_m_s2)
         for (recording, _), run, soak in zip(series, runs, soaked, strict=True)
     )
-    axes = [_axis(fit) for fit in fits]
+    axes = [_axis(fit, axis) for fit, axis in zip(fits, correction.axes, strict=True)]
+    gyro_noise = None if noise_from_cycle else known.gyro_noise
+    gyros = gyro_temperatures(runs, settings, gyro_noise)
+    gyro_correction, gyros_corrected = correct_gyros(runs, gyros, settings, gyro_noise, thermometers)
     return ThermalCycle(
         judged="current" if judged is not correction else "fit",
         reference_c=settings.reference_c,
@@ -101,10 +109,19 @@ def analyse_cycle(
         magnitude_m_s2=tuple((_about_mean(r, plain, gravity_m_s2), _about_mean(r, judged, gravity_m_s2)) for r in runs),
         forms=forms,
         accelerometers=_correlations(runs, judged),
-        gyros=gyro_temperatures(runs, settings, None if noise_from_cycle else known.gyro_noise),
+        gyros=gyros,
         gyro_noise=gyro_noises(runs, settings, known.gyro_noise),
         allan=tuple(curve for run in runs for curve in allan_of(run, judged)),
-        warnings=(*warnings, *refused, *_doubts(found_runs, soaked, axes, settings), *extrapolated(cells, judged)),
+        warnings=(
+            *(*warnings, *not_found, *refused, *doubts(found_runs, soaked, axes, settings)),
+            *extrapolated(cells, judged),
+        ),
+        following=following,
+        converter_lag_s=settings.converter_lag_s,
+        thermometers=thermometers is not None,
+        hysteresis=hysteresis(runs, soaked, judged, known.accelerometer_noise or [fit.noise for fit in fits]),
+        gyro_correction=gyro_correction,
+        gyros_corrected=gyros_corrected,
     )
 
 
@@ -113,6 +130,19 @@ def _first_stage(known: KnownOfUnit, judge_current: bool) -> ConverterTriad | No
     if judge_current and known.correction is not None:
         return known.correction.first_stage
     return known.converter
+
+
+def _thermometers(known: KnownOfUnit, judge_current: bool) -> ThermometerCorrection | None:
+    """The correction of the sensors to take out first: the one that goes with the correction that is judged."""
+    if judge_current and known.correction is not None:
+        return known.correction.thermometers
+    return known.thermometers
+
+
+def _comparable(current: ThermalCorrection, fitted: ThermalCorrection) -> bool:
+    """Whether a current correction is one of the same outputs and temperatures as the fitted one."""
+    same = (current.first_stage, current.thermometers, current.static_sensors)
+    return same == (fitted.first_stage, fitted.thermometers, fitted.static_sensors)
 
 
 def _two_references(converter: ConverterTriad | None, settings: CycleSettings) -> list[str]:
@@ -176,9 +206,35 @@ def _forms(
         add("normalised polynomial (C)", normalised_triad(runs, soaked, settings.reference_c[0]))
     except DomainError as refusal:
         refused.append(f"C's normalised polynomial could not be fitted for comparison: {refusal}")
+    _other_sensor(runs, soaked, settings, gravity_m_s2, chosen, answers, refused)
     if current is not None:
         add(CURRENT, current)
     return tuple(answers), refused
+
+
+OTHER_SENSOR = {
+    "case": "thesis 4.1, each axis by its own gyro's thermometer",
+    "gyros": "all axes by the case's thermometer",
+}
+"""The other choice of the static sensor, by the one that was chosen."""
+
+
+def _other_sensor(
+    runs: Sequence[PreparedRun],
+    soaked: Sequence[RunSoaks],
+    settings: CycleSettings,
+    gravity_m_s2: float,
+    form: Form,
+    answers: list[FormFound],
+    refused: list[str],
+) -> None:
+    """Add the chosen form with the other choice of the static sensor, on the same cycles."""
+    name, others = OTHER_SENSOR[settings.static], [replace(run, cells=run.other) for run in runs]
+    try:
+        made = fit_correction([run.cells for run in others], settings.reference_c, form)[0]
+        answers.append(worth(name, others, soaked, made, gravity_m_s2))
+    except DomainError as refusal:
+        refused.append(f"{name}: could not be fitted for comparison: {refusal}")
 
 
 def _run(
@@ -208,17 +264,18 @@ def _about_mean(run: PreparedRun, correction: Corrects, gravity_m_s2: float) -> 
     return float(np.std(errors))
 
 
-def _axis(fit: AxisFit) -> AxisFound:
+def _axis(fit: AxisFit, correction: AxisCorrection) -> AxisFound:
     still, moving = (sd if isfinite(sd) else None for sd in fit.residual_sd_m_s2)
     return AxisFound(
-        fit.correction,
-        tuple(fit.correction.standard_uncertainties().tolist()),
+        correction,
+        tuple(correction.standard_uncertainties().tolist()),
         (still, moving),
         fit.effective_samples,
         fit.condition,
         fit.order.bic,
         fit.order.p_value,
         fit.order.preferred,
+        fit.order.reason(2),
     )
 
 
@@ -230,52 +287,8 @@ def _correlations(runs: Sequence[PreparedRun], judged: Corrects) -> tuple[Accele
         for run, forces in zip(runs, after, strict=True):
             before = run.cells.output_m_s2[:, axis] * judged.scales[axis]
             old, new = (
-                found(run.series.name, name, correlation(v, run.cells.case_c, run.cells.cell_s))
+                found(run.series.name, name, correlation(v, run.cells.case(axis), run.cells.cell_s))
                 for v in (before, forces[:, axis])
             )
             answers.append(AccelerometerCorrelation(old, new))
     return tuple(answers)
-
-
-def _doubts(
-    runs: Sequence[RunFound], soaked: Sequence[RunSoaks], axes: Sequence[AxisFound], settings: CycleSettings
-) -> list[str]:
-    """Warnings that limit the confidence in the numbers of a cycle."""
-    warnings: list[str] = []
-    for run, soak in zip(runs, soaked, strict=True):
-        warnings += _of_regimes(run, settings.regime.delay_s)
-        if abs(soak.reference.case_c - settings.reference_c[0]) > REFERENCE_WITHIN_C:
-            warnings.append(
-                f"{run.name}: the soak nearest to the reference of {settings.reference_c[0]:g} °C had its case at "
-                f"{soak.reference.case_c:.1f} °C: 3σ is about that one, and K0 and B0 are extrapolated"
-            )
-    for name, axis in zip(AXES, axes, strict=True):
-        still, moving = axis.residual_sd_m_s2
-        if still and moving and moving > WORSE * still:
-            warnings.append(
-                f"accelerometer {name}: what the fit leaves is {moving / still:.1f} times as large on ramps as in "
-                f"soaks ({moving:.2g} against {still:.2g} m/s²): heat acts where no sensor is, or a sensor's lag is "
-                "not what it was given as"
-            )
-        if axis.preferred_order != 2:
-            warnings.append(
-                f"accelerometer {name}: by the Bayesian criterion order {axis.preferred_order} describes the cycle "
-                "best, the correction is of the second"
-            )
-    return warnings
-
-
-def _of_regimes(run: RunFound, delay_s: float) -> list[str]:
-    warnings: list[str] = []
-    if min(run.static_share, 1.0 - run.static_share) < SINGLE_REGIME_SHARE:
-        warnings.append(f"{run.name}: {run.static_share:.0%} of the run was static: one regime is hardly there")
-    for number, (leg, regime) in enumerate(zip(run.legs, run.regimes, strict=True), start=1):
-        where = f"{run.name}, leg {number} ({leg.target_c:g} °C)"
-        if regime.onset_delay_s is not None and regime.onset_delay_s > delay_s:
-            warnings.append(
-                f"{where}: the regime became dynamic {regime.onset_delay_s:.0f} s after the ramp began, later than the "
-                f"indicator's {delay_s:.0f} s"
-            )
-        if regime.chatter:
-            warnings.append(f"{where}: the regime became dynamic {regime.chatter} times with no ramp to explain it")
-    return warnings

@@ -104,9 +104,10 @@ class NormalisedTriad:
         return np.array([1.0 / gain.at_reference for gain in self.gains])
 
     def apply(self, output_m_s2: Array, case_c: Array, converter_c: Array, dynamic: ArrayLike) -> Array:
-        """``f = (V − V0 − Fs(t))/(K·Fc(t))`` at case temperatures (n,); nothing else is asked."""
+        """``f = (V − V0 − Fs(t))/(K·Fc(t))`` at case temperatures (n,), or (n, 3) by axis; nothing else is asked."""
+        own = case_c if case_c.ndim == 2 else np.repeat(case_c[:, None], 3, axis=1)
         columns = [
-            (output_m_s2[:, axis] - zero.value(case_c)) / gain.value(case_c)
+            (output_m_s2[:, axis] - zero.value(own[:, axis])) / gain.value(own[:, axis])
             for axis, (zero, gain) in enumerate(zip(self.zeros, self.gains, strict=True))
         ]
         return np.column_stack(columns)

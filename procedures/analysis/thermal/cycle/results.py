@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
+from procedures.analysis.thermal.following import Following
 from procedures.analysis.thermal.profile_progress import LegEvidence
+from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.thermal_correction import AxisCorrection, ThermalCorrection
 
 Triple = tuple[float, float, float]
@@ -74,11 +76,13 @@ class AxisFound:
     """Residual standard deviations of the cells, static and dynamic."""
     effective_samples: float
     condition: float
-    bic: Triple
-    """Bayesian criterion of orders 1, 2 and 3."""
-    p_values: tuple[float, float]
-    """F test of order 2 against 1, and of 3 against 2."""
+    bic: tuple[float, ...]
+    """Bayesian criterion of orders 1 … 5."""
+    p_values: tuple[float, ...]
+    """F test of order 2 against 1, of 3 against 2, …"""
     preferred_order: int
+    order_reason: str = ""
+    """Reason for or against the second order, in a sentence."""
 
 
 @dataclass(frozen=True)
@@ -177,6 +181,31 @@ class AllanFound:
 
 
 @dataclass(frozen=True)
+class Hysteresis:
+    """Corrected accelerometer at one temperature, reached from below less reached from above, in one run."""
+
+    run: str
+    axis: str
+    target_c: float
+    difference_m_s2: float
+    standard_uncertainty_m_s2: float
+    p_value: float
+    """Chance of as large a difference from the noise of the fit's residuals."""
+
+
+@dataclass(frozen=True)
+class GyroCorrected:
+    """Correction of a gyro that depends on temperature."""
+
+    axis: str
+    order: int
+    reason: str
+    p_before: float
+    p_after: float | None
+    """What is left, each run corrected by a fit to the others; None with a single run."""
+
+
+@dataclass(frozen=True)
 class ThermalCycle:
     """Complete results of a thermal cycle."""
 
@@ -204,3 +233,13 @@ class ThermalCycle:
     gyro_noise: tuple[GyroNoise, ...]
     allan: tuple[AllanFound, ...]
     warnings: tuple[str, ...]
+    following: Following | None = None
+    """Delay of the converter's sensor, found from the readings; None where it was not found."""
+    converter_lag_s: float | None = None
+    """Time constant of the converter's sensor that the fit was given."""
+    thermometers: bool = False
+    """True if the unit's sensors were corrected by its current calibration of thermometers."""
+    hysteresis: tuple[Hysteresis, ...] = ()
+    gyro_correction: GyroThermalCorrection | None = None
+    """For gyros that depend on temperature; None where none does."""
+    gyros_corrected: tuple[GyroCorrected, ...] = ()

@@ -5,6 +5,7 @@ Stage one takes the converter's own drift out of nominal outputs first (paper C;
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from procedures.analysis.thermal.cycle.series import CycleSeries
 from procedures.analysis.thermal.fit import fit_correction
 from procedures.analysis.thermal.judgement import nearest, soaks
+from procedures.analysis.thermal.profile_progress import SENSORS
 from procedures.analysis.thermal.regime import RegimeSettings, RegimeTrace, regimes
 from procedures.analysis.thermal.runs import ThermalRun, thermal_run, without_lag
 from procedures.core.arrays import Array
@@ -19,6 +21,7 @@ from procedures.core.converter import ConverterTriad, at_reference
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.thermal_correction import ThermalCorrection
 
+GYRO_SENSORS = [i for i, name in enumerate(SENSORS) if name.startswith("temperature_gyro_")]
 PASSES = 2
 """Number of fits from whose correction each axis's output at the reference, and so its force, is derived."""
 
@@ -30,10 +33,14 @@ class CycleSettings:
     cell_s: float = 60.0
     """Length of the cells that the fits work on."""
     case_lag_s: float = 5.0
-    converter_lag_s: float = 5.0
-    """Time constants of the two sensors, by their data sheet."""
+    converter_lag_s: float | None = 5.0
+    """Time constants of the two sensors, by their data sheet; None: the converter's is found from the readings."""
     lag_sd_s: float = 0.05
     """Standard uncertainty of each time constant."""
+    converter_lag_sd_s: float | None = None
+    """That of the converter's sensor, where it differs."""
+    static: Literal["case", "gyros"] = "case"
+    """Sensor of the static terms: the case's, or each axis' own gyro's (thesis 4.1)."""
     reference_c: tuple[float, float] = (20.0, 20.0)
     """Readings of case and converter sensor at which the correction changes nothing but K0 and B0."""
     regime: RegimeSettings = field(default_factory=RegimeSettings)
@@ -46,8 +53,14 @@ class CycleSettings:
 
     @property
     def lag_s(self) -> dict[str, float]:
-        """Sensor time constants by the names of `thermal_run`."""
-        return {"case": self.case_lag_s, "converter": self.converter_lag_s}
+        """Sensor time constants by the names of `thermal_run`; the gyros' sensors are taken as the case's."""
+        board = self.case_lag_s if self.converter_lag_s is None else self.converter_lag_s
+        return {"case": self.case_lag_s, "static": self.case_lag_s, "converter": board}
+
+    @property
+    def lag_sds_s(self) -> tuple[float, float]:
+        """Standard uncertainties of the time constants of static and converter sensor."""
+        return self.lag_sd_s, self.lag_sd_s if self.converter_lag_sd_s is None else self.converter_lag_sd_s
 
 
 @dataclass(frozen=True)
@@ -60,9 +73,11 @@ class PreparedRun:
     output_m_s2: Array
     """After stage one, (n, 3)."""
     case_c: Array
-    """Without the sensor's lag, (n,)."""
+    """Regressor of the static terms without the sensor's lag, (n,), or (n, 3) by the gyros' sensors."""
     converter_c: Array
     cells: ThermalRun
+    other: ThermalRun
+    """The same cells with the other choice of the static regressor."""
 
     @property
     def dynamic(self) -> NDArray[np.bool_]:
@@ -76,22 +91,26 @@ def prepare(
 
     Raises `BadParameter`, `UnfitRecording`.
     """
-    case = without_lag(series.case_c, series.sample_s, settings.case_lag_s)
-    board = without_lag(series.converter_c, series.sample_s, settings.converter_lag_s)
+    lags = settings.lag_s
+    own = series.sensors_c[:, GYRO_SENSORS]
+    case = without_lag(series.case_c, series.sample_s, lags["case"])
+    if settings.static == "gyros":
+        case = np.column_stack([without_lag(c, series.sample_s, lags["static"]) for c in own.T])
+    board = without_lag(series.converter_c, series.sample_s, lags["converter"])
     output = series.output_m_s2
     if converter is not None:
         output = at_reference(output, board, converter)
     trace = regimes(series.case_c, series.sample_s, settings.regime)
-    cells = thermal_run(
-        series.up,
-        gravity_m_s2,
-        series.sample_s,
-        {"output": output, "case": series.case_c, "converter": series.converter_c},
-        cell_s=settings.cell_s,
-        lag_s=settings.lag_s,
-        trace=trace,
-    )
-    return PreparedRun(series, trace, output, case, board, cells)
+
+    def cells(static: Array) -> ThermalRun:
+        given = {"output": output, "case": series.case_c, "static": static, "converter": series.converter_c}
+        return thermal_run(
+            *(series.up, gravity_m_s2, series.sample_s, given), cell_s=settings.cell_s, lag_s=lags, trace=trace
+        )
+
+    by_case, by_gyros = cells(series.case_c), cells(own)
+    chosen, other = (by_gyros, by_case) if settings.static == "gyros" else (by_case, by_gyros)
+    return PreparedRun(series, trace, output, case, board, chosen, other)
 
 
 def with_forces(
@@ -134,4 +153,5 @@ def _at_reference(run: ThermalRun, correction: ThermalCorrection) -> Array:
 
 def _with_force(run: PreparedRun, force: Array) -> PreparedRun:
     x, y, z = force.tolist()
-    return replace(run, cells=replace(run.cells, force_m_s2=(x, y, z)))
+    cells, other = (replace(c, force_m_s2=(x, y, z)) for c in (run.cells, run.other))
+    return replace(run, cells=cells, other=other)

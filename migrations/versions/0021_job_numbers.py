@@ -1,13 +1,13 @@
 """short numbers of jobs, counted from 1 in each database
 
-Revision: 0017, after 0012
+Revision: 0021, after 0020
 """
 
 import sqlalchemy as sa
 from alembic import op
 
-revision = "0017"
-down_revision = "0012"
+revision = "0021"
+down_revision = "0020"
 branch_labels = None
 depends_on = None
 

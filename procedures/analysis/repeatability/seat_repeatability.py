@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from procedures.analysis.calibration.run_to_run import sd_interval
+from procedures.analysis.repeatability.run_to_run import sd_interval
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration

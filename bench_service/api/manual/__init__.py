@@ -1,0 +1,1 @@
+"""Routes of manual mode, and their schemas."""

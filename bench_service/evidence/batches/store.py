@@ -1,0 +1,88 @@
+"""PORT of memory for batches of analyses and their tasks. Every method is one transaction."""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Protocol
+
+from bench_service.model.batches import AnalysisBatch, AnalysisTask, ClaimedTask, Selection, TaskState
+from bench_service.model.job import Failure
+from bench_service.model.records import Idempotency, Page
+
+
+class BatchStore(Protocol):
+    """The stored batches, and the queue of their tasks."""
+
+    def select(self, selection: Selection, limit: int) -> tuple[tuple[str, str | None, str], ...]:
+        """(id, job, unit) of at most `limit` complete recordings of a selection, oldest first."""
+        ...
+
+    def add(
+        self, batch: AnalysisBatch, groups: Sequence[Sequence[str]], idempotency: Idempotency | None = None
+    ) -> AnalysisBatch:
+        """Add a batch with one waiting task for each group of recordings.
+
+        Raises `IdempotencyConflict`; a known key with the same fingerprint returns the first batch.
+        """
+        ...
+
+    def get(self, batch_id: str) -> AnalysisBatch:
+        """Return one batch with its counts. Raises `NotFound`."""
+        ...
+
+    def list(self, *, after: str | None = None, limit: int = 50) -> Page[AnalysisBatch]: ...
+
+    def tasks(
+        self, batch_id: str, *, state: TaskState | None = None, after: int | None = None, limit: int = 50
+    ) -> tuple[AnalysisTask, ...]:
+        """Tasks in the order of their numbers, from after a number on. Raises `NotFound`."""
+        ...
+
+    def waiting(self, most: int) -> int:
+        """Number of tasks of all batches that wait, counted up to `most`."""
+        ...
+
+    def claim(self, worker: str, at: datetime) -> ClaimedTask | None:
+        """Claim the next due task for a worker; None where none is due. No task is ever claimed by two workers."""
+        ...
+
+    def end(
+        self,
+        task: ClaimedTask,
+        worker: str,
+        state: TaskState,
+        at: datetime,
+        result: str | None = None,
+        failure: Failure | None = None,
+    ) -> bool:
+        """Write the end of a claimed task; False where the claim was lost meanwhile, and nothing is changed."""
+        ...
+
+    def put_back(
+        self, task: ClaimedTask, worker: str, not_before: datetime | None, why: Failure, spent: bool = True
+    ) -> bool:
+        """Put a claimed task back into its place in the queue; False where the claim was lost meanwhile.
+
+        `spent`: whether the attempt counts. A task of a cancelled batch is cancelled.
+        """
+        ...
+
+    def claimants(self) -> tuple[str, ...]:
+        """Names of the workers that have running tasks."""
+        ...
+
+    def orphaned(self, worker: str, most_attempts: int, at: datetime) -> int:
+        """Put all running tasks of a dead worker back; one that was claimed `most_attempts` times fails.
+
+        Returns their number.
+        """
+        ...
+
+    def cancel(self, batch_id: str, by: str, at: datetime) -> AnalysisBatch:
+        """Cancel every waiting task of a batch; running ones end by themselves. Raises `NotFound`,
+        `IllegalTransition` for a batch that has ended.
+        """
+        ...
+
+    def retry(self, batch_id: str, at: datetime) -> AnalysisBatch:
+        """Queue the failed and cancelled tasks of an ended batch again. Raises `NotFound`, `IllegalTransition`."""
+        ...

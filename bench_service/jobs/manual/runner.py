@@ -1,0 +1,153 @@
+"""Runs leases of manual mode on the bench of this process: from taking one to a bench that is safe again.
+
+The dispatcher calls `run` where it would run a job, in its own thread, so no job starts meanwhile.
+"""
+
+import logging
+from collections.abc import Callable
+from threading import Event
+
+from bench_service.bench.driven import ShuttingDown
+from bench_service.bench.driver import BenchDriver
+from bench_service.bench.live.values import LiveBoard
+from bench_service.bench.make_safe import RoadEnd, over_new_link, whole_road
+from bench_service.bench.processes import ProcessIdentity
+from bench_service.jobs.manual.reader import LeaseReader
+from bench_service.jobs.manual.session import ManualSession
+from bench_service.jobs.stores import JobStores
+from bench_service.model.errors import ServiceError
+from bench_service.model.manual import ManualLease
+from bench_service.model.records import BenchStop
+from bench_service.telemetry.audit import AuditTrail, record
+from bench_service.wall_clock import now
+from procedures.bench import BenchNeeds
+from procedures.bench.errors import BenchError, Stopped
+
+END_S = 20.0
+"""Time that a service which ends waits for a bench in manual mode to be safe [s]."""
+WRITE_S = 2.0
+"""Time that the end of a lease waits for its last outcomes to be written [s]."""
+
+log = logging.getLogger(__name__)
+
+
+class ManualRunner:
+    """Runs one lease at a time."""
+
+    def __init__(
+        self,
+        stores: JobStores,
+        trail: AuditTrail,
+        driver: BenchDriver,
+        board: LiveBoard,
+        stopped: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Set up with `stopped`: whether the bench is stopped over its host's stop channel; asks no database."""
+        self._stores, self._trail, self._driver, self._board = stores, trail, driver, board
+        self._stopped = stopped
+        self._by = f"the worker, {ProcessIdentity.own()}"
+        self._session: ManualSession | None = None
+        self._wake = Event()
+        self._ending = Event()
+        self._idle = Event()
+        self._idle.set()
+
+    def run(self, lease: ManualLease) -> bool:
+        """Run an open lease to its end, or close one that no process runs any more; False: there was nothing to do.
+
+        Raises `ShuttingDown` once the bench is safe, and `StorageFailure` before anything was commanded.
+        """
+        if lease.began_at is not None:
+            obstacle = None if self._driver.device_state() is None else over_new_link(self._driver, self._by)
+            because = f"its process, {lease.process}, ended or lost its database"
+            self._ended(lease, because, None if obstacle is None else obstacle.why)
+            return True
+        if not lease.live(now()) or self._stopped():
+            why = "the bench is stopped" if self._stopped() else "its time was over before it began"
+            self._ended(lease, why, None)
+            return True
+        taken = self._stores.manual.take(lease.id, now(), str(ProcessIdentity.own()))
+        if taken is None:
+            return False
+        self._idle.clear()
+        try:
+            self._hold(taken)
+        finally:
+            self._idle.set()
+        return True
+
+    def wake(self) -> None:
+        """Look at the lease now: a demand came, or its end was asked for."""
+        self._wake.set()
+
+    def stop_now(self) -> None:
+        """Leave the lease and make the bench safe, whatever its own thread waits for; called by the stop guard."""
+        session = self._session
+        if session is None:
+            return
+        session.stop()
+        if self._driver.device_state() is not None:  # else the session's own link is the only one
+            self._whole_road(session)
+
+    def shut_down(self) -> None:
+        """End the lease that runs, and wait until the bench is safe: the service is ending."""
+        self._ending.set()
+        session = self._session
+        if session is not None:
+            session.shut_down()
+        self._idle.wait(END_S)
+
+    def _hold(self, lease: ManualLease) -> None:
+        description = self._driver.description
+        chamber = description.chamber is not None and not description.no_thermal_jobs
+        try:
+            bench = self._driver.open(lease.unit, None, None, BenchNeeds(temperatures=chamber, real_time=True))
+        except (BenchError, ServiceError) as error:
+            self._ended(lease, f"the bench could not be opened: {error}", None)
+            return
+        reader = LeaseReader(self._stores.manual, lease.id, self._wake)
+
+        def stop_wanted() -> bool:
+            return self._stopped() or reader.silent()
+
+        session = ManualSession(lease, bench, stop_wanted, self._board, reader.tell)
+        self._session = session
+        if self._ending.is_set():  # set while the bench was being opened, when there was no session to end
+            session.shut_down()
+        log.info("bench %s is in manual mode by %s until %s: %s", lease.bench, lease.holder, lease.until, lease.reason)
+        reader.begin(session)
+        because, ending = "", False
+        try:
+            session.hold()
+            because = reader.because or "its time was over"
+        except Stopped:
+            because = reader.because or "the bench was stopped"
+        except ShuttingDown:
+            because, ending = "the service ended", True
+        except (BenchError, ServiceError) as error:
+            because = f"{type(error).__name__}: {error}"
+        finally:
+            end = self._whole_road(session)
+            reader.end(WRITE_S)
+        detour = f"; made safe over a new link: {end.detour}" if end.detour else ""
+        self._ended(lease, because + detour, None if end.obstacle is None else end.obstacle.why)
+        if ending:
+            raise ShuttingDown
+
+    def _whole_road(self, session: ManualSession) -> RoadEnd:
+        def given_back() -> None:
+            if self._session is session:
+                self._session = None
+
+        return whole_road(session, self._driver, self._by, given_back)
+
+    def _ended(self, lease: ManualLease, because: str, unsafe: str | None) -> None:
+        """Note the end of a lease; where the bench is not safe it is stopped. What is not noted now is closed later."""
+        log.info("manual mode of bench %s has ended: %s", lease.bench, because)
+        if unsafe is not None:
+            log.error("bench %s could not be made safe: %s", lease.bench, unsafe)
+            reason = f"could not be made safe: {unsafe}"
+            self._stores.benches.stop_bench_once(BenchStop(lease.bench, now(), reason, by=self._by))
+        self._stores.manual.end(lease.id, now(), because, unsafe is None)
+        target = f"/api/v1/benches/{lease.bench}/manual/{lease.id}"
+        record(self._trail, self._by, "manual_ended", target, "noted", because=because, safe=unsafe is None)

@@ -1,0 +1,231 @@
+"""A bench while an operator drives it: demands as they come, readings meanwhile, and one end at which it is left."""
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from datetime import datetime
+from math import inf
+from typing import Any
+
+from bench_service.bench.driven import UNWIND_S, DrivenBench
+from bench_service.bench.live.devices import DeviceReadings
+from bench_service.bench.live.values import PUBLISH_S, BenchLive, LiveBoard, LiveManual
+from bench_service.jobs.manual.demands import angles, constant_rate
+from bench_service.jobs.manual.sensors import UnitReadings
+from bench_service.model.manual import MOTIONS, Answer, DemandState, ManualDemand, ManualLease
+from bench_service.wall_clock import monotonic_s, now, pause_async
+from procedures.bench import Bench
+from procedures.bench.errors import BenchError, Disconnected, OutOfRange, Stopped
+from procedures.core.errors import BadParameter
+
+TICK_S = 0.1
+"""Time that passes between two looks at the lease, of bench and real time alike [s]."""
+
+log = logging.getLogger(__name__)
+Tell = Callable[[ManualDemand, DemandState, Answer], object]
+
+
+class ManualSession(DrivenBench):
+    """Carries out demands until `leave`, a stop, or the end of the lease's time, which depends on no database."""
+
+    def __init__(
+        self, lease: ManualLease, bench: Bench, stop_wanted: Callable[[], bool], board: LiveBoard, tell: Tell
+    ) -> None:
+        """Set up with `tell`, called in the bench's thread with what becomes of a demand; it must not wait."""
+        super().__init__(f"manual lease {lease.id}", bench, stop_wanted)
+        self.lease = lease
+        self._board, self._tell = board, tell
+        self._readings = DeviceReadings(self._bench)
+        self._sensors = UnitReadings(bench)
+        self._over = asyncio.Event()
+        self._until_s = self._monotonic(lease.until)
+        self._publish_s = -inf
+        self._seen: set[str] = set()
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._motion: asyncio.Task[None] | None = None
+        self._doing = ""
+        self._order = asyncio.Lock()
+        self._failure: BenchError | None = None
+
+    def hold(self) -> None:
+        """Hold the bench until the lease ends. Raises `Stopped`, `Disconnected`, `ShuttingDown`, `StorageFailure`."""
+        self._run(self._life())
+
+    def leave(self) -> None:
+        """Make `hold` return; from any thread."""
+        self._loop.call_soon_threadsafe(self._over.set)
+
+    def expires(self, lease: ManualLease) -> None:
+        """Take over the lease's end where it was moved; from any thread.
+
+        It is counted from this moment by a clock that is never set back.
+        """
+        if lease.until != self.lease.until:
+            self._until_s = self._monotonic(lease.until)
+            self.lease = lease
+
+    def demand(self, demand: ManualDemand) -> None:
+        """Carry out a demand; one that was given before is not repeated. From any thread."""
+        self._loop.call_soon_threadsafe(self._begin, demand)
+
+    @property
+    def expired(self) -> bool:
+        """Whether the lease's time is over."""
+        return monotonic_s() >= self._until_s
+
+    @staticmethod
+    def _monotonic(until: datetime) -> float:
+        return monotonic_s() + (until - now()).total_seconds()
+
+    async def _life(self) -> None:
+        try:
+            while not self._over.is_set() and not self.expired:
+                await self._pass()
+                if self._failure is not None:
+                    raise self._failure
+                if monotonic_s() >= self._publish_s:
+                    self._publish_s = monotonic_s() + PUBLISH_S
+                    await self._publish()
+        finally:
+            await self._leave()
+
+    async def _leave(self) -> None:
+        """Cancel what is under way: it is not carried on while the devices are made safe."""
+        for task in self._tasks:
+            task.cancel()
+        if self._tasks:
+            await asyncio.wait(self._tasks, timeout=UNWIND_S)
+
+    async def _end(self) -> None:
+        self._board.publish(BenchLive(self.lease.bench, now()))
+
+    async def _pass(self) -> None:
+        """Let some time pass, in the bench's clock unless a motion does that already."""
+        if self._moving():
+            await pause_async(TICK_S)
+        else:
+            await self._time_passes(TICK_S)
+
+    async def _time_passes(self, seconds: float) -> None:
+        """Let time pass in the bench's clock; with a unit that has power, while its samples are read."""
+        if not await self._sensors.read(seconds):
+            await self._bench.clock.sleep(seconds)
+
+    def _moving(self) -> bool:
+        return self._motion is not None and not self._motion.done()
+
+    async def _publish(self) -> None:
+        devices = await self._readings.read()
+        self._sensors.powered(devices.unit_on)
+        lease, sensors = self.lease, self._sensors
+        manual = LiveManual(
+            lease.id,
+            lease.holder,
+            lease.reason,
+            lease.until,
+            self._bench.clock.now_s(),
+            self._doing if self._moving() else "",
+            sensors.values,
+            sensors.at_s,
+            sensors.problem,
+        )
+        self._board.publish(BenchLive(lease.bench, now(), devices=devices, manual=manual))
+
+    def _begin(self, demand: ManualDemand) -> None:
+        if demand.id in self._seen or self._over.is_set():
+            return
+        self._seen.add(demand.id)
+        moves = demand.kind in MOTIONS
+        if moves and self._moving():
+            text = f"the table is moving ({self._doing}): halt it, or wait for its end; one motion at a time"
+            self._tell(demand, DemandState.REFUSED, Answer(text, "kind", demand.kind, "halt"))
+            return
+        task = self._loop.create_task(self._do(demand))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        if moves:
+            self._motion, self._doing = task, demand.kind
+
+    async def _do(self, demand: ManualDemand) -> None:
+        self._tell(demand, DemandState.DOING, Answer())
+        state, answer = DemandState.DONE, Answer()
+        try:
+            answer = Answer(await self._WORK[demand.kind](self, demand.values))
+        except BadParameter as refusal:
+            answer = Answer(str(refusal), refusal.field, refusal.value, refusal.allowed)
+            state = DemandState.REFUSED
+        except OutOfRange as refusal:
+            state, answer = DemandState.REFUSED, Answer(str(refusal))
+        except Stopped as stopped:
+            state, answer = DemandState.STOPPED, Answer(str(stopped))
+        except Disconnected as lost:  # whether a demand was carried out is not known: the bench is made safe
+            state, answer, self._failure = DemandState.FAILED, Answer(str(lost)), lost
+        except BenchError as failure:
+            state, answer = DemandState.FAILED, Answer(str(failure))
+        except asyncio.CancelledError:
+            state, answer = DemandState.STOPPED, Answer("a halt, a stop or the end of the lease came first")
+            raise
+        except Exception as defect:
+            log.exception("manual lease %s: %s", self.lease.id, demand.kind)
+            state, answer = DemandState.FAILED, Answer(f"{type(defect).__name__}: {defect}")
+        finally:
+            self._tell(demand, state, answer)
+
+    async def _move(self, values: dict[str, Any]) -> str:
+        table = self._bench.turntable
+        await table.move_to(angles(values, (await table.read()).angles))
+        at = (await table.read()).angles
+        shown = (round(angle, 4) + 0.0 for angle in (at.outer_deg, at.middle_deg, at.inner_deg))  # no -0.0000
+        return f"at rest at {', '.join(f'{angle:.4f}' for angle in shown)} deg"
+
+    async def _rate(self, values: dict[str, Any]) -> str:
+        table, clock = self._bench.turntable, self._bench.clock
+        rate = constant_rate(values, (await table.read()).angles, self._bench.description)
+        await table.command_rate(rate)
+        until_s = clock.now_s() + rate.duration_s
+        while (left_s := until_s - clock.now_s()) > 0.0:
+            await self._time_passes(min(TICK_S, left_s))
+        await table.settle()
+        return f"{rate.rate_deg_s:g} deg/s of the {rate.axis} axis is over, the table rests"
+
+    async def _halt(self, values: dict[str, Any]) -> str:
+        motion = self._motion
+        if motion is not None and not motion.done():
+            motion.cancel()
+            await asyncio.wait([motion], timeout=UNWIND_S)
+        await self._bench.turntable.make_safe()
+        return "the table rests"
+
+    async def _chamber(self, values: dict[str, Any]) -> str:
+        async with self._order:
+            chamber = self._bench.chamber
+            if chamber is None:
+                raise BadParameter("kind", "chamber", "another demand: the bench was opened without its chamber")
+            await chamber.command(values["temperature_c"], values["ramp_c_min"])
+            return f"led to {values['temperature_c']:g} °C at {values['ramp_c_min']:g} K/min"
+
+    async def _supply_on(self, values: dict[str, Any]) -> str:
+        async with self._order:
+            supply = self._bench.supply
+            if values["voltage_v"] is not None:
+                await supply.set_output(values["voltage_v"], values["current_a"])
+            await supply.switch_on()
+            self._sensors.powered(True)
+            reading = await supply.read()
+            return f"on: {reading.voltage_v:.3f} V, {reading.current_a:.3f} A"
+
+    async def _supply_off(self, values: dict[str, Any]) -> str:
+        async with self._order:
+            self._sensors.powered(False)
+            await self._bench.supply.switch_off()
+            return "off"
+
+    _WORK: dict[str, Callable[["ManualSession", dict[str, Any]], Awaitable[str]]] = {  # noqa: RUF012  never changed
+        "home": _move,
+        "go_to": _move,
+        "rate": _rate,
+        "halt": _halt,
+        "chamber": _chamber,
+        "supply_on": _supply_on,
+        "supply_off": _supply_off,
+    }

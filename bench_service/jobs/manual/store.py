@@ -1,0 +1,87 @@
+"""PORT of memory of manual mode: leases and their demands. Every method is one transaction."""
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Protocol
+
+from bench_service.model.manual import Answer, DemandState, ManualDemand, ManualLease
+from bench_service.model.records import Idempotency, Page
+
+
+@dataclass(frozen=True)
+class LeaseNews:
+    """A lease and what a worker must know of it, read at one moment."""
+
+    lease: ManualLease
+    stopped: str
+    """The reasons of the bench's standing stops; empty: none stands."""
+    demands: tuple[ManualDemand, ...]
+    """Accepted demands that no worker has begun, oldest first."""
+
+
+class ManualStore(Protocol):
+    """The stored leases of all benches."""
+
+    def begin(self, lease: ManualLease, idempotency: Idempotency | None = None) -> ManualLease:
+        """Store a new lease; with a known key and the same fingerprint, return the one that it made.
+
+        Raises `ManualRefused` while a job drives the bench, while it is stopped, or while another lease lives;
+        `AlreadyReserved` where another holder's reservation of bench or unit holds; `IdempotencyConflict`.
+        """
+        ...
+
+    def get(self, lease_id: str) -> ManualLease:
+        """Return one lease by its id. Raises `NotFound`."""
+        ...
+
+    def open_on(self, bench: str) -> ManualLease | None:
+        """The lease of a bench that has not ended, whether or not its time is over."""
+        ...
+
+    def list(self, *, bench: str | None = None, after: str | None = None, limit: int = 50) -> Page[ManualLease]:
+        """List leases, newest first."""
+        ...
+
+    def take(self, lease_id: str, at: datetime, process: str) -> ManualLease | None:
+        """Note that a worker runs it from now on; None where it has ended, its time is over, or another one took it."""
+        ...
+
+    def news(self, lease_id: str) -> LeaseNews:
+        """Read what a worker must know. Raises `NotFound`."""
+        ...
+
+    def renew(self, lease_id: str, until: datetime, at: datetime) -> ManualLease:
+        """Move a lease's end. Raises `ManualRefused` where it does not live, `NotFound`."""
+        ...
+
+    def ask_end(self, lease_id: str, by: str, at: datetime) -> ManualLease:
+        """Ask for a lease's end: at once where no worker has taken it. One that has ended stays as it is."""
+        ...
+
+    def end(self, lease_id: str, at: datetime, because: str, safe: bool | None) -> None:
+        """End a lease; its open demands are stopped. A second end changes nothing."""
+        ...
+
+    def hear(self) -> None:
+        """Count a sign of life of this process for every open lease."""
+        ...
+
+    def demand(self, demand: ManualDemand, at: datetime) -> ManualDemand:
+        """Store a demand; the one that its key made before is returned instead.
+
+        Raises `IdempotencyConflict` for a key of another demand, `ManualRefused` where the lease does not live or too
+        many demands wait.
+        """
+        ...
+
+    def get_demand(self, lease_id: str, key: str) -> ManualDemand:
+        """Return the demand of a key. Raises `NotFound`."""
+        ...
+
+    def demands(self, lease_id: str, *, after: str | None = None, limit: int = 50) -> Page[ManualDemand]:
+        """List demands of a lease, newest first."""
+        ...
+
+    def answer(self, demand_id: str, state: DemandState, answer: Answer, at: datetime) -> None:
+        """Note what became of a demand; one that is over stays as it is."""
+        ...

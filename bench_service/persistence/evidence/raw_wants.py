@@ -1,0 +1,85 @@
+"""What wants the raw data of recordings, in SQL: calibrations that count, holds, and analyses that have not ended."""
+
+from collections.abc import Iterable, Iterator
+
+from sqlalchemy import or_, select
+from sqlalchemy.orm import Session
+
+from bench_service.model.batches import TaskState
+from bench_service.model.calibrations import Approval
+from bench_service.persistence.tables.batches import TaskRecordingRow, TaskRow
+from bench_service.persistence.tables.evidence import (
+    CalibrationRow,
+    CorrectionRow,
+    HoldRow,
+    ResultCalibrationRow,
+    ResultCorrectionRow,
+    ResultRecordingRow,
+)
+
+AT_ONCE = 500
+"""Ids in one statement: databases limit the number of values."""
+_OPEN = (TaskState.WAITING.value, TaskState.RUNNING.value)
+
+
+def wanted_by_calibrations(session: Session) -> frozenset[str]:
+    """Recordings of the results behind every current or approved calibration and every current correction.
+
+    A result may rest on other calibrations and corrections; so theirs are wanted too.
+    """
+    counts = or_(CalibrationRow.is_current, CalibrationRow.approval == Approval.APPROVED.value)
+    found: set[str] = set()
+    new = {
+        result
+        for query in (
+            select(CalibrationRow.result_id).where(counts),
+            select(CorrectionRow.result_id).where(CorrectionRow.is_current),
+        )
+        for result in session.scalars(query)
+        if result is not None
+    }
+    while new:
+        found |= new
+        below: set[str] = set()
+        for ids in _parts(sorted(new)):
+            calibrations = (
+                select(CalibrationRow.result_id)
+                .join(ResultCalibrationRow, ResultCalibrationRow.calibration_id == CalibrationRow.id)
+                .where(ResultCalibrationRow.result_id.in_(ids))
+            )
+            corrections = (
+                select(CorrectionRow.result_id)
+                .join(ResultCorrectionRow, ResultCorrectionRow.correction_id == CorrectionRow.id)
+                .where(ResultCorrectionRow.result_id.in_(ids))
+            )
+            below |= {result for query in (calibrations, corrections) for result in session.scalars(query) if result}
+        new = below - found
+    recordings: set[str] = set()
+    for ids in _parts(sorted(found)):
+        used = select(ResultRecordingRow.recording_id).where(ResultRecordingRow.result_id.in_(ids))
+        recordings |= set(session.scalars(used))
+    return frozenset(recordings)
+
+
+def wanted_by_holds(session: Session, recording_id: str | None = None) -> frozenset[str]:
+    """Recordings with a standing hold, or the one that is asked for."""
+    query = select(HoldRow.recording_id).where(HoldRow.released_at.is_(None))
+    if recording_id is not None:
+        query = query.where(HoldRow.recording_id == recording_id)
+    return frozenset(session.scalars(query))
+
+
+def wanted_by_analyses(session: Session, recording_id: str | None = None) -> frozenset[str]:
+    """Recordings that a task wants which waits or runs, or the one that is asked for."""
+    query = (
+        select(TaskRecordingRow.recording_id)
+        .join(TaskRow, (TaskRow.batch_id == TaskRecordingRow.batch_id) & (TaskRow.number == TaskRecordingRow.number))
+        .where(TaskRow.state.in_(_OPEN))
+    )
+    if recording_id is not None:
+        query = query.where(TaskRecordingRow.recording_id == recording_id)
+    return frozenset(session.scalars(query))
+
+
+def _parts(ids: list[str]) -> Iterator[Iterable[str]]:
+    return (ids[first : first + AT_ONCE] for first in range(0, len(ids), AT_ONCE))

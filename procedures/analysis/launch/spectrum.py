@@ -1,0 +1,46 @@
+"""Power spectral densities of a recording's channels as they are: nothing trimmed or subtracted but lines."""
+
+from collections.abc import Sequence
+
+from procedures.analysis.cells import CellStream, cell_samples, channel_rows
+from procedures.analysis.launch.density import Density, density_of
+from procedures.analysis.noise_fit.powers import FEWEST_SAMPLES, FastPowers, slow_powers
+from procedures.core.errors import UnfitRecording
+from procedures.core.recording import Recording, require_finite
+
+CELL_S = 1.0
+FEWEST_A_CELL = 8
+"""Fewest samples a cell for which faster frequencies are taken from every sample."""
+CROSSOVER_HZ = 0.03
+
+
+def densities(recording: Recording, names: Sequence[str], confidence: float) -> tuple[list[Density | None], list[str]]:
+    """Densities of channels in one pass, None with a sentence where a channel has none.
+
+    Raises `MissingChannel`, `UnfitRecording` for samples that are no numbers.
+    """
+    info = recording.info
+    samples = cell_samples(info.rate_hz, max(CELL_S, 1.0 / info.rate_hz))
+    if info.count // samples < FEWEST_SAMPLES:
+        short = (
+            f"recording {info.id} is too short for a spectral density: it takes {FEWEST_SAMPLES} means over a second"
+        )
+        return [None] * len(names), [short]
+    stream = CellStream(info, names, samples / info.rate_hz)
+    fast = [FastPowers(info.rate_hz, CROSSOVER_HZ) for _ in names] if samples >= FEWEST_A_CELL else []
+    for rows in channel_rows(info, names, recording.blocks()):
+        require_finite(info, names, rows.T)
+        stream.add(rows)
+        for powers, row in zip(fast, rows, strict=bool(fast)):
+            powers.add(row)
+    cells = stream.finish()
+    found: list[Density | None] = []
+    why: list[str] = []
+    for index, (name, row) in enumerate(zip(names, cells.rates, strict=True)):
+        try:
+            slow = slow_powers(row, cells.cell_s)
+            found.append(density_of(slow, fast[index].finish() if fast else None, confidence))
+        except UnfitRecording as refusal:
+            found.append(None)
+            why.append(f"recording {info.id}, {name}: no spectral density: {refusal}")
+    return found, why

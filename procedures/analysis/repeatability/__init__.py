@@ -1,0 +1,1 @@
+"""Repeatability of calibrations: from launch to launch, and from mounting to mounting."""

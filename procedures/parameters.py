@@ -1,0 +1,68 @@
+"""Bases of parameter models, and the decision rules that every verdict follows."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from procedures.core.decision import COVERAGE, Rule, RuleName
+from procedures.core.errors import BadParameter
+
+
+class Parameters(BaseModel):
+    """Base of every parameter model: unknown names are refused, NaN and infinity too."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def filled(self, defaults: Mapping[str, Any]) -> Self:
+        """Copy the parameters with each None replaced by its default, where there is one."""
+        return self.model_copy(update={name: value for name, value in defaults.items() if getattr(self, name) is None})
+
+
+class DecisionRules(Parameters):
+    """Rules by which a result's values are held to their limits (ISO/IEC 17025, 7.8.6; ILAC-G8)."""
+
+    rule: RuleName = Field(
+        "simple", description="simple: a value passes at its limit; guarded: inside it by the guard band r·U"
+    )
+    guard: float = Field(1.0, gt=0.0, le=10.0, description="r of the guarded rule")
+    coverage_probability: float = Field(
+        COVERAGE, gt=0.5, lt=1.0, description="of U = k·u; k is Student's factor of the value's degrees of freedom"
+    )
+    by_check: dict[str, RuleName] = Field(
+        default_factory=dict[str, RuleName], max_length=200, description="another rule for a check, by its name"
+    )
+
+    def of(self, check: str) -> Rule:
+        """The rule of a check."""
+        return Rule(self.by_check.get(check, self.rule), self.guard, self.coverage_probability)
+
+    def require_known(self, checks: Sequence[str]) -> None:
+        """Refuse a rule for a check that a result will not have. Raises `BadParameter` by the check."""
+        for name in self.by_check:
+            if name not in checks:
+                raise BadParameter("decision.by_check", name, f"one of {', '.join(checks)}")
+
+
+class JudgedParameters(Parameters):
+    """Base of the parameters of what gives a verdict."""
+
+    decision: DecisionRules | None = Field(
+        None,
+        exclude_if=lambda rules: rules is None,
+        description="how values are held to their limits; None: simple acceptance, U at 95.45 %",
+    )
+
+
+Second = Annotated[float, Field(ge=0.0, le=1e9)]
+
+
+class RecordedParameters(JudgedParameters):
+    """Base of the parameters of methods that work on recordings, or on a stretch of them."""
+
+    start_s: Second | tuple[Second, ...] | None = Field(
+        None, description="from this second of each recording; a list: one for each"
+    )
+    stop_s: Second | tuple[Second, ...] | None = Field(
+        None, description="up to this second of each recording; a list: one for each"
+    )
