@@ -11,7 +11,7 @@ from fastapi.responses import StreamingResponse
 
 from bench_service.api.http.admitted_stream import AdmittedStream, place_in_turn
 from bench_service.api.http.dependencies import Service
-from bench_service.api.http.errors import problems
+from bench_service.api.http.errors import binary, problems
 from bench_service.api.http.job_numbers import JobByNumber
 from bench_service.api.recordings import EXPORTS
 from bench_service.evidence.recordings import require_undamaged
@@ -36,7 +36,7 @@ DATA: dict[int | str, dict[str, object]] = {
     200: {"description": "A file in the format that was asked for", "content": {"application/octet-stream": BYTES}}
 }
 ZIP: dict[int | str, dict[str, object]] = {
-    200: {"description": "A zip with a file a recording and manifest.json", "content": {"application/zip": BYTES}}
+    200: {"description": "A zip with a file a recording and manifest.json", "content": binary("application/zip")}
 }
 
 
