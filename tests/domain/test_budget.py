@@ -118,9 +118,7 @@ def test_noise_from_the_scatter_has_the_degrees_of_freedom_of_the_fit() -> None:
     (row,) = (made := budgets(fit, [observed_part(fit)], table))[0].rows
     assert (row.source, row.degrees_of_freedom) == (OBSERVED, 24.0)
     assert made[0].degrees_of_freedom == pytest.approx(24.0)
-    assert made[0].coverage_factor == pytest.approx(
-        2.11, abs=0.005
-    )  # table G.2: 2.13 at 20, 2.11 at 25
+    assert made[0].coverage_factor == pytest.approx(2.11, abs=0.005)  # table G.2: 2.13 at 20, 2.11 at 25
     assert made[0].standard_uncertainty == pytest.approx(fit.calibration().standard_uncertainties[0], rel=1e-9)
 
 
