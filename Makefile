@@ -9,7 +9,7 @@ BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
 
 .DEFAULT_GOAL := help
-.PHONY: help run test browser clients bench chaos soak format check validate rights pictures newest-form lock audit images clean foreign
+.PHONY: help run test browser screenshots figures clients bench bench-against profile chaos soak format check validate rights pictures newest-form lock audit images clean foreign
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -36,6 +36,12 @@ browser: $(VENV)/.browser  ## the pages in a real Chromium, installed first wher
 	@$(BIN)/python -m tests.browser.chromium; case $$? in 0) ;; 3) exit 0;; *) exit 1;; esac; \
 	$(BIN)/python -m pytest tests/browser --browser -n 2 --dist loadfile
 
+screenshots: $(VENV)/.browser  ## take the pictures of the pages in docs/pictures/pages anew
+	@$(BIN)/python -m pytest -p no:xdist tests/browser/test_pictures.py --browser --pictures docs/pictures/pages
+
+figures: $(VENV)/.browser  ## measure the pages in Chromium: stop, first paint, live charts over MINUTES (20), the feed
+	@$(BIN)/python -m tests.browser.figures --minutes $(or $(MINUTES),20)
+
 chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books; press stop while something is in its way
 	@kept=0; $(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both || kept=1; $(BIN)/python -m tests.chaos.stop_matrix --runs 5 || kept=1; exit $$kept
 
@@ -54,11 +60,23 @@ validate: $(VENV)/.ready  ## Monte Carlo against theory over 1000 simulated unit
 bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 	@kept=0; for part in $(BENCHMARKS); do $(BIN)/python -m $$part || kept=1; done; exit $$kept
 
+bench-against: $(VENV)/.ready  ## this checkout beside revision REV (e36ea0a), built beside it, in turns; ONLY=static,allan ROUNDS=5
+	@$(BIN)/python -m tests.benchmarks.against --rev $(or $(REV),e36ea0a) --rounds $(or $(ROUNDS),5) $(if $(ONLY),--only $(ONLY))
+
+.venv-profile/.ready: .ci/profile.lock $(VENV)/.ready
+	@test -x .venv-profile/bin/python || $(PYTHON) -m venv .venv-profile
+	@VIRTUAL_ENV=$(CURDIR)/.venv-profile $(BIN)/uv pip install --quiet --require-hashes -r .ci/profile.lock
+	@touch $@
+
+profile: .venv-profile/.ready  ## the three heaviest lines of each benchmark, by time and by memory; ONLY=static,allan
+	@$(BIN)/python -m tests.benchmarks.heaviest --tools .venv-profile/bin $(if $(ONLY),--only $(ONLY))
+
 lock: $(VENV)/.ready  ## compile requirements.lock anew, with its part for run time and the tools of the audit
 	@$(COMPILE) --extra dev --extra formats pyproject.toml -o requirements.lock
 	@$(COMPILE) --extra formats -c requirements.lock pyproject.toml -o .ci/runtime.lock
 	@$(COMPILE) --extra dev --extra formats --extra browser -c requirements.lock pyproject.toml -o .ci/browser.lock
 	@$(COMPILE) .ci/audit.in -o .ci/audit.lock
+	@$(COMPILE) -c requirements.lock .ci/profile.in -o .ci/profile.lock
 
 .venv-audit/.ready: .ci/audit.lock $(VENV)/.ready
 	@test -x .venv-audit/bin/python || $(PYTHON) -m venv .venv-audit
@@ -93,4 +111,4 @@ foreign: $(addprefix .foreign/,$(addsuffix /.ready,$(FOREIGN)))  ## environments
 	@touch $@
 
 clean:  ## remove the environment and the demo's data
-	rm -rf $(VENV) .venv-audit .foreign .bench
+	rm -rf $(VENV) .venv-audit .venv-profile .foreign .bench

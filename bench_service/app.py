@@ -14,6 +14,8 @@ from threadpoolctl import threadpool_limits
 from bench_service.api import (
     audit,
     audit_chain,
+    batches,
+    console,
     database,
     health,
     metrics,
@@ -23,6 +25,7 @@ from bench_service.api import (
     reservations,
     results,
     samples,
+    storage,
     trends,
 )
 from bench_service.api.access import guard, identify
@@ -91,6 +94,7 @@ ROUTERS = (
     jobs,
     recordings,
     samples,
+    batches,
     results,
     units,
     calibrations,
@@ -104,10 +108,12 @@ ROUTERS = (
     access,
     audit,
     database,
+    storage,
     audit_chain,
     health,
     metrics,
     feed,
+    *console.PARTS,
 )
 PAGES = (
     static_files,

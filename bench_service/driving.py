@@ -8,6 +8,7 @@ from bench_service.bench.live.values import Heartbeat, LiveBoard
 from bench_service.bench_files import BenchFiles
 from bench_service.campaigns.stores import Stores
 from bench_service.collector import no_collection
+from bench_service.evidence.spread_processes import spread_processes
 from bench_service.jobs.dispatcher import Dispatcher, JobEngine
 from bench_service.jobs.instrumented_runner import InstrumentedRunner
 from bench_service.jobs.manual.runner import ManualRunner
@@ -42,8 +43,9 @@ def driving(
     heartbeat = Heartbeat(board, stores.live)
     heartbeat.begin()
     closing.callback(heartbeat.end)
+    spread = spread_processes(closing)
     runner = InstrumentedRunner(
-        stores, planner, driver, code, lease.held, board, settings.retry_scale, traces, files.stopped
+        stores, planner, driver, code, lease.held, board, settings.retry_scale, traces, files.stopped, spread
     )
     manual = ManualRunner(stores, stores.audit, driver, board, files.stopped)
     worker = Worker(runner, partial(_engine, settings), partial(_dispatcher, settings, stores, lease, files, manual))

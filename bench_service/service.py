@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from bench_service.access.book import AccessBook
 from bench_service.access.service import AccessService
@@ -16,6 +17,7 @@ from bench_service.campaigns.stores import Stores
 from bench_service.evidence.analyses import AnalysisService
 from bench_service.evidence.batches.runner import RunnerMaker
 from bench_service.evidence.batches.service import BatchService
+from bench_service.evidence.estimates import EstimateService
 from bench_service.evidence.imports import ImportService
 from bench_service.evidence.raw_data.nightly import NightlyStorage
 from bench_service.evidence.raw_data.service import RawDataService, StorageSettings
@@ -89,6 +91,7 @@ class BenchService:
             stores, planner.catalogue, stores.jobs.get, code_version, processes and processes.analyses
         )
         self.reports = ReportService(stores, planner.catalogue, stores.jobs.get, processes and processes.printing)
+        self.estimates = EstimateService(partial(_estimates, stores), stores.jobs.get, processes and processes.analyses)
         self._runner = None if runner is None else runner(stores.batches, self.analyses)
         self.batches = BatchService(stores, planner.catalogue, self._runner.wake if self._runner else lambda: None)
         self.queues = QueueService(stores, planner.benches, self._wake)
@@ -192,3 +195,10 @@ class BenchService:
                 self._worker.wake()
         else:
             self._roads.wake(bench_id)
+
+
+def _estimates(stores: Stores, job_id: str) -> str:
+    """Work out a job's estimates here: only a command's own service does, its numerics are loaded for that alone."""
+    from bench_service.evidence.estimating import Estimating
+
+    return Estimating(stores, stores.jobs.get).text(job_id)

@@ -1,4 +1,4 @@
--- revision 0019
+-- revision 0020
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -486,6 +486,16 @@ CREATE TABLE tokens (
 	CONSTRAINT pk_tokens PRIMARY KEY (id)
 );
 
+CREATE TABLE unit_notes (
+	id VARCHAR NOT NULL, 
+	unit VARCHAR NOT NULL, 
+	at DATETIME NOT NULL, 
+	"by" VARCHAR NOT NULL, 
+	proven BOOLEAN NOT NULL, 
+	text VARCHAR NOT NULL, 
+	CONSTRAINT pk_unit_notes PRIMARY KEY (id)
+);
+
 CREATE TABLE units (
 	serial VARCHAR NOT NULL, 
 	document JSON NOT NULL, 
@@ -576,6 +586,8 @@ CREATE UNIQUE INDEX ix_tokens_digest ON tokens (digest);
 
 CREATE INDEX ix_tokens_name ON tokens (name);
 
+CREATE INDEX ix_unit_notes_unit_id ON unit_notes (unit, id);
+
 CREATE INDEX ix_upkeep_kind_id ON upkeep (kind, id);
 
 CREATE UNIQUE INDEX uq_calibrations_current_unit_triad ON calibrations (unit, triad) WHERE is_current;
@@ -588,5 +600,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0019');
+INSERT INTO "alembic_version" VALUES ('0020');
 

@@ -10,7 +10,8 @@ from typing import Literal, TypeVar
 
 from pydantic import Field
 
-from procedures.analysis.launch.analysis import INSPECTION, analyse_launch
+from procedures.analysis.launch.analysis import INSPECTION
+from procedures.analysis.launch.analysis import analyse_launches as all_launches
 from procedures.analysis.launch.prediction import predicted_noise
 from procedures.analysis.launch.results import ChannelNoise, LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
@@ -122,8 +123,8 @@ def analyse_launches(
     settings = params.settings()
     if params.band_launch > len(recordings):
         raise BadParameter("band_launch", params.band_launch, f"1 … {len(recordings)}, the launches that there are")
-    found = (analyse_launch(r, _label(r, i), settings) for i, r in enumerate(recordings, start=1))
-    launches = tuple(_matched(launch, unit) for launch in found)
+    labels = [_label(r, i) for i, r in enumerate(recordings, start=1)]
+    launches = tuple(_matched(launch, unit) for launch in all_launches(recordings, labels, settings))
     names = {tuple((c.channel, c.rate_unit) for c in launch.channels) for launch in launches}
     if len(names) > 1:
         raise UnfitRecording("the recordings have different channels: analyse them one by one")

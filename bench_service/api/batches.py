@@ -22,7 +22,7 @@ from bench_service.model.search import LabelSought, Search
 from bench_service.service import BenchService
 from procedures.core.limits import Verdict
 
-router = APIRouter(prefix="/analyses/batches", tags=["analyses"])
+router = APIRouter(prefix="/api/v1/analyses/batches", tags=["analyses"])
 LOOK_S = 0.5
 """Interval at which a stream of a batch looks for progress [s]."""
 QUIET_LOOKS = 20

@@ -7,7 +7,6 @@ from fastapi import APIRouter, Query, Response
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 
-from bench_service.api import batches, storage
 from bench_service.api.batches import BatchView, RecordingSelection
 from bench_service.api.http.dependencies import After, IdempotencyKey, Limit, RequestedBy, Service
 from bench_service.api.http.errors import made, problems
@@ -26,8 +25,6 @@ from procedures.core.mounting import Mounting
 from procedures.core.report import Figure, Table
 
 router = APIRouter(prefix="/api/v1", tags=["analyses"])
-router.include_router(batches.router)
-router.include_router(storage.router)
 
 
 class AnalysisSubmission(Request):

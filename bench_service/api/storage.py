@@ -13,7 +13,7 @@ from bench_service.api.recordings import RecordingView
 from bench_service.mapping import copied
 from bench_service.model.raw_data import Growth, Hold, Keeping, Prediction, RawPlan, RawState, Share, StorageReport
 
-router = APIRouter(tags=["health"])
+router = APIRouter(prefix="/api/v1", tags=["health"])
 
 
 class StorageView(BaseModel):

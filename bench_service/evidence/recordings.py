@@ -53,6 +53,14 @@ class RecordingWriter(Protocol):
         ...
 
 
+class RecordingSoFar(Recording, Protocol):
+    """The part of a recording that is stored; `count` of its `info` is that part's."""
+
+    def since(self, start: int) -> Iterator[RawArray]:
+        """The raw samples from sample `start` on, each block (n, channels)."""
+        ...
+
+
 class RecordingStore(Protocol):
     """The stored recordings and their samples."""
 
@@ -77,8 +85,12 @@ class RecordingStore(Protocol):
         """The complete recordings of a job in the order of their stations."""
         ...
 
-    def load(self, recording_id: str) -> Recording:
+    def load(self, recording_id: str) -> RecordingSoFar:
         """The recording for an analysis: blocks are read chunk by chunk. Raises `NotFound`, `RawDataRemoved`."""
+        ...
+
+    def so_far(self, job_id: str) -> "RecordingSoFar | None":
+        """The stored part of the recording that a job is making now; None where nothing of one is stored yet."""
         ...
 
     def read(

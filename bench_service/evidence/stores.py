@@ -12,6 +12,7 @@ from bench_service.evidence.keys import KeyStore
 from bench_service.evidence.raw_data.store import RawDataStore
 from bench_service.evidence.recordings import RecordingStore
 from bench_service.evidence.results import ResultStore
+from bench_service.evidence.unit_notes import UnitNoteStore
 from bench_service.evidence.units import UnitStore
 
 
@@ -20,6 +21,7 @@ class EvidenceStores(AccessStores):
     """The stores of this room and of those below it."""
 
     units: UnitStore
+    unit_notes: UnitNoteStore
     recordings: RecordingStore
     results: ResultStore
     calibrations: CalibrationStore

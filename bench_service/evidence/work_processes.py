@@ -117,11 +117,16 @@ _run: list[Run] = []
 
 def _begin(open_run: Callable[..., Run], arguments: tuple[Any, ...]) -> None:
     """Set up a new process: leave interrupts to the service, open what the work needs, then lower the priority."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_end_with_the_service, name="end with the service", daemon=True).start()
+    begin_process()
     _run.append(open_run(*arguments))
     with contextlib.suppress(OSError):  # only now: a client waits for the first piece of work
         os.nice(NICENESS)
+
+
+def begin_process() -> None:
+    """Set up a new process of the service: it leaves interrupts to the service, and ends with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_the_service, name="end with the service", daemon=True).start()
 
 
 def _work(name: str, arguments: tuple[Any, ...]) -> str | Refusal:

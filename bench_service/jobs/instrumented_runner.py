@@ -6,6 +6,7 @@ from contextlib import AbstractContextManager
 
 from bench_service.bench.driver import BenchDriver
 from bench_service.bench.live.values import LiveBoard
+from bench_service.evidence.spread_processes import SpreadProcesses
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue import QueueEntry
 from bench_service.jobs.runner import JobRunner, StepOutcome
@@ -32,8 +33,9 @@ class InstrumentedRunner(JobRunner):
         retry_scale: float,
         traces: Traces,
         stopped: Callable[[], bool],
+        spread: SpreadProcesses,
     ) -> None:
-        super().__init__(stores, planner, driver, code_version, lease_held, live, retry_scale, stopped)
+        super().__init__(stores, planner, driver, code_version, lease_held, live, retry_scale, stopped, spread)
         self._traces = traces
         self._campaign: tuple[str, str | None] = ("", None)
         """The job that began last, and the campaign run that it belongs to."""

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from threading import Event
@@ -15,6 +16,7 @@ from bench_service.bench.processes import ProcessIdentity
 from bench_service.bench.session import BenchSession
 from bench_service.evidence.catalogue import AnyProcedure
 from bench_service.evidence.job_analysis import analysed, recordings_of
+from bench_service.evidence.spread_processes import SpreadProcesses
 from bench_service.jobs.as_planned import require_as_planned
 from bench_service.jobs.planning import Planner
 from bench_service.jobs.queue import QueueEntry
@@ -60,13 +62,16 @@ class JobRunner:
         live: LiveBoard | None = None,
         retry_scale: float = 1.0,
         stopped: Callable[[], bool] = lambda: False,
+        spread: SpreadProcesses | None = None,
     ) -> None:
         """Set up with `lease_held`: returns whether this process holds the bench's lease; called before every station.
 
         `live`: the board for the bench's live state; None: it is not published.
         `retry_scale`: factor on the pauses before a retry; less than 1 where bench time is not real time.
         `stopped`: returns whether the bench is stopped over its host's stop channel; asks no database.
+        `spread`: shares long analyses among processes; None: they are made here.
         """
+        self._spread = spread
         self._stores = stores
         self._planner = planner
         self._driver = driver
@@ -187,7 +192,8 @@ class JobRunner:
         try:
             recordings = recordings_of(self._stores, job_id)
             context = context_of(job, self._stores.calibrations.several)
-            result = analysed(job, context, procedure, job.parameters, recordings, self._code_version)
+            with nullcontext() if self._spread is None else self._spread.used_for(recordings):
+                result = analysed(job, context, procedure, job.parameters, recordings, self._code_version)
             stored = self._stores.results.add(
                 result.stored,
                 result.calibrations,
@@ -279,6 +285,8 @@ class JobRunner:
         self._stores.recordings.interrupt_open(job.id)
         checkpoint = self._stores.recordings.checkpoint(job.id)
         bench = self._driver.open(job.unit, job.seed, checkpoint, BenchNeeds.of(job.stations), job.id)
+        if self._spread is not None and bench.description.origin == "simulated":  # a real one takes its hours
+            self._spread.begin_for(job.stations, bench.imu)
         live = None if self._live is None else LiveTap(job, bench, self._live)
         stop_wanted = partial(self._stop_wanted, job.id)
         self._session = BenchSession(job, procedure, bench, self._stores.recordings, stop_wanted, live)

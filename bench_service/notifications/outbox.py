@@ -9,7 +9,7 @@ from pydantic import TypeAdapter
 
 from bench_service.notifications.channels import Undelivered, deliver
 from bench_service.notifications.messages import Message, digest
-from bench_service.notifications.targets import Mail, Webhook
+from bench_service.notifications.targets import URGENT, Mail, Webhook
 from bench_service.wall_clock import now
 
 OLDEST = timedelta(days=1)
@@ -38,16 +38,21 @@ class Outbox:
         self._due = datetime.min.replace(tzinfo=now().tzinfo)
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self._book = self._folder / "kept.txt"
+        self._urgent: dict[str, bool] = {}
         self._kept = self._book.read_text(encoding="utf-8").split()[-REMEMBERED:] if self._book.exists() else []
         if self._kept:
             self._book.write_text("\n".join(self._kept) + "\n", encoding="utf-8")
 
     def put(self, message: Message) -> None:
-        """Keep a message for the target, where it wants this kind; the same thing is kept once."""
+        """Keep a message for the target, where it wants this kind; the same thing is kept once.
+
+        An urgent one is tried at once, also while the target is left alone after a failure.
+        """
+        urgent = message.kind in URGENT
         file = self._folder / f"{message.key}.json"
         if message.kind not in self.target.events or message.key in self._kept:
             return
-        if len(self._files()) >= MOST_FILES:
+        if not urgent and len(self._files()) >= MOST_FILES:
             log.error("%s has %d messages waiting: left out: %s", self.target.name, MOST_FILES, message.title)
             return
         part = file.with_suffix(".part")
@@ -56,22 +61,38 @@ class Outbox:
         self._kept.append(message.key)
         with self._book.open("a", encoding="utf-8") as book:
             book.write(message.key + "\n")
+        if urgent:
+            self._due, self._pause = datetime.min.replace(tzinfo=now().tzinfo), FIRST_PAUSE
 
     def send(self, at: datetime) -> int:
-        """Deliver what waits and is due; the number of messages that are still waiting."""
+        """Deliver what waits and is due; the number of messages that are still waiting.
+
+        Urgent ones go first, each by itself, and neither count for `per_hour` nor wait for it.
+        """
         while at >= self._due and (waiting := self._files()):
-            self._sent = [moment for moment in self._sent if at - moment < HOUR]
-            room = self.target.per_hour - len(self._sent)
-            if room <= 0:
-                break
-            many = len(waiting) > room and room == 1
-            batch = waiting if many else waiting[:1]
+            urgent = next((file for file in waiting if self._is_urgent(file)), None)
+            batch = [urgent] if urgent is not None else self._ordinary(waiting, at)
             messages = [message for file in batch if (message := self._read(file)) is not None]
-            if messages and not self._deliver(digest(messages, messages[0].bench, at) if many else messages[0], at):
+            if not batch or (messages and not self._deliver(_one(messages, at), at)):
                 break
             for file in batch:
                 file.unlink(missing_ok=True)
+                self._urgent.pop(file.stem, None)
         return len(self._files())
+
+    def _ordinary(self, waiting: list[Path], at: datetime) -> list[Path]:
+        """The files of the next ordinary message: the oldest, all in the last place of the hour, none after it."""
+        self._sent = [moment for moment in self._sent if at - moment < HOUR]
+        room = self.target.per_hour - len(self._sent)
+        if room <= 0:
+            return []
+        return waiting if len(waiting) > room and room == 1 else waiting[:1]
+
+    def _is_urgent(self, file: Path) -> bool:
+        if file.stem not in self._urgent:
+            message = self._read(file)
+            self._urgent[file.stem] = message is not None and message.kind in URGENT
+        return self._urgent[file.stem]
 
     def _files(self) -> list[Path]:
         return sorted(self._folder.glob("*.json"), key=lambda file: (file.stat().st_mtime_ns, file.name))
@@ -94,6 +115,11 @@ class Outbox:
             log.warning("not delivered, tried again in %s: %s: %s", self._pause, message.title, error)
             self._due, self._pause = at + self._pause, min(2 * self._pause, LONGEST_PAUSE)
             return False
-        self._sent.append(at)
+        if message.kind not in URGENT:
+            self._sent.append(at)
         self._pause = FIRST_PAUSE
         return True
+
+
+def _one(messages: list[Message], at: datetime) -> Message:
+    return messages[0] if len(messages) == 1 else digest(messages, messages[0].bench, at)

@@ -10,6 +10,8 @@ from bench_service.model.errors import Misconfigured
 
 EventKind = Literal["verdict", "stop", "prompt", "trouble", "campaign", "disk"]
 EVERY: tuple[EventKind, ...] = ("verdict", "stop", "prompt", "trouble", "campaign", "disk")
+URGENT: tuple[EventKind, ...] = ("stop", "prompt")
+"""Kinds that a person waits for or must act on: no limit holds them back."""
 Address = Annotated[str, Field(pattern=r"^[^@\s<>]+@[^@\s<>]+$", max_length=254)]
 
 
@@ -18,7 +20,12 @@ class _Target(BaseModel):
 
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$", description="also the name of its folder of waiting files")
     events: tuple[EventKind, ...] = Field(EVERY, min_length=1)
-    per_hour: int = Field(20, ge=1, le=1000, description="messages in an hour; what comes beyond them is one digest")
+    per_hour: int = Field(
+        20,
+        ge=1,
+        le=1000,
+        description="messages in an hour, without stops and prompts; what comes beyond them is one digest",
+    )
 
 
 class Mail(_Target):

@@ -1,4 +1,4 @@
-"""Routes of the pages that are made by scripts over the public API: start, queue, search, recordings, audit."""
+"""Routes of the pages that are made by scripts over the public API: start, queue, search, recordings, accounts."""
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
@@ -53,3 +53,21 @@ def recording_page(recording_id: str, request: Request) -> HTMLResponse:
 def audit_page(request: Request) -> HTMLResponse:
     """Page of who did what, newest first."""
     return _page(request, "audit.html")
+
+
+@router.get("/accounts")
+def accounts_page(request: Request) -> HTMLResponse:
+    """Page of accounts, tokens and approved procedures."""
+    return _page(request, "accounts.html")
+
+
+@router.get("/certificate")
+def certificate_page(request: Request) -> HTMLResponse:
+    """Page where a calibration certificate is checked."""
+    return _page(request, "certificate.html")
+
+
+@router.get("/units/{serial}/calibrations/new")
+def enter_calibration_page(serial: str, request: Request) -> HTMLResponse:
+    """Page where a known calibration is entered."""
+    return _page(request, "enter_calibration.html", unit=service_of(request).stores.units.unit(serial))

@@ -5,6 +5,7 @@ from typing import Any
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 
+from bench_service.formats.calibration_exports.forms import CalibrationForm
 from bench_service.model.job import FINAL, Event, Job, JobState
 from bench_service.model.records import StoredResult
 from bench_service.pages.corrections import correction_table
@@ -175,7 +176,9 @@ def unit_page(serial: str, request: Request) -> HTMLResponse:
         calibrations=service.stores.calibrations.list(serial).items,
         corrections=[(c, correction_table(c.correction)) for c in service.stores.corrections.list(serial).items],
         jobs=service.stores.jobs.list(unit=serial).items,
+        notes=service.stores.unit_notes.list(serial).items,
         imports=[r for r in service.stores.recordings.list(unit=serial).items if r.job_id is None],
         names=COEFFICIENT_NAMES,
         display=DISPLAY,
+        forms=[form.value for form in CalibrationForm],
     )

@@ -19,6 +19,7 @@ from bench_service.persistence.evidence.correction_store import SqlCorrectionSto
 from bench_service.persistence.evidence.raw_store import SqlRawDataStore
 from bench_service.persistence.evidence.recording_store import SqlRecordingStore
 from bench_service.persistence.evidence.result_store import SqlResultStore
+from bench_service.persistence.evidence.unit_note_store import SqlUnitNoteStore
 from bench_service.persistence.evidence.unit_store import SqlUnitStore
 from bench_service.persistence.idempotency import SqlKeyStore
 from bench_service.persistence.jobs.job_store import SqlJobStore
@@ -58,6 +59,7 @@ def stores_of(database: Database) -> Stores:
         recordings=SqlRecordingStore(database),
         results=SqlResultStore(database),
         units=SqlUnitStore(database),
+        unit_notes=SqlUnitNoteStore(database),
         benches=SqlBenchRegistry(database),
         campaigns=SqlCampaignStore(database),
         calibrations=SqlCalibrationStore(database),

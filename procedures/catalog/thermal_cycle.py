@@ -14,11 +14,12 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis.calibration.reference import site_with
+from procedures.analysis.fitness.watched import each_watched
 from procedures.analysis.thermal.cycle.analysis import KnownOfUnit, analyse_cycle
 from procedures.analysis.thermal.cycle.checks import CycleLimits, cycle_checks, planned_cycle_checks
 from procedures.analysis.thermal.cycle.results import ThermalCycle
 from procedures.analysis.thermal.cycle.runs import CycleSettings
-from procedures.analysis.thermal.cycle.series import read_cycle
+from procedures.analysis.thermal.cycle.series import run_of
 from procedures.analysis.thermal.regime import RegimeSettings
 from procedures.analysis.turns.plan import UPRIGHT
 from procedures.bench import Bench
@@ -164,7 +165,7 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     params = resolve(params, context)
     _require_correction(params, context)
     site = site_with(context.bench.site, None, params.gravity_m_s2, None, None)
-    series = [(r.info.id, read_cycle(r, _up(r, context))) for r in recordings]
+    series = each_watched(run_of, recordings, lambda _, recording: (recording, _up(recording, context)))
     unit = context.unit
     calibration = unit.calibration("accelerometer")
     known = KnownOfUnit(

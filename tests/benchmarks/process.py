@@ -6,7 +6,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import httpx
@@ -36,19 +36,47 @@ class Service:
 
     def peak_memory_mb(self) -> float:
         """Largest resident set of the process so far."""
-        status = Path(f"/proc/{self.process.pid}/status")
-        if not status.exists():
-            return psutil.Process(self.process.pid).memory_info().rss / 1e6
-        line = next(line for line in status.read_text().splitlines() if line.startswith("VmHWM"))
-        return float(line.split()[1]) / 1e3
+        return _memory_mb(self.process.pid, "VmHWM")
+
+    def memory_mb(self) -> dict[str, float]:
+        """Resident set of the process now, and of each other process that it has begun, by kind and number."""
+        found = {"service": _memory_mb(self.process.pid, "VmRSS")}
+        return found | {name: _memory_mb(pid, "VmRSS") for name, pid in self._others()}
+
+    def peaks_mb(self) -> dict[str, float]:
+        """Largest resident set so far of each process that the service has begun and that still runs."""
+        return {name: _memory_mb(pid, "VmHWM") for name, pid in self._others()}
+
+    def processor_s(self) -> float:
+        """Processor time so far of the process and of those that it has begun [s]."""
+        whole = 0.0
+        for process in (psutil.Process(self.process.pid), *self._children()):
+            with suppress(psutil.NoSuchProcess):
+                times = process.cpu_times()
+                whole += times.user + times.system + times.children_user + times.children_system
+        return whole
+
+    def _others(self) -> Generator[tuple[str, int]]:
+        for process in self._children():
+            with suppress(psutil.NoSuchProcess):
+                line = " ".join(process.cmdline())
+                kinds = ("supervise", "resource_tracker", "spawn_main")
+                yield f"{next((kind for kind in kinds if kind in line), 'other')} {process.pid}", process.pid
+
+    def _children(self) -> list[psutil.Process]:
+        with suppress(psutil.NoSuchProcess):
+            return psutil.Process(self.process.pid).children(recursive=True)
+        return []
 
 
 @contextmanager
-def command(arguments: list[str], port: int, environment: dict[str, str]) -> Generator[Service]:
+def command(
+    arguments: list[str], port: int, environment: dict[str, str], folder: Path | None = None
+) -> Generator[Service]:
     """Start a command that will answer on a port, wait for its first 200, and end it afterwards."""
     begun = monotonic_s()
     quiet = subprocess.DEVNULL
-    process = subprocess.Popen(arguments, env={**os.environ, **environment}, stdout=quiet, stderr=quiet)
+    process = subprocess.Popen(arguments, env={**os.environ, **environment}, cwd=folder, stdout=quiet, stderr=quiet)
     with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=600) as client:
         try:
             while True:
@@ -75,6 +103,22 @@ def service(database_url: str | None = None) -> Generator[Service]:
         }
         with command([sys.executable, "-m", "bench_service", "serve"], port, environment) as running:
             yield running
+
+
+def _memory_mb(pid: int, kind: str) -> float:
+    """A line of the kernel's book of a process [MB]; where there is no such book, or no such process, its resident set.
+
+    `kind`: "VmHWM", the largest so far, or "VmRSS", now.
+    """
+    status = Path(f"/proc/{pid}/status")
+    try:
+        lines = status.read_text().splitlines()
+    except OSError:
+        with suppress(psutil.NoSuchProcess):
+            return psutil.Process(pid).memory_info().rss / 1e6
+        return 0.0
+    line = next((line for line in lines if line.startswith(kind)), f"{kind}: 0 kB")
+    return float(line.split()[1]) / 1e3
 
 
 def free_port() -> int:

@@ -33,6 +33,8 @@ CHARTS = """async () => {
     for (const chart of charts) { chart.add(window.sent / 10, [Math.sin(window.sent / 20)]); chart.draw(); }
   }, 100);
 }"""
+REAL_TIME_FACTOR = "10"
+"""Pace of the job whose page is watched for long: its events and live states come as on a bench."""
 
 
 def load() -> str:
@@ -48,8 +50,8 @@ def stop_answer(browser: Browser, service: BenchProcess, pages: int, presses: in
     context = browser.new_context()
     job = service.submit("static_run", parameters={"launches": 1, "duration_s": 864_000.0})
     opened = [context.new_page() for _ in range(pages)]
-    for page in opened:
-        page.goto(f"{address(service)}/jobs/{job}")
+    for number, page in enumerate(opened):
+        page.goto(address(service) + ("/" if number % 2 else f"/jobs/{job}"))
     took: list[float] = []
     for press in range(presses):
         page = opened[press * len(opened) // presses]
@@ -89,17 +91,32 @@ def heap(page: Page) -> float:
     return float(session.send("Runtime.getHeapUsage")["usedSize"]) / 1e6
 
 
-def charts(browser: Browser, service: BenchProcess, minutes: float) -> bool:
+def charts(browser: Browser, folder: Path, minutes: float) -> bool:
+    """Watch the page of a running job, with eight more charts on it that get ten values a second each."""
+    service = process(folder, real_time_factor=REAL_TIME_FACTOR)
+    service.start()
+    try:
+        return _charts(browser, service, minutes)
+    finally:
+        service.end()
+
+
+def _charts(browser: Browser, service: BenchProcess, minutes: float) -> bool:
+    job = service.submit(parameters={"dwell_s": 86_400.0, "settle_s": 0.5})
     page = browser.new_context().new_page()
-    page.goto(address(service) + "/units")
-    page.wait_for_selector("html[data-ready]")
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.goto(f"{address(service)}/jobs/{job}")
+    page.wait_for_selector("#charts canvas", timeout=60_000)
     page.evaluate(CHARTS)
     pause(150.0)  # until old points are merged for the first time: then the page is at its size
+    assert page.locator("main > .chart canvas").count() == 8, "the charts are not drawn"
     before, sent = heap(page), page.evaluate("sent")
     begun = monotonic_s()
     pause(60.0 * minutes)
     after, rate = heap(page), (page.evaluate("sent") - sent) / (monotonic_s() - begun)
     page.context.close()
+    assert not wrong, wrong[:3]
     print(f"charts: 8 channels, {rate:.1f} updates/s over {minutes:g} min, heap {before:.1f} -> {after:.1f} MB")
     return figure("charts, growth of the heap", 100.0 * abs(after / before - 1.0), 10.0, "%")
 
@@ -141,7 +158,11 @@ def main() -> None:
     parser.add_argument("--presses", type=int, default=20)
     parser.add_argument("--minutes", type=float, default=20.0)
     given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        tempfile.TemporaryDirectory() as apart,
+        sync_playwright() as playwright,
+    ):
         service = process(Path(folder))
         service.start()
         browser = playwright.chromium.launch(executable_path=found(), args=list(CHROMIUM_ARGUMENTS))
@@ -151,7 +172,7 @@ def main() -> None:
             kept &= first_paint(browser, service, "a calibration's result", f"/results/{job['result']}", 1.0)
             kept &= stream(service, 8.0, 3)
             kept &= stop_answer(browser, service, given.pages, given.presses)
-            kept &= charts(browser, service, given.minutes)
+            kept &= charts(browser, Path(apart), given.minutes)
         finally:
             browser.close()
             service.end()

@@ -131,22 +131,6 @@ def test_a_recording_is_looked_at_and_a_method_is_run_on_it(window: Watched, cal
     expect(page.get_by_role("heading", level=1)).to_contain_text("allan_deviation")
 
 
-def test_a_file_is_imported(window: Watched, tmp_path: Path) -> None:
-    file = tmp_path / "gyro.csv"
-    file.write_text("gyro_x,gyro_y\n" + "".join(f"{0.01 * (k % 5)},{0.02 * (k % 3)}\n" for k in range(500)))
-    page = window.open("/recordings")
-    window.expected = re.compile(r"status of (404|405|422)")
-    page.get_by_label("Drop files here").set_input_files(file)
-    expect(page.locator("#looked table")).to_be_visible()
-    page.locator("#import-unit").fill("PAPER-1")
-    page.get_by_label("Description: which column").fill(
-        '{"rate_hz": 100, "channels": [{"name": "gyro_x", "quantity": "angular_rate", "unit": "deg/s"}]}'
-    )
-    page.get_by_role("button", name="Import").click()
-    page.wait_for_url(re.compile("/recordings/"), timeout=20_000)
-    expect(page.locator("#main")).to_contain_text("PAPER-1")
-
-
 def test_the_queue_is_ordered_held_and_cancelled(window: Watched, service: BenchProcess) -> None:
     service.client.post("/api/v1/benches/sim/stop", json={"reason": "queue"})
     first, second = (service.submit("no_operation") for _ in range(2))
@@ -164,23 +148,24 @@ def test_the_queue_is_ordered_held_and_cancelled(window: Watched, service: Bench
     assert ended(service, second)["state"] == "succeeded"
 
 
-def test_a_campaign_is_made_started_and_scheduled(window: Watched, service: BenchProcess) -> None:
-    page = window.open("/campaigns")
-    page.get_by_role("button", name="New campaign").click()
-    page.get_by_label("The campaign as JSON").fill(
-        '{"name": "short", "title": "Short", "steps": [{"name": "nothing", "procedure": "no_operation"}]}'
-    )
-    page.get_by_role("button", name="Make the campaign").click()
-    cell = page.locator('td[data-campaign="short"]')
-    cell.get_by_role("button", name="Schedule").click()
-    page.locator("#campaign").get_by_role("button", name="Schedule").click()
-    expect(page.locator("#schedules")).to_contain_text("short")
-    page.locator("#schedules").get_by_role("button", name="Switch off").click()
-    expect(page.locator("#schedules").get_by_role("button", name="Switch on")).to_be_visible()
-    page.locator('td[data-campaign="short"]').get_by_role("button", name="Start").click()
-    page.get_by_role("button", name="Start the campaign").click()
+def test_a_new_unit_is_calibrated_then_verified_in_one_go(window: Watched, service: BenchProcess) -> None:
+    page = window.open("/start?unit=SIM-0001&procedure=calibration_12_orientations")
+    both = page.get_by_role("button", name="Calibrate, then verify")
+    expect(page.locator("#preview")).to_contain_text("12 stations")
+    both.click()
     page.wait_for_url(re.compile("/campaign-runs/"))
-    expect(page.locator(".verdict")).to_contain_text("PASS", timeout=30_000)
+    expect(page.locator(".verdict")).to_contain_text("PASS", timeout=60_000)
+    expect(page.locator("tbody tr")).to_have_count(2)
+
+
+def test_estimates_so_far_are_drawn_while_a_job_runs(window: Watched, service: BenchProcess) -> None:
+    job = service.submit(parameters={"dwell_s": 2_000.0})
+    page = window.open(f"/jobs/{job}")
+    expect(page.locator("#estimates")).to_contain_text("Allan deviation so far", timeout=30_000)
+    expect(page.locator("#estimates .uplot").first).to_be_visible()
+    expect(page.locator("#estimates")).to_contain_text("gyro_x")
+    expect(page.locator("#estimates")).to_contain_text("Uncertainty after each station", timeout=30_000)
+    service.client.post(f"/api/v1/jobs/{job}/cancel")
 
 
 def test_the_trail_says_who_did_what(window: Watched, service: BenchProcess) -> None:

@@ -129,10 +129,8 @@ def test_recordings_without_turns_or_rests_are_refused(recordings: list[MemoryRe
     found = method.analyse(Evidence(tuple(recordings[::-1])), given, context.unit)
     assert found.gyro.p_value is not None
     assert found.gyro.coefficients[0].name == "gyro.b_x"
-    for kind, kept in (
-        ("of whole turns", recordings[::3]),
-        ("at rest", [r for i, r in enumerate(recordings) if i % 3]),
-    ):
+    turning = [r for i, r in enumerate(recordings) if i % 3]
+    for kind, kept in (("of whole turns", recordings[::3]), ("at rest", turning)):
         with pytest.raises(UnfitRecording, match=f"no recording {kind}"):
             method.analyse(Evidence(tuple(kept)), given, context.unit)
     lost = [replace(r, info=replace(r.info, station=None)) for r in recordings]

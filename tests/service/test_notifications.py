@@ -193,6 +193,36 @@ def test_a_flood_becomes_a_digest(tmp_path: Path, hook: _Hook) -> None:
     assert box.send(AT + timedelta(minutes=61)) == 0
 
 
+@pytest.mark.parametrize("kind", ["stop", "prompt"])
+def test_a_flood_holds_back_neither_stops_nor_prompts(tmp_path: Path, hook: _Hook, kind: str) -> None:
+    box = outbox(tmp_path, hook, per_hour=2)
+    for number in range(10):
+        box.put(message(f"m{number}"))
+    assert box.send(AT) == 0
+    box.put(message("waits"))
+    for number in range(5):  # more than the hour has room for, and each by itself
+        box.put(message(f"now{number}", kind=kind, title=f"title {number}"))
+    assert box.send(AT) == 1
+    assert [got["title"] for got in hook.got[2:]] == [f"title {number}" for number in range(5)]
+    assert outbox(tmp_path, hook, per_hour=2).send(AT) == 0, "a service that starts anew has an hour of its own"
+    assert hook.got[-1]["key"] == "waits"
+
+
+def test_a_stop_is_tried_at_once_at_a_target_that_was_away(tmp_path: Path, hook: _Hook) -> None:
+    hook.answers = [503] * 6
+    box = outbox(tmp_path, hook)
+    box.put(message("verdict"))
+    at = AT
+    for _ in range(6):  # the pause is minutes by now
+        assert box.send(at) == 1
+        at = box._due
+    at -= timedelta(seconds=1)
+    assert box.send(at) == 1
+    box.put(message("stop", kind="stop"))
+    assert box.send(at) == 0
+    assert [got["key"] for got in hook.got] == ["stop", "verdict"]
+
+
 def test_a_target_gets_the_events_that_it_asked_for(tmp_path: Path, hook: _Hook) -> None:
     box = outbox(tmp_path, hook, events=["stop"])
     box.put(message())

@@ -19,30 +19,10 @@ from bench_service.formats.certificate.errors import CertificateRefused
 from bench_service.formats.certificate.laboratory import Laboratory, laboratory_of
 from bench_service.formats.certificate.rules import attached, faults, schema_faults
 from bench_service.formats.certificate.signature import KeyPair, new_key, parsed, signed, verified
+from tests.kit.certificate_facts import TEXT
 from tests.kit.exported_calibrations import a_subject
 
 SCHEMA = Path(__file__).parents[3] / "shared" / "data" / "dcc"
-TEXT = """
-identifier = "K-2026-001"
-begun = 2026-01-01
-[laboratory]
-name = "Bench & Söhne <Lab>"
-country = "UA"
-city = "Київ"
-street = "Main"
-[customer]
-name = "A customer"
-country = "DE"
-city = "Braunschweig"
-[[people]]
-name = "Ann"
-role = "head of laboratory"
-main_signer = true
-[[equipment]]
-name = "rate table"
-serial = "T-1"
-certificate = "PTB 12345"
-"""
 
 
 @pytest.fixture(scope="module")

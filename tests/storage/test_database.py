@@ -126,7 +126,7 @@ def test_a_process_killed_in_mid_recording_leaves_whole_chunks(
     assert stores.recordings.interrupt_open(job.id) == 1
     (kept,) = stores.recordings.list().items
     assert kept.state is RecordingState.INTERRUPTED
-    assert kept.info.count == 2 * 524_288
+    assert kept.info.count in (524_288, 2 * 524_288)  # the second chunk was on its way, or there
     raw = np.concatenate(list(stores.recordings.load(kept.info.id).blocks()))
     np.testing.assert_array_equal(raw[:, 0], np.arange(kept.info.count))
 

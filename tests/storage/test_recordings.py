@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from datetime import timedelta
+from threading import Event
 
 import numpy as np
 import pytest
@@ -10,13 +11,13 @@ import sqlalchemy as sa
 from bench_service.campaigns.stores import Stores
 from bench_service.formats import chunk
 from bench_service.formats.content_hash import content_hash
-from bench_service.model.errors import IdempotencyConflict, NotFound, StorageFailure
+from bench_service.model.errors import IdempotencyConflict, NotFound, StorageFailure, StorageFull
 from bench_service.model.job import Job
 from bench_service.model.records import Idempotency, NewRecording, RecordingState
 from bench_service.persistence import Database
 from bench_service.persistence.evidence.recording_store import SqlRecordingStore
 from bench_service.persistence.tables.evidence import ChunkRow, RecordingRow
-from bench_service.wall_clock import now
+from bench_service.wall_clock import monotonic_s, now, pause
 from procedures.core.errors import BadParameter, MissingChannel, UnfitRecording
 from procedures.core.recording import RawArray, RecordingInfo, Station
 
@@ -104,6 +105,7 @@ def test_nothing_is_seen_before_the_seal(
     writer.write(samples(ROWS - 1))
     assert _count(database, RecordingRow) == 0
     writer.write(samples(ROWS))
+    _wait_for_chunks(database, 1)
     assert _count(database, RecordingRow) == 1
     assert stores.recordings.list().items == ()
     info = writer.seal()
@@ -143,12 +145,13 @@ def test_an_abandoned_import_leaves_nothing(
 
 
 def test_after_a_crash_an_open_recording_becomes_interrupted(
-    stores: Stores, new_recording: New, new_job: Callable[..., Job], samples: Samples
+    stores: Stores, database: Database, new_recording: New, new_job: Callable[..., Job], samples: Samples
 ) -> None:
     job = stores.jobs.add(new_job())
     raw = samples(2 * ROWS + 7)
     dead = stores.recordings.open(new_recording(job_id=job.id, station=job.stations[0]))
     dead.write(raw)
+    _wait_for_chunks(database, 2)
     assert stores.recordings.interrupt_open("another job") == 0
     assert stores.recordings.interrupt_open(job.id) == 1
     assert stores.recordings.interrupt_open(job.id) == 0
@@ -162,10 +165,39 @@ def test_after_a_crash_an_open_recording_becomes_interrupted(
     assert [r.info for r in stores.recordings.of_job(job.id)] == [again]
 
 
+def test_a_chunk_is_stored_beside_the_next_and_its_failure_is_raised_by_the_next_call(
+    stores: Stores, new_recording: New, samples: Samples, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    may_go_on = Event()
+
+    def full(*_: object) -> bytes:
+        assert may_go_on.wait(30.0)
+        raise StorageFull("no room")
+
+    monkeypatch.setattr("bench_service.persistence.evidence.recording_writer.encode_chunk", full)
+    writer = stores.recordings.open(new_recording())
+    writer.write(samples(ROWS))
+    writer.write(samples(ROWS - 1))  # while the first chunk is on its way
+    may_go_on.set()
+    with pytest.raises(StorageFull, match="no room"):
+        writer.write(samples(1))
+    for call in (lambda: writer.write(samples(1)), writer.seal):
+        with pytest.raises(StorageFailure, match="closed"):
+            call()
+    writer.abandon()
+    last = stores.recordings.open(new_recording())
+    last.write(samples(ROWS))
+    with pytest.raises(StorageFull, match="no room"):
+        last.seal()
+    last.abandon()
+    assert stores.recordings.list().items == ()
+
+
 def test_a_crashed_import_can_be_cleared_away(
     stores: Stores, database: Database, new_recording: New, samples: Samples
 ) -> None:
     stores.recordings.open(new_recording()).write(samples(ROWS))
+    _wait_for_chunks(database, 1)
     kept = _store(stores, new_recording(), samples(ROWS))
     recordings = SqlRecordingStore(database)
     assert recordings.discard_open_imports(now() - timedelta(hours=1)) == 0
@@ -268,6 +300,7 @@ def test_a_damaged_recording_that_is_left_open_can_be_closed(
     job = stores.jobs.add(new_job())
     writer = stores.recordings.open(new_recording(job_id=job.id, station=Station(0, "up")))
     writer.write(samples(2 * ROWS + 1))
+    _wait_for_chunks(database, 2)
     with database.write() as session:
         row = session.scalars(sa.select(ChunkRow).where(ChunkRow.number == 0)).one()
         row.payload = row.payload[:-1]
@@ -306,6 +339,14 @@ def test_what_cannot_be_a_recording_is_refused(stores: Stores, new_recording: Ne
         floats.write(np.full((3, 6), np.nan))
     writer.write(samples(5))
     assert writer.seal().count == 5
+
+
+def _wait_for_chunks(database: Database, number: int) -> None:
+    """Wait until the writers' threads have stored so many chunks."""
+    deadline_s = monotonic_s() + 30.0
+    while _count(database, ChunkRow) < number:
+        assert monotonic_s() < deadline_s
+        pause(0.005)
 
 
 def _count(database: Database, table: type[RecordingRow] | type[ChunkRow]) -> int:

@@ -18,8 +18,9 @@ RIGHTS: dict[str, Right] = {
     "read_session": Right.OPEN,
     "log_in": Right.OPEN,
     "log_out": Right.SEE,
-    # previews and prints change nothing
+    # previews, prints and checks change nothing
     "print_certificate": Right.SEE,
+    "check_certificate_file": Right.SEE,
     "preview": Right.SEE,
     "preview_batch": Right.SEE,
     "preview_campaign": Right.SEE,
@@ -31,6 +32,7 @@ RIGHTS: dict[str, Right] = {
     "pause": Right.OPERATE,
     "answer": Right.OPERATE,
     "add_note": Right.OPERATE,
+    "add_unit_note": Right.OPERATE,
     "resume": Right.OPERATE,
     "release": Right.OPERATE,
     "release_stop": Right.OPERATE,

@@ -3,6 +3,7 @@
 import errno
 import signal
 import socket
+import sys
 import threading
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
@@ -27,6 +28,9 @@ from bench_service.wall_clock import pause
 
 EMBEDDED = "embedded"
 """Name that commands give to a service in their own process, which they reach over a socket file."""
+SWITCH_S = 0.0005
+"""Time after which a thread that computes gives way to another one [s]. A stop passes through several threads, and with
+the interpreter's 5 ms each of these handovers may wait so long while a job runs at full speed."""
 GRACE_S = 3
 """Time that open connections may take to end at shutdown [s]."""
 
@@ -67,6 +71,7 @@ def _opened(
     settings: Settings, drive: bool, socket_file: Path | None, level: str
 ) -> Generator[tuple[uvicorn.Server, BenchService]]:
     set_up(settings, level)
+    sys.setswitchinterval(SWITCH_S)
     protect(settings)
     few_arenas()
     BoundedConnections.most = raise_descriptors()

@@ -10,7 +10,7 @@ export function confirmed({ title, lost, verb, reason = null, by = false }) {
   return new Promise((settle) => {
     const id = `dialog-${++dialogs}`;
     const name = by && h("label", {}, t("Your name"), h("input", { name: "by", required: true, maxlength: 200, autocomplete: "name", value: me() }));
-    const why = reason && h("label", {}, reason.label, h("input", { name: reason.name || "reason", maxlength: 500, required: reason.required, placeholder: reason.hint }));
+    const why = reason && h("label", {}, reason.label, h("input", { name: reason.name || "reason", maxlength: 500, required: reason.required, placeholder: reason.hint, type: reason.secret ? "password" : "text", autocomplete: reason.secret ? "new-password" : "off" }));
     const form = h("form", { method: "dialog" }, h("h2", { id }, title), lost && h("p", {}, lost), name, why,
       h("div", { class: "verbs" }, h("button", { type: "submit", class: "danger" }, verb), h("button", { type: "button", class: "quiet", onclick: () => box.close() }, t("Back"))));
     const box = h("dialog", { "aria-labelledby": id }, form);

@@ -1,4 +1,5 @@
 // The one way of the pages to the service: its public API. A refusal becomes a sentence, never silence.
+import { inTurn } from "./turns.js";
 import { t } from "./words.js";
 
 const NAME = "bench.name";
@@ -26,20 +27,23 @@ export async function ask(method, path, body, { key = null, patience = PATIENCE_
   if (body !== undefined && !(body instanceof FormData)) headers["Content-Type"] = "application/json";
   if (key) headers["Idempotency-Key"] = key;
   if (me() && method !== "GET") headers["X-Requested-By"] = utf8(me());
-  let answer;
-  try {
+  let answer, text;
+  const fetched = async () => {
     const timed = AbortSignal.timeout(patience);
     answer = await fetch(path, {
       method, headers, signal: signal ? AbortSignal.any([signal, timed]) : timed,
       body: body === undefined ? undefined : body instanceof FormData ? body : JSON.stringify(body),
     });
+    text = await answer.text();
+  };
+  try {
+    await (method === "GET" ? inTurn(fetched, signal) : fetched());
   } catch (error) {
     if (signal && signal.aborted) throw error;
     throw new Refused(error.name === "TimeoutError"
       ? t("No answer within {s} s: it is not known whether this was done.", { s: patience / 1000 })
       : t("Nothing answers: the service is not reached. This was not done."));
   }
-  const text = await answer.text();
   let document_ = null;
   try { document_ = text ? JSON.parse(text) : null; } catch { /* no JSON: the status alone is shown */ }
   if (!answer.ok) throw new Refused(sentence(answer.status, document_ || {}, answer.statusText), answer.status, document_ || {});

@@ -1,12 +1,13 @@
 // Campaigns and schedules: made, changed, previewed, started, switched on and off.
 import { ask, part, read, send } from "./api.js";
 import { busy, verb } from "./act.js";
+import { CampaignForm } from "./campaign_form.js";
 import { fill, h, span } from "./dom.js";
 import { t } from "./words.js";
 
 const place = document.getElementById("campaign"), zone = Intl.DateTimeFormat().resolvedOptions().timeZone;
 const NEW = { name: "my-campaign", title: "", steps: [{ name: "calibrate", procedure: "calibration_12_orientations" }, { name: "verify", procedure: "verification_9_orientations" }] };
-let units = [], benches = [];
+let units = [], benches = [], catalogue = { procedures: [], methods: [] };
 
 function target() {
   const unit = h("input", { name: "unit", required: true, list: "known-units", value: (benches[0] && benches[0].units[0]) || units[0] || "" });
@@ -34,31 +35,30 @@ function start(name) {
 function open(element) { fill(place, element); place.scrollIntoView({ block: "nearest" }); const first = place.querySelector("input, textarea"); if (first) first.focus(); }
 
 function edit(campaign, fresh) {
-  const text = h("textarea", { rows: 18, spellcheck: "false", "aria-label": t("The campaign as JSON") }), output = h("output", { role: "alert" }), save = h("button", { class: "go" }, fresh ? t("Make the campaign") : t("Change the campaign"));
-  text.value = JSON.stringify(campaign, null, 2);
-  const form = h("form", {}, h("h2", {}, fresh ? t("New campaign") : `${t("Change")} ${campaign.name}`), h("p", { class: "note" }, t("Steps in order, each with a procedure or a method, parameters and limits. Every step is examined before it is kept.")), text, h("div", { class: "verbs" }, save, output));
-  form.addEventListener("submit", async (event) => {
-    event.preventDefault();
-    const made = await busy(save, output, () => { const body = JSON.parse(text.value); return fresh ? send("/api/v1/campaigns", body) : ask("PUT", `/api/v1/campaigns/${part(campaign.name)}`, body); });
-    if (!made) return;
-    if (made.warnings && made.warnings.length) fill(output, ...made.warnings.map((one) => h("p", {}, one))); else location.reload();
-  });
-  open(form);
+  open(new CampaignForm(campaign, fresh, catalogue, (body) => fresh ? send("/api/v1/campaigns", body) : ask("PUT", `/api/v1/campaigns/${part(campaign.name)}`, body)).element);
 }
 
+const WEEKDAY = new Intl.DateTimeFormat(document.documentElement.lang, { weekday: "long", timeZone: "UTC" });
+const HOW_OFTEN = [["* * *", t("every day")], ["* * 1-5", t("from Monday to Friday")], ...[1, 2, 3, 4, 5, 6, 0].map((day) => [`* * ${day}`, WEEKDAY.format(new Date(Date.UTC(2024, 0, 7 + day)))]), ["1 * *", t("on the first of each month")], ["", t("by a cron line")]];
+
 function schedule(name) {
-  const on = target(), output = h("output", { role: "alert" }), cron = h("input", { name: "cron", required: true, value: "0 1 * * *" }), where = h("input", { name: "zone", required: true, value: zone });
-  const form = h("form", {}, h("h2", {}, `${t("Schedule")} ${name}`), h("div", { class: "filters" }, h("label", {}, t("Minute hour day month weekday"), cron), h("label", {}, t("Time zone"), where), ...on.labels, h("button", { class: "go" }, t("Schedule")), output));
+  const on = target(), output = h("output", { role: "alert" }), often = h("select", {}, ...HOW_OFTEN.map(([value, text]) => h("option", { value }, text))), time = h("input", { type: "time", value: "01:00", required: true });
+  const cron = h("input", { name: "cron", value: "0 1 * * *" }), where = h("input", { name: "zone", required: true, value: zone }), cronLabel = h("label", { hidden: true }, t("Minute hour day month weekday"), cron), timeLabel = h("label", {}, t("At"), time);
+  const missed = h("select", {}, h("option", { value: "run_once" }, t("one run makes up for it")), h("option", { value: "skip" }, t("it is left out"))), overlap = h("select", {}, h("option", { value: "skip" }, t("the new start is left out")), h("option", { value: "queue" }, t("the new one waits")));
+  often.addEventListener("change", () => { cronLabel.hidden = often.value !== ""; timeLabel.hidden = often.value === ""; });
+  const line = () => { if (often.value === "") return cron.value; const [hour, minute] = time.value.split(":").map(Number); return `${minute} ${hour} ${often.value}`; };
+  const form = h("form", {}, h("h2", {}, `${t("Schedule")} ${name}`), h("div", { class: "filters" }, h("label", {}, t("How often"), often), timeLabel, cronLabel, h("label", {}, t("Time zone"), where), ...on.labels,
+    h("label", {}, t("Where a start was missed"), missed), h("label", {}, t("While the run before is open"), overlap), h("button", { class: "go" }, t("Schedule")), output));
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
-    const made = await busy(form.querySelector("button"), output, () => send("/api/v1/schedules", { cron: cron.value, time_zone: where.value, campaign: name, ...on.values() }, { key: crypto.randomUUID() }));
+    const made = await busy(form.querySelector("button"), output, () => send("/api/v1/schedules", { cron: line(), time_zone: where.value, campaign: name, missed: missed.value, overlap: overlap.value, ...on.values() }, { key: crypto.randomUUID() }));
     if (made) location.reload();
   });
   open(form);
 }
 
 async function begin() {
-  [units, benches] = await Promise.all([read("/api/v1/units").then((all) => all.map((one) => one.serial)), read("/api/v1/benches")]);
+  [units, benches, catalogue.procedures, catalogue.methods] = await Promise.all([read("/api/v1/units").then((all) => all.map((one) => one.serial)), read("/api/v1/benches"), read("/api/v1/procedures"), read("/api/v1/methods")]);
   for (const cell of document.querySelectorAll("td.do[data-campaign]")) {
     const name = cell.dataset.campaign;
     cell.append(h("div", { class: "verbs" }, h("button", { type: "button", onclick: () => start(name) }, t("Start")), h("button", { type: "button", onclick: () => schedule(name) }, t("Schedule")),

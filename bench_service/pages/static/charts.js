@@ -96,6 +96,23 @@ function download(name, type, content) {
 
 const cell = (value) => value === null || value === undefined ? "" : typeof value === "string" ? `"${value.replaceAll('"', '""')}"` : String(value);
 
+/** Curves that are replaced as a whole: on logarithmic axes where asked, none of them kept. */
+export class Curves {
+  constructor(title, names, { xLabel = "", height = 200, logX = false, logY = false, dashed = [] } = {}) {
+    this.element = h("section", { class: "chart", "aria-label": title }, h("h3", {}, title));
+    this.plot = null;
+    this.options = { width: 420, height, cursor: { drag: { x: true, y: false } }, legend: { live: true }, scales: { x: { time: false, distr: logX ? 3 : 1 }, y: { distr: logY ? 3 : 1 } }, axes: [axis(xLabel), axis()],
+      series: [{ label: xLabel }, ...names.map((name, k) => ({ label: name, stroke: COLOURS[k % COLOURS.length], width: dashed.includes(name) ? 0.8 : 1.4, dash: dashed.includes(name) ? [4, 4] : [], points: { show: false }, spanGaps: true, value: (_, v) => number(v === null ? null : Number(v.toPrecision(4))) }))] };
+  }
+
+  show(data) {
+    if (!this.element.isConnected || document.hidden) return;
+    if (this.plot) { this.plot.setData(data); return; }
+    this.plot = new uPlot(this.options, data, this.element);
+    fitted(this.plot, this.element, this.options.height);
+  }
+}
+
 /** A plot of a result, to zoom into and read values off; it can be taken out as PNG and CSV. */
 export function plotted(figure, { height = 330 } = {}) {
   const flat = figure.series.flatMap((s) => s.style === "band" ? [{ ...s, style: "line", error: [] }, { ...s, name: `${s.name} –`, y: s.upper, style: "line", error: [] }] : [s]);

@@ -1,9 +1,9 @@
 "use strict";
 // One connection for all pages of this browser: reads the feed, and hands it on to each page.
-const SILENT_MS = 3000, AGAIN_MS = 1000, GONE_MS = 40000, KEPT = 2000;
+const SILENT_MS = 3000, AGAIN_MS = 1000, GONE_MS = 40000, KEPT = 2000, LATEST_MS = 10000;
 const ports = new Map();  // port -> { jobs, at }
-const known = { benches: new Map(), lives: new Map(), jobs: new Map() };
-let source = null, followed = "", beatAt = 0, state = { alive: null, why: "" }, timer = null;
+const known = { benches: new Map(), lives: new Map(), jobs: new Map(), latest: null };
+let source = null, followed = "", beatAt = 0, state = { alive: null, why: "" }, timer = null, latestAt = 0, asking = false;
 
 const all = (message) => { for (const port of ports.keys()) port.postMessage(message); };
 
@@ -23,6 +23,7 @@ function open() {
   source.addEventListener("bench", (event) => {
     const news = JSON.parse(event.data);
     known.benches.set(news.bench.id, news);
+    latestAt = Math.min(latestAt, Date.now() - LATEST_MS + 500);  // soon: a job has begun, ended or joined the queue
     all({ kind: "bench", news });
   });
   source.addEventListener("live", (event) => {
@@ -51,7 +52,19 @@ function open() {
   };
 }
 
+async function latest() {  // the list of the latest jobs, read once for all pages that show it
+  if (asking || state.alive !== true || Date.now() - latestAt < LATEST_MS || ![...ports.values()].some((page) => page.latest)) return;
+  asking = true;
+  latestAt = Date.now();
+  try {
+    const answer = await fetch("/api/v1/jobs?limit=20", { signal: AbortSignal.timeout(10000) });
+    if (answer.ok) { known.latest = (await answer.json()).items; all({ kind: "latest", items: known.latest }); }
+  } catch { /* the state says that the service is away */ }
+  asking = false;
+}
+
 function look() {
+  latest();
   const now = Date.now();
   for (const [port, page] of ports) if (now - page.at > GONE_MS) ports.delete(port);
   if (!ports.size) { if (source) source.close(); source = null; state = { alive: null, why: "" }; return; }
@@ -66,7 +79,8 @@ function look() {
 function heard(port, message) {
   if (message.kind === "bye") { ports.delete(port); return; }
   const page = ports.get(port), first = page === undefined;
-  ports.set(port, { jobs: message.jobs || [], at: Date.now() });
+  if (message.latest && !(page && page.latest) && known.latest) port.postMessage({ kind: "latest", items: known.latest });
+  ports.set(port, { jobs: message.jobs || [], latest: Boolean(message.latest), at: Date.now() });
   if (first) {
     for (const news of known.benches.values()) port.postMessage({ kind: "bench", news });
     for (const live of known.lives.values()) port.postMessage({ kind: "live", live });

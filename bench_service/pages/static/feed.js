@@ -2,6 +2,7 @@
 const PING_MS = 10000;
 const listeners = new Map();
 const jobs = new Set();
+let wantsLatest = false;
 const here = new URL("./feed-worker.js", import.meta.url);
 let port = null, worker = null;
 
@@ -30,7 +31,7 @@ function begin() {
   hello();
 }
 
-function hello() { if (port) port.postMessage({ kind: "hello", jobs: [...jobs] }); }
+function hello() { if (port) port.postMessage({ kind: "hello", jobs: [...jobs], latest: wantsLatest }); }
 
 function end() {
   if (!port) return;
@@ -39,13 +40,16 @@ function end() {
   port = worker = null;
 }
 
-/** Calls `tell` with each message of a kind: `bench`, `live`, `job`, `state`. */
+/** Calls `tell` with each message of a kind: `bench`, `live`, `job`, `latest`, `state`. */
 export function on(kind, tell) {
   listeners.set(kind, [...(listeners.get(kind) || []), tell]);
 }
 
 /** Also follow the events of a job, from its first one. */
 export function follow(job) { jobs.add(job); hello(); }
+
+/** Also keep up with the latest jobs: one reading for all pages of the browser. */
+export function latest() { wantsLatest = true; hello(); }
 
 begin();
 setInterval(hello, PING_MS);

@@ -40,11 +40,11 @@ function bounds(kind) {
 const shown = (value) => value === null || value === undefined ? "" : typeof value === "object" ? JSON.stringify(value) : String(value);
 
 class Field {
-  constructor(path, schema, whole, changed) {
+  constructor(path, schema, whole, changed, prefix = "") {
     this.path = path;
     this.kind = kindOf(schema, whole);
     this.standard = this.kind.default === undefined ? null : this.kind.default;
-    const name = path[path.length - 1], id = `field-${path.join("-")}`, unit = unitOf(name), range = bounds(this.kind);
+    const name = path[path.length - 1], id = `field-${prefix}${path.join("-")}`, unit = unitOf(name), range = bounds(this.kind);
     const describe = [this.kind.description && t(this.kind.description), range && t("allowed: {range}", { range: `${range} ${unit}`.trim() })].filter(Boolean).join("; ");
     this.input = this.control(id);
     this.message = h("span", { class: "message", role: "alert" });
@@ -108,8 +108,9 @@ class Field {
 }
 
 export class SchemaForm {
-  constructor(schema, changed) {
+  constructor(schema, changed, prefix = "") {
     this.fields = [];
+    this.prefix = prefix;
     this.changed = () => { for (const field of this.fields) field.mark(); changed(); };
     this.element = h("div", { class: "fields" }, ...this.part(schema, schema, [], {}));
     if (!this.fields.length) this.element.append(h("p", { class: "note" }, t("It has no parameters.")));
@@ -121,7 +122,7 @@ export class SchemaForm {
       if (kind.type === "object" && kind.properties && !kind.mixed && !kind.nullable) {
         return h("fieldset", {}, h("legend", {}, plainName(name)), ...this.part(kind, whole, [...path, name], kind.default));
       }
-      const field = new Field([...path, name], own, whole, () => this.changed());
+      const field = new Field([...path, name], own, whole, () => this.changed(), this.prefix);
       this.fields.push(field);
       return field.element;
     });

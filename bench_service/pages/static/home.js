@@ -1,12 +1,11 @@
 // The first page, live: each bench with what it does, its stops and their release, and the latest jobs.
-import { read, part, send } from "./api.js";
+import { part, send } from "./api.js";
 import { badge, fill, h, moment, number, short, span } from "./dom.js";
 import { busy } from "./act.js";
 import { iAm, me } from "./api.js";
 import * as feed from "./feed.js";
+import { reload } from "./turns.js";
 import { t } from "./words.js";
-
-const JOBS_MS = 10000;
 
 function release(bench, stop) {
   const output = h("output", { role: "status" });
@@ -44,7 +43,7 @@ function stops(card, bench) {
 
 function show({ bench, job }) {
   const card = document.getElementById(`bench-${bench.id}`);
-  if (!card) { location.reload(); return; }
+  if (!card) { reload(); return; }
   stops(card, bench);
   const live = feed.lives.get(bench.id), progress = live && live.job && job && live.job.id === job.id ? live.job : null;
   const { safety } = bench, free = !job && bench.state !== "busy";
@@ -59,23 +58,14 @@ function show({ bench, job }) {
     live && live.devices && live.devices.chamber && h("p", { class: "note" }, `${t("Chamber")} ${number(Number(live.devices.chamber.air_c.toFixed(1)))} °C`));
 }
 
-let held = "", timer = null;
-async function jobs() {
-  clearTimeout(timer);
-  timer = setTimeout(jobs, JOBS_MS);
-  if (feed.state.alive === false) return;
-  try {
-    const page = await read("/api/v1/jobs?limit=20");
-    fill(document.getElementById("jobs"), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Latest jobs") }, h("table", {}, h("thead", {}, h("tr", {}, ...["Procedure", "Unit", "State", "Verdict", "Stations", "Submitted", "Labels", "Job"].map((name) => h("th", {}, t(name))))),
-      h("tbody", {}, ...page.items.map((job) => h("tr", {}, h("td", {}, h("a", { href: job.page }, job.procedure)), h("td", {}, job.unit), h("td", {}, badge(job.state)), h("td", {}, job.verdict && badge(job.verdict)),
-        h("td", { class: "n" }, `${job.progress.station} / ${job.progress.stations}`), h("td", {}, moment(job.created_at)), h("td", {}, Object.entries(job.labels).map(([k, v]) => `${k}: ${v}`).join("; ")), h("td", {}, h("code", { title: job.id }, short(job.id)))))))));
-  } catch { /* the page says by itself that the service is away */ }
+function jobs({ items }) {
+  fill(document.getElementById("jobs"), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Latest jobs") }, h("table", {}, h("thead", {}, h("tr", {}, ...["Procedure", "Unit", "State", "Verdict", "Stations", "Submitted", "Labels", "Job"].map((name) => h("th", {}, t(name))))),
+    h("tbody", {}, ...items.map((job) => h("tr", {}, h("td", {}, h("a", { href: job.page }, job.procedure)), h("td", {}, job.unit), h("td", {}, badge(job.state)), h("td", {}, job.verdict && badge(job.verdict)),
+      h("td", { class: "n" }, `${job.progress.station} / ${job.progress.stations}`), h("td", {}, moment(job.created_at)), h("td", {}, Object.entries(job.labels).map(([k, v]) => `${k}: ${v}`).join("; ")), h("td", {}, h("code", { title: job.id }, short(job.id)))))))));
 }
 
-feed.on("bench", ({ news }) => {
-  show(news);
-  const key = JSON.stringify([...feed.benches.values()].map((one) => [one.bench.state, one.job && one.job.id, one.bench.queued]));
-  if (key !== held) { held = key; jobs(); }
-});
-feed.on("live", ({ live }) => { const news = feed.benches.get(live.bench); if (news) show(news); });
+feed.on("bench", ({ news }) => show(news));
+feed.on("latest", jobs);
+feed.on("live", ({ live }) => { const news = feed.benches.get(live.bench); if (news && !document.hidden) show(news); });
 for (const news of feed.benches.values()) show(news);
+feed.latest();

@@ -4,7 +4,9 @@ import { Strip } from "./charts.js";
 import { fill, h, moment, doubt, number, shownIn, span } from "./dom.js";
 import * as feed from "./feed.js";
 import { attitude } from "./table3d.js";
+import { reload } from "./turns.js";
 import { t } from "./words.js";
+import { stationDone } from "./estimates.js";
 import "./result.js";
 
 const job = document.getElementById("job").dataset, at = (id) => document.getElementById(id);
@@ -23,8 +25,8 @@ function happened(events) {
     if (event.sequence <= known) continue;
     known = event.sequence;
     at("log").append(h("li", { "data-sequence": event.sequence }, moment(event.at), " ", h("strong", {}, event.kind), " ", words(event.data)));
-    if (event.kind === "state") { location.reload(); return; }
-    if (event.kind === "station") { at("done").textContent = event.data.station + 1; recordings(); }
+    if (event.kind === "state") { reload(); return; }
+    if (event.kind === "station") { at("done").textContent = event.data.station + 1; recordings(); stationDone(); }
   }
 }
 
@@ -84,7 +86,7 @@ function table() {
 
 function devices(found, commanded) {
   const angles = [found.outer_deg, found.middle_deg, found.inner_deg];
-  attitude(at("table"), angles, commanded);
+  if (!document.hidden) attitude(at("table"), angles, commanded);
   const c = found.chamber;
   at("devices").textContent = `${t("Table")} ${angles.map((angle) => `${angle.toFixed(4)}°`).join(" ")} ${found.moving ? t("moving") : t("at rest")}`
     + (commanded ? `; ${t("commanded")} ${commanded.map((angle) => `${angle.toFixed(1)}°`).join(" ")}` : "") + `; ${t("unit")} ${found.unit_on ? t("on") : t("off")}`

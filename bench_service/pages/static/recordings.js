@@ -3,6 +3,7 @@ import { ask, part, read } from "./api.js";
 import { busy } from "./act.js";
 import { bytes, h, fill, moment, number, span } from "./dom.js";
 import { SchemaForm } from "./form.js";
+import "./import_wizard.js";
 import { t } from "./words.js";
 
 const at = (id) => document.getElementById(id), search = at("search"), chosen = new Map();
@@ -51,69 +52,10 @@ async function analyse(event) {
   if (made) location.href = made.page;
 }
 
-const TEMPLATE = { unit: "", rate_hz: 100, channels: [{ name: "gyro_x", column: 0, quantity: "angular_rate", unit: "deg/s" }] };
-
-function looked(found) {
-  const columns = found.columns || [], doubts = [...(found.unknown || []), ...(found.suspicious || [])];
-  fill(at("looked"), found.title && h("p", {}, `${found.title}. ${found.rate_hz ? `${number(found.rate_hz)} Hz. ` : ""}${(found.notes || []).join(" ")}`),
-    ...doubts.map((text) => h("p", { class: "warning" }, text)),
-    columns.length && !found.first && h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Columns of the file") }, h("table", {}, h("thead", {}, h("tr", {}, ...Object.keys(columns[0]).map((name) => h("th", {}, name)))),
-      h("tbody", {}, ...columns.map((one) => h("tr", {}, ...Object.values(one).map((value) => h("td", {}, value === null ? "–" : Array.isArray(value) ? value.join(", ") : String(value)))))))),
-    found.first && h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("First rows of the file") }, h("table", {}, h("thead", {}, h("tr", {}, ...columns.map((one) => h("th", {}, one)))),
-      h("tbody", {}, ...found.first.slice(0, 8).map((cells) => h("tr", {}, ...cells.map((one) => h("td", {}, String(one)))))))));
-}
-
-async function firstRows(file) {  // a text file, read here: the service proposes more where it can
-  const head = await file.slice(0, 4000).text(), lines = head.split(/\r?\n/).slice(0, 9);
-  if (head.includes("\0")) return { columns: [], suspicious: [t("The file is no text: its columns are named by the file itself, or by the service.")] };
-  const split = (line) => line.split(line.includes(";") ? ";" : line.includes("\t") ? "\t" : line.includes(",") ? "," : /\s+/);
-  const rows = lines.filter(Boolean).map(split), width = Math.max(0, ...rows.map((cells) => cells.length));
-  return { columns: [...Array(width).keys()], first: rows, suspicious: [] };
-}
-
-async function dropped() {
-  const files = [...at("files").files];
-  if (!files.length) return;
-  at("step").hidden = false;
-  const sent = new FormData();
-  sent.append("file", files[0], files[0].name);
-  if (at("import-unit").value.trim()) sent.append("unit", at("import-unit").value.trim());
-  let found;
-  try { found = await ask("POST", "/api/v1/recordings/describe", sent, { patience: 60000 }); }
-  catch (error) {
-    found = await firstRows(files[0]);
-    if (error.status !== 404 && error.status !== 405) found.suspicious.push(error.message);
-  }
-  looked(found);
-  at("description").value = JSON.stringify(found.description || TEMPLATE, null, 2);
-}
-
-async function bring(event) {
-  event.preventDefault();
-  const output = at("wizard").querySelector("output");
-  const made = await busy(at("wizard").querySelector("button"), output, () => {
-    let description;
-    try { description = JSON.parse(at("description").value); } catch (error) { throw new Error(`${t("The description is no JSON:")} ${error.message}`); }
-    if (at("import-unit").value.trim()) description.unit = at("import-unit").value.trim();
-    const sent = new FormData();
-    for (const file of at("files").files) sent.append("files", file, file.name);
-    sent.append("description", JSON.stringify(description));
-    return ask("POST", "/api/v1/recordings", sent, { key: crypto.randomUUID(), patience: 600000 });
-  });
-  if (made) location.href = `/recordings/${made.id}`;
-}
-
 search.addEventListener("submit", (event) => { event.preventDefault(); find(); });
 at("older").addEventListener("click", () => find(next));
 at("method").addEventListener("change", () => choose(at("method").value));
 at("analyse").addEventListener("submit", analyse);
-at("files").addEventListener("change", dropped);
-at("wizard").addEventListener("submit", bring);
-for (const kind of ["dragover", "drop", "dragleave"]) at("drop").addEventListener(kind, (event) => {
-  event.preventDefault();
-  at("drop").classList.toggle("over", kind === "dragover");
-  if (kind === "drop") { at("files").files = event.dataTransfer.files; dropped(); }
-});
 for (const [name, value] of new URLSearchParams(location.search)) if (search.elements[name]) search.elements[name].value = value;
 count();
 find();

@@ -1,5 +1,6 @@
 """Entry point of an analysis process: its connection to the database, its catalogue, and the numerics."""
 
+from collections.abc import Callable
 from typing import Any
 
 from bench_service.evidence.analyses import AnalysisService
@@ -10,17 +11,23 @@ from bench_service.persistence import open_stores
 
 
 def open_run(database_url: str, code_version: str) -> Run:
-    """Prepare an analysis process, see `WorkProcesses`: "method" and "again" give a result's id, "recompute" JSON."""
+    """Prepare an analysis process, see `WorkProcesses`: "method" and "again" give a result's id, the others JSON."""
     from threadpoolctl import threadpool_limits
+
+    from bench_service.evidence.estimating import Estimating
 
     stores, _ = open_stores(database_url)  # it is closed with the process
     catalogue = Catalogue()
-    service = AnalysisService(stores, catalogue, stores.jobs.get, code_version)
-    second = RecomputationService(stores, catalogue, stores.jobs.get, code_version)
     threadpool_limits(1)
-    verbs = {"method": service.run_method, "again": service.analyse_again}
+    service = AnalysisService(stores, catalogue, stores.jobs.get, code_version)
+    verbs: dict[str, Callable[..., str]] = {
+        "method": lambda *of: service.run_method(*of).id,
+        "again": lambda *of: service.analyse_again(*of).id,
+        "recompute": RecomputationService(stores, catalogue, stores.jobs.get, code_version).as_json,
+        "so_far": Estimating(stores, stores.jobs.get).text,
+    }
 
     def run(name: str, arguments: tuple[Any, ...]) -> str:
-        return second.as_json(*arguments) if name == "recompute" else verbs[name](*arguments).id
+        return verbs[name](*arguments)
 
     return run

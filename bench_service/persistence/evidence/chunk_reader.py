@@ -6,12 +6,13 @@ Knows where a sample lies: all chunks but the last have the same number of sampl
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from sqlalchemy import select
 
 from bench_service.formats.chunk import UnreadableChunk, decode_chunk
 from bench_service.model.errors import DamagedRecording
-from bench_service.persistence.database import Database
+from bench_service.persistence.database import Database, connect
 from bench_service.persistence.evidence.raw_places import payload_elsewhere
 from bench_service.persistence.tables.evidence import ChunkRow
 from procedures.core.recording import RawArray
@@ -24,6 +25,11 @@ class ChunkReader:
     database: Database
     recording_id: str
     chunk_rows: int
+
+    def __reduce__(self) -> tuple[object, tuple[str, str, int]]:
+        """On its way to another process of the service a reader has the database's address, not its connections."""
+        url = self.database.engine.url.render_as_string(hide_password=False)
+        return _reopened, (url, self.recording_id, self.chunk_rows)
 
     def blocks(self, names: Sequence[str], start: int, stop: int) -> Iterator[RawArray]:
         """Samples start…stop (half open) of the named channels. Raises `DamagedRecording`, naming the chunk."""
@@ -62,3 +68,13 @@ class ChunkReader:
             "lost here. Samples before and after it can be exported by start_s and stop_s; a copy of the database from "
             "before the damage has them all"
         )
+
+
+def _reopened(url: str, recording_id: str, chunk_rows: int) -> ChunkReader:
+    return ChunkReader(_opened(url), recording_id, chunk_rows)
+
+
+@lru_cache(maxsize=1)
+def _opened(url: str) -> Database:
+    """The database, opened once; it is closed with the process."""
+    return connect(url)

@@ -48,7 +48,11 @@ class StoredSamples:
 
     def blocks(self) -> Iterator[RawArray]:
         """Yield the raw samples in order, a chunk at a time."""
-        return self._reader.blocks([c.name for c in self.info.channels], 0, self.info.count)
+        return self.since(0)
+
+    def since(self, start: int) -> Iterator[RawArray]:
+        """Yield the raw samples from sample `start` on, in order, a chunk at a time."""
+        return self._reader.blocks([c.name for c in self.info.channels], start, self.info.count)
 
 
 class SqlRecordingStore:
@@ -107,6 +111,12 @@ class SqlRecordingStore:
         for name in names:
             info.column(name)
         return reader.blocks(names, max(0, start), min(stop, info.count))
+
+    def so_far(self, job_id: str) -> StoredSamples | None:
+        query = select(RecordingRow).where(RecordingRow.job_id == job_id, RecordingRow.state == _OPEN)
+        with self._database.read() as session:
+            row = session.scalars(query.order_by(RecordingRow.created_at.desc()).limit(1)).first()
+            return None if row is None or not row.samples else StoredSamples(info_of_row(row), self._reader(row))
 
     def damage(self, recording_id: str, start: int, stop: int) -> Iterator[DamagedChunk]:
         with self._database.read() as session:

@@ -4,6 +4,8 @@ Knows when something is committed and what remains when it cannot be. Must not k
 
 * Before the first full chunk nothing is in the database. A short dwell is one transaction, at `seal`.
 * With the first chunk comes the row, `open`, which no list shows.
+* A full chunk is hashed, encoded and committed in a thread, while the next one fills; there is one on its way at most.
+  Its failure is raised by the next call. `seal` and `abandon` wait for it: what they leave does not depend on it.
 * After a failed `write` the writer can only be abandoned: what a job had committed is then kept as interrupted, an
   import leaves nothing.
 * A failed `seal` may be tried again.
@@ -11,6 +13,8 @@ Knows when something is committed and what remains when it cannot be. Must not k
 
 import hashlib
 import logging
+from concurrent.futures import Future
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +23,7 @@ from sqlalchemy import delete, insert, select
 from sqlalchemy.orm import Session
 
 from bench_service import wall_clock
+from bench_service.background import in_background
 from bench_service.formats.chunk import ChunkPlace, SampleType, encode_chunk, rows_per_chunk, sample_type
 from bench_service.formats.content_hash import ContentHash
 from bench_service.model.errors import StorageFailure, StorageFull
@@ -35,7 +40,7 @@ log = logging.getLogger(__name__)
 
 
 class SqlRecordingWriter:
-    """SQL implementation of `bench_service.jobs.stores.RecordingWriter`. It holds one chunk in memory at most."""
+    """SQL implementation of `bench_service.jobs.stores.RecordingWriter`. It holds two chunks in memory at most."""
 
     def __init__(self, database: Database, new: NewRecording) -> None:
         _check(new)
@@ -48,6 +53,9 @@ class SqlRecordingWriter:
         self._created_at = wall_clock.now()
         self._rows = rows_per_chunk(len(self._names), self._dtype)
         self._buffer = _empty(self._rows, len(self._names), self._dtype)
+        self._spare: RawArray | None = None
+        self._under_way: Future[None] | None = None
+        """The chunk that is on its way into the database. Until it is there, what is below it belongs to its thread."""
         self._filled = 0
         self._committed = 0
         self._chunks = 0
@@ -56,10 +64,13 @@ class SqlRecordingWriter:
         self._closed = False
 
     def write(self, block: RawArray) -> None:
-        """Append samples, shape (n, channels). Raises `StorageFull`, `StorageFailure`, `UnfitRecording`."""
-        if self._closed:
-            raise StorageFailure("this recording was closed: after a failed write it can only be abandoned")
+        """Append samples, shape (n, channels). Raises `UnfitRecording`, and `StorageFull` or `StorageFailure` where
+        a chunk before these samples could not be stored.
+        """
+        self._require_open()
         samples = self._checked(block)
+        if self._under_way is not None and self._under_way.done():
+            self._arrived()
         taken = 0
         while taken < len(samples):
             size = min(self._rows - self._filled, len(samples) - taken)
@@ -67,11 +78,7 @@ class SqlRecordingWriter:
             self._filled += size
             taken += size
             if self._filled == self._rows:
-                try:
-                    self._commit_chunk()
-                except BaseException:
-                    self._closed = True
-                    raise
+                self._hand_over()
 
     def seal(self, checkpoint: dict[str, Any] | None = None, measured: Measured | None = None) -> RecordingInfo:
         """Write the rest and complete the recording. Where the job's station is complete already, that one is returned.
@@ -81,8 +88,8 @@ class SqlRecordingWriter:
         """
         if self._sealed is not None:
             return self._sealed
-        if self._closed:
-            raise StorageFailure("this recording was closed: after a failed write it can only be abandoned")
+        self._require_open()
+        self._arrived()
         if self._committed + self._filled == 0:
             raise UnfitRecording("a recording without samples cannot be sealed")
         try:
@@ -101,6 +108,8 @@ class SqlRecordingWriter:
         if self._sealed is not None:
             return
         self._closed = True
+        if self._under_way is not None:
+            self._under_way.exception()
         if not self._chunks:
             return
         try:
@@ -111,22 +120,44 @@ class SqlRecordingWriter:
         except (StorageFull, StorageFailure) as error:
             log.warning("recording %s stays open, and unlisted, until it is cleared away: %s", self.id, error)
 
-    def _commit_chunk(self) -> None:
+    def _require_open(self) -> None:
+        if self._closed:
+            raise StorageFailure("this recording was closed: after a failed write it can only be abandoned")
+
+    def _hand_over(self) -> None:
+        """Begin to store the full buffer, once the chunk before it is stored, and go on in the other buffer."""
+        self._arrived()
+        full = self._buffer
+        self._buffer = _empty(*full.shape, self._dtype) if self._spare is None else self._spare
+        self._spare, self._filled = full, 0
+        self._under_way = in_background("chunk", partial(self._commit_chunk, full))
+
+    def _arrived(self) -> None:
+        """Wait for the chunk that is on its way. Raises its error: after it the writer is closed."""
+        under_way, self._under_way = self._under_way, None
+        if under_way is not None:
+            try:
+                under_way.result()
+            except BaseException:
+                self._closed = True
+                raise
+
+    def _commit_chunk(self, samples: RawArray) -> None:
+        payload = self._encoded(samples)
         with self._database.write() as session:
-            row = self._row(session)
-            self._add_chunk(session, row)
-        self._hash.update(self._buffer[: self._filled])
-        self._committed += self._filled
+            self._add_chunk(session, self._row(session), payload, len(samples))
+        self._hash.update(samples)
+        self._committed += len(samples)
         self._chunks += 1
-        self._filled = 0
 
     def _complete(self, checkpoint: dict[str, Any] | None, measured: Measured | None) -> RecordingInfo:
-        rest = self._hash.copy()
-        rest.update(self._buffer[: self._filled])
+        rest, last = self._hash.copy(), self._buffer[: self._filled]
+        rest.update(last)
+        payload = self._encoded(last) if len(last) else b""
         with self._database.write() as session:
             row = self._row(session)
-            if self._filled:
-                self._add_chunk(session, row)
+            if payload:
+                self._add_chunk(session, row, payload, len(last))
             row.content_hash = rest.hexdigest()
             row.checkpoint = checkpoint
             row.measured = None if measured is None else MEASURED.dump_python(measured, mode="json")
@@ -154,21 +185,22 @@ class SqlRecordingWriter:
             raise StorageFailure(f"recording {self.id} was closed while it was being written")
         return row
 
-    def _add_chunk(self, session: Session, row: RecordingRow) -> None:
-        place = ChunkPlace(self.id, self._committed, self._new.rate_hz)
-        payload = encode_chunk(self._buffer[: self._filled], self._names, place)
+    def _encoded(self, samples: RawArray) -> bytes:
+        return encode_chunk(samples, self._names, ChunkPlace(self.id, self._committed, self._new.rate_hz))
+
+    def _add_chunk(self, session: Session, row: RecordingRow, payload: bytes, samples: int) -> None:
         session.execute(
             insert(ChunkRow).values(
                 recording_id=self.id,
                 number=self._chunks,
                 start_sample=self._committed,
-                samples=self._filled,
+                samples=samples,
                 sha256=hashlib.sha256(payload).hexdigest(),
                 payload=payload,
             )
         )
         row.chunks = self._chunks + 1
-        row.samples = self._committed + self._filled
+        row.samples = self._committed + samples
         row.stored_bytes += len(payload)
 
     def _complete_before(self) -> RecordingInfo | None:

@@ -17,6 +17,20 @@ class UnitRow(Table):
     updated_at: Mapped[datetime]
 
 
+class UnitNoteRow(Table):
+    """A remark of a person about a unit."""
+
+    __tablename__ = "unit_notes"
+    __table_args__ = (Index(None, "unit", "id"),)
+
+    id: Mapped[str] = mapped_column(Id, primary_key=True)
+    unit: Mapped[str] = mapped_column(Id)
+    at: Mapped[datetime]
+    by: Mapped[str]
+    proven: Mapped[bool]
+    text: Mapped[str]
+
+
 class RecordingRow(Table):
     __tablename__ = "recordings"
     __table_args__ = (

@@ -11,11 +11,12 @@ from math import comb
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
+from scipy import fft
 
 from procedures.analysis.allan.statistic import Sizes, Statistic
 from procedures.core.arrays import Array
 
-SPAN = 32
+SPAN = 16
 """Ratio of a transform's length to the longest lag; large, so that little is spent on padding."""
 TOGETHER = 4
 """Fewest windows that are transformed at once: the rows share the processor's wide registers."""
@@ -59,8 +60,8 @@ class LaggedProducts:
         self._take_whole(1)
         if len(self._rest):
             self._take(self._rest[None, :], len(self._rest))
-        products = np.fft.irfft(_paired(self._power), self._length)[: self._reach]
-        return products - np.fft.irfft(_paired(self._seams), 2 * self._reach)[: self._reach]
+        products = _inverse(_paired(self._power), self._length)[: self._reach]
+        return products - _inverse(_paired(self._seams), 2 * self._reach)[: self._reach]
 
     def spectrum(self) -> Array:
         """Mean over the windows of each one's part of `energies` by frequency, (length/2 + 1,), its sum near 1."""
@@ -84,8 +85,12 @@ class LaggedProducts:
 
 def _powers(rows: Array, length: int) -> Array:
     """Squares of the real and imaginary parts of each row's transform, padded to `length`, (rows, length + 2)."""
-    parts = np.fft.rfft(rows, length).view(np.float64)
+    parts = np.asarray(fft.rfft(rows, length)).view(np.float64)
     return np.multiply(parts, parts, out=parts)
+
+
+def _inverse(squares: Array, length: int) -> Array:
+    return np.asarray(fft.irfft(squares, length), dtype=np.float64)
 
 
 def _paired(squares: Array) -> Array:
@@ -98,7 +103,7 @@ def _response(kernel: Array, length: int) -> Array:
     both = np.zeros(length)
     both[: len(kernel)] = kernel
     both[length - len(kernel) + 1 :] += kernel[:0:-1]
-    weights = np.fft.rfft(both).real * 2.0 / length
+    weights = np.asarray(fft.rfft(both)).real * 2.0 / length
     weights[[0, -1]] /= 2.0
     return np.repeat(weights, 2)
 

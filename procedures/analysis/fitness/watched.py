@@ -4,8 +4,9 @@ The first pass over a recording's blocks also serves the inspection; a refusal a
 result. A few outliers can be mended for a second analysis.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,8 +14,12 @@ from procedures.analysis.fitness.findings import ChannelFitness, FitnessSettings
 from procedures.analysis.fitness.grouped import grouped
 from procedures.analysis.fitness.jumps import Jump
 from procedures.analysis.fitness.stream import FitnessStream
+from procedures.core import spread
 from procedures.core.errors import UnfitRecording
 from procedures.core.recording import Channel, Quantity, RawArray, Recording, RecordingInfo, Station
+
+A = TypeVar("A")
+R = TypeVar("R")
 
 WRONG_TEMPERATURES = (Kind.WRAPPED, Kind.WRONG_UNIT, Kind.NOT_FINITE)
 
@@ -76,8 +81,20 @@ class Watched:
             stream.add(block)
             yield block
         self._end(stream)
-        if self.refused:
-            (self._watch or Watch.of(self)).refuse()
+        self.require_fit()
+
+    @property
+    def unwatched(self) -> Recording:
+        """The underlying recording, for a pass that is no inspection."""
+        return self._recording
+
+    def seen(self) -> "Seen":
+        """What the first pass has found, to be carried to this recording's original by `learn`."""
+        return self.fitness(), self._outliers
+
+    def learn(self, seen: "Seen") -> None:
+        """Take over what the first pass of a copy of this recording has found."""
+        self._fitness, self._outliers = seen
 
     def fitness(self) -> tuple[ChannelFitness, ...]:
         """The findings by channel; the recording is read for them unless an analysis has read it to the end."""
@@ -88,6 +105,11 @@ class Watched:
             self._end(stream)
         assert self._fitness is not None
         return self._fitness
+
+    def require_fit(self) -> None:
+        """Raise `UnfitRecording`, with the refusals of all recordings of the analysis, where this one is refused."""
+        if self.refused:
+            (self._watch or Watch.of(self)).refuse()
 
     @property
     def refused(self) -> bool:
@@ -134,6 +156,30 @@ class Watched:
         for row, column, away in inside:
             mended[row, column] -= round(away) if np.issubdtype(mended.dtype, np.integer) else away
         return mended
+
+
+Seen = tuple[tuple[ChannelFitness, ...], dict[int, list[Jump]]]
+"""Findings and outliers of a recording's first pass."""
+
+
+def each_watched(
+    work: Callable[[A], R], recordings: Sequence[Recording], item: Callable[[int, Recording], A]
+) -> list[R]:
+    """The results of `work` on ``item(i, recording)`` of each recording, which it reads to the end; see `spread.each`.
+
+    The inspection that comes with the reading is known here afterwards, wherever it was made.
+    """
+    found = spread.each(_watched, [(work, item(i, recording), recording) for i, recording in enumerate(recordings)])
+    for recording, (_, seen) in zip(recordings, found, strict=True):
+        if seen is not None and isinstance(recording, Watched):
+            recording.learn(seen)
+    return [result for result, _ in found]
+
+
+def _watched(task: tuple[Callable[[A], R], A, Recording]) -> tuple[R, Seen | None]:
+    work, item, recording = task
+    result = work(item)
+    return result, recording.seen() if isinstance(recording, Watched) and recording.is_read else None
 
 
 class Watch:

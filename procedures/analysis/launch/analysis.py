@@ -5,23 +5,24 @@ computes everything faster than a cell from every sample after the trim; everyth
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from procedures.analysis.allan.correlated import Uncorrelatable
 from procedures.analysis.allan.deviation import Deviation, DeviationStream
 from procedures.analysis.allan.statistic import Sizes, decade_sizes
 from procedures.analysis.cells import Cells, CellStream, cell_samples, channel_rows
 from procedures.analysis.fitness.findings import FitnessSettings
-from procedures.analysis.fitness.watched import Inspection, Watched
+from procedures.analysis.fitness.watched import Inspection, Seen, Watched, each_watched
 from procedures.analysis.launch.channel import channel_noise
 from procedures.analysis.launch.context import ChannelContext, Resolution, smooth_temperatures, temperature_names
-from procedures.analysis.launch.results import LaunchNoise
+from procedures.analysis.launch.results import ChannelNoise, LaunchNoise
 from procedures.analysis.launch.settings import LaunchSettings
 from procedures.analysis.launch.signal import CleanSignal, clean_signal
 from procedures.analysis.noise_fit.powers import FastPowers, Powers
+from procedures.core import spread
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
-from procedures.core.recording import Quantity, RawArray, Recording
+from procedures.core.recording import Quantity, RawArray, Recording, RecordingInfo
 
 INSPECTION = Inspection(FitnessSettings())
 """Inspection settings of a launch: the unit is at rest throughout."""
@@ -40,59 +41,140 @@ FEWEST_A_CELL = 8
 
 def analyse_launch(recording: Recording, label: str, settings: LaunchSettings) -> LaunchNoise:
     """Analyse all channels but temperatures. Raises `UnfitRecording` (recording, channel, value) and `BadParameter`."""
-    info = recording.info
+    return analyse_launches([recording], [label], settings)[0]
+
+
+def analyse_launches(
+    recordings: Sequence[Recording], labels: Sequence[str], settings: LaunchSettings
+) -> tuple[LaunchNoise, ...]:
+    """Analyse each recording as `analyse_launch`; launches and channels are parts that `spread` may work out."""
+    names = [_names(recording.info) for recording in recordings]
+    if len(recordings) == 1 and spread.width() > 1:
+        firsts = [_first_in_two(recordings[0], names[0], settings)]
+    else:
+        firsts = each_watched(_first_pass, recordings, lambda i, recording: (recording, names[i], settings))
+    # As many parts of a launch as make all processes busy; the channels of one part share a reading.
+    parts = 1 if len(recordings) % spread.width() == 0 else spread.width()
+    tasks = [
+        (recording, some, first.only(some), settings)
+        for recording, channels, first in zip(recordings, names, firsts, strict=True)
+        for some in _groups(channels, recording.info.count, parts)
+    ]
+    results = iter(spread.each(_channels, tasks))
+    found: list[LaunchNoise] = []
+    for recording, label, channels in zip(recordings, labels, names, strict=True):
+        info = recording.info
+        groups = _groups(channels, info.count, parts)
+        noises = tuple(noise for _ in groups for noise in next(results))
+        found.append(LaunchNoise(info.id, label, info.rate_hz, info.duration_s, info.since_launch_s, noises))
+    return tuple(found)
+
+
+def _names(info: RecordingInfo) -> tuple[str, ...]:
     names = tuple(c.name for c in info.channels if c.quantity is not Quantity.TEMPERATURE)
     if not names:
         raise UnfitRecording(f"recording {info.id} has no channel whose noise could be analysed")
-    cells, known = _first_pass(recording, names, settings)
-    rows = dict(zip(cells.channels, cells.rates, strict=True))
-    signals = [clean_signal(name, rows[name], cells.cell_s, cells.since_launch_s, settings) for name in names]
-    samples = cell_samples(info.rate_hz, settings.cell_s)
-    parts: list[tuple[Deviation | None, Powers | None]] = [(None, None)] * len(names)
-    if settings.fast and samples >= FEWEST_A_CELL:
-        size = len(names) if info.count <= LONG else AT_ONCE
-        parts = []
-        for i in range(0, len(names), size):
-            group = names[i : i + size], signals[i : i + size]
-            try:
-                parts += _second_pass(recording, *group, settings, correlate=True)
-            except Uncorrelatable:
-                parts += _second_pass(recording, *group, settings, correlate=False)
-    channels = tuple(
-        channel_noise(name, info.channels[info.column(name)].rate_unit, cells, signal, *part, known[name], settings)
-        for name, signal, part in zip(names, signals, parts, strict=True)
-    )
-    return LaunchNoise(info.id, label, info.rate_hz, info.duration_s, info.since_launch_s, channels)
+    return names
 
 
-def _first_pass(
-    recording: Recording, names: Sequence[str], settings: LaunchSettings
-) -> tuple[Cells, dict[str, ChannelContext]]:
-    """Gather cell means, also of temperatures, and the context of each channel. Raises `UnfitRecording`."""
+def _groups(names: tuple[str, ...], count: int, parts: int) -> list[tuple[str, ...]]:
+    size = max(1, min(-(-len(names) // parts), len(names) if count <= LONG else AT_ONCE))
+    return [names[i : i + size] for i in range(0, len(names), size)]
+
+
+@dataclass(frozen=True)
+class _First:
+    """What the first pass gives: cell means, and the context of each channel."""
+
+    cells: Cells
+    known: dict[str, ChannelContext]
+
+    def only(self, names: Sequence[str]) -> "_First":
+        """The same of some of the channels."""
+        rows = self.cells.rates[[self.cells.channels.index(name) for name in names]]
+        return _First(replace(self.cells, channels=tuple(names), rates=rows), {n: self.known[n] for n in names})
+
+
+def _first_pass(task: tuple[Recording, tuple[str, ...], LaunchSettings]) -> _First:
+    """Gather the cells while the recording is inspected. Raises `UnfitRecording`."""
+    recording, names, settings = task
+    watched = recording if isinstance(recording, Watched) else Watched(recording, INSPECTION)
+    gathered = _gathered((watched, names, settings))
+    return _known(watched, gathered, names)
+
+
+def _first_in_two(recording: Recording, names: tuple[str, ...], settings: LaunchSettings) -> _First:
+    """Gather the cells of a lone recording beside its inspection. Raises `UnfitRecording`."""
+    watched = recording if isinstance(recording, Watched) else Watched(recording, INSPECTION)
+    if watched.is_read:
+        return _first_pass((watched, names, settings))
+    gathered, seen = spread.each(_either, [(True, watched, names, settings), (False, watched, names, settings)])
+    assert isinstance(gathered, _Gathered)
+    assert isinstance(seen, tuple)
+    watched.learn(seen)
+    watched.require_fit()
+    return _known(watched, gathered, names)
+
+
+def _either(task: tuple[bool, Watched, tuple[str, ...], LaunchSettings]) -> "_Gathered | Seen":
+    cells, watched, names, settings = task
+    return _gathered((watched.unwatched, names, settings)) if cells else watched.seen()
+
+
+@dataclass(frozen=True)
+class _Gathered:
+    cells: Cells
+    coarse: dict[str, str]
+
+
+def _gathered(task: tuple[Recording, tuple[str, ...], LaunchSettings]) -> _Gathered:
+    """Gather cell means, also of temperatures, and each channel's resolution. Raises `UnfitRecording`."""
+    recording, names, settings = task
     info = recording.info
-    temperatures = temperature_names(info)
     columns = [info.column(name) for name in names]
     resolution = Resolution([info.channels[c] for c in columns])
-    watched = recording if isinstance(recording, Watched) else Watched(recording, INSPECTION)
-    stream = CellStream(info, (*names, *temperatures), settings.cell_s)
+    everything = (*names, *temperature_names(info))
+    stream = CellStream(info, everything, settings.cell_s)
 
     def seen() -> Iterator[RawArray]:
-        for block in watched.blocks():
+        for block in recording.blocks():
             resolution.add(block, columns)
             yield block
 
-    for rows in channel_rows(info, (*names, *temperatures), seen()):
+    for rows in channel_rows(info, everything, seen()):
         stream.add(rows)
-    found = watched.fitness()
-    cells = stream.finish()
+    return _Gathered(stream.finish(), resolution.finish())
+
+
+def _known(watched: Watched, gathered: _Gathered, names: tuple[str, ...]) -> _First:
+    """The context of each channel. Raises `UnfitRecording`."""
+    found, cells = watched.fitness(), gathered.cells
     if cells.rates.shape[1] < FEWEST_CELLS:
         raise UnfitRecording(
-            f"recording {info.id}: {cells.rates.shape[1]} cells of {cells.cell_s:g} s are too few for a noise "
+            f"recording {watched.info.id}: {cells.rates.shape[1]} cells of {cells.cell_s:g} s are too few for a noise "
             f"analysis, at least {FEWEST_CELLS} are needed"
         )
-    coarse, warm = resolution.finish(), smooth_temperatures(cells, temperatures)
+    warm = smooth_temperatures(cells, temperature_names(watched.info))
     sentences = {f.channel: tuple(finding.sentence for finding in f.findings) for f in found}
-    return cells, {name: ChannelContext(sentences.get(name, ()), coarse.get(name, ""), warm) for name in names}
+    coarse = gathered.coarse
+    return _First(cells, {n: ChannelContext(sentences.get(n, ()), coarse.get(n, ""), warm) for n in names})
+
+
+def _channels(task: tuple[Recording, tuple[str, ...], _First, LaunchSettings]) -> list[ChannelNoise]:
+    """Analyse some channels of a launch: the second pass, and the fits. Raises `UnfitRecording`."""
+    recording, names, first, settings = task
+    info, cells = recording.info, first.cells
+    rows = dict(zip(cells.channels, cells.rates, strict=True))
+    signals = [clean_signal(name, rows[name], cells.cell_s, cells.since_launch_s, settings) for name in names]
+    parts: list[tuple[Deviation | None, Powers | None]] = [(None, None)] * len(names)
+    if settings.fast and cell_samples(info.rate_hz, settings.cell_s) >= FEWEST_A_CELL:
+        parts = _second_pass(recording, names, signals, settings)
+    return [
+        channel_noise(
+            name, info.channels[info.column(name)].rate_unit, cells, signal, *part, first.known[name], settings
+        )
+        for name, signal, part in zip(names, signals, parts, strict=True)
+    ]
 
 
 @dataclass
@@ -113,14 +195,36 @@ class _Streams:
 
 
 def _second_pass(
+    recording: Recording, names: Sequence[str], signals: Sequence[CleanSignal], settings: LaunchSettings
+) -> list[tuple[Deviation | None, Powers | None]]:
+    """Compute deviations at short times and powers at high frequencies from every sample.
+
+    A channel that cannot be correlated is read once more, and differenced term by term.
+    """
+    streams = _passed(recording, names, signals, settings, correlate=True)
+    found: dict[str, tuple[Deviation | None, Powers | None]] = {}
+    left: list[int] = []
+    for i, (name, stream) in enumerate(zip(names, streams, strict=True)):
+        try:
+            found[name] = stream.deviation.finish(), stream.powers.finish()
+        except Uncorrelatable:
+            left.append(i)
+    if left:
+        again = [names[i] for i in left]
+        streams = _passed(recording, again, [signals[i] for i in left], settings, correlate=False)
+        found |= {n: (s.deviation.finish(), s.powers.finish()) for n, s in zip(again, streams, strict=True)}
+    return [found[name] for name in names]
+
+
+def _passed(
     recording: Recording,
     names: Sequence[str],
     signals: Sequence[CleanSignal],
     settings: LaunchSettings,
     *,
     correlate: bool,
-) -> list[tuple[Deviation | None, Powers | None]]:
-    """Compute deviations at short times and powers at high frequencies from every sample. Raises `Uncorrelatable`."""
+) -> list[_Streams]:
+    """The streams of some channels after all samples."""
     info = recording.info
     samples = cell_samples(info.rate_hz, settings.cell_s)
     crossover_hz = max(CROSSOVER * info.rate_hz / samples, SLOW_MODES * 0.5 / info.duration_s)
@@ -136,4 +240,4 @@ def _second_pass(
     for rows in channel_rows(info, names, recording.blocks()):
         for stream, row in zip(streams, rows, strict=True):
             stream.add(row)
-    return [(stream.deviation.finish(), stream.powers.finish()) for stream in streams]
+    return streams

@@ -108,6 +108,11 @@ def read_cycle(recording: Recording, up: int) -> CycleSeries:
     )
 
 
+def run_of(run: tuple[Recording, int]) -> tuple[str, CycleSeries]:
+    """The recording's id, and `read_cycle` of recording and axis."""
+    return run[0].info.id, read_cycle(*run)
+
+
 class _Replay:
     """Feeds the recorded readings to the profile's judge, as the bench did."""
 

@@ -1,0 +1,176 @@
+"""Processes that share the analysis of a long recording: both processors work, and the service's memory stays small.
+
+They are begun when a job that will need them begins, so that nobody waits for their imports, and they end when they
+have had nothing to do for a while. Where one of them dies, its parts are worked out in the caller's thread.
+"""
+
+import logging
+import multiprocessing
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager, ExitStack
+from importlib import import_module
+from threading import Lock, Timer
+from typing import Any, TypeVar
+
+from bench_service.evidence.work_processes import Refusal, begin_process
+from bench_service.model.errors import ServiceError
+from procedures.bench.imu import Imu
+from procedures.core.errors import DomainError
+from procedures.core.recording import Recording, Station
+from procedures.core.spread import Spread, spread_over
+
+A = TypeVar("A")
+R = TypeVar("R")
+
+log = logging.getLogger(__name__)
+
+AT_ONCE = 2
+"""Number of processes."""
+MANY_VALUES = 5_000_000
+"""Number of samples of all channels from which an analysis takes longer than handing its parts over."""
+IDLE_S = 10.0
+"""Time without work after which the processes end [s, real time]."""
+MODULES = (
+    "procedures.launches",
+    "procedures.analysis.thermal.cycle.series",
+    "scipy.fft",
+    "scipy.signal",
+    "bench_service.persistence.evidence.recording_store",
+)
+"""What a process imports beforehand: it has the time while a job records."""
+
+
+class SpreadProcesses:
+    """Processes of one service that work out parts of analyses, a `Spread`. For any thread."""
+
+    width = AT_ONCE
+
+    def __init__(self, idle_s: float = IDLE_S) -> None:
+        self._idle_s = idle_s
+        self._mutex = Lock()
+        self._pool: ProcessPoolExecutor | None = None
+        self._users = 0
+        self._timer: Timer | None = None
+        self._closed = False
+
+    def over(self, values: int) -> Spread | None:
+        """These processes for an analysis of so many values, None where it is not worth it."""
+        return self if values >= MANY_VALUES and not self._closed else None
+
+    def used_for(self, recordings: Sequence[Recording]) -> AbstractContextManager[None]:
+        """Inside the block an analysis of these recordings is worked out here, where that is worth it."""
+        return spread_over(self.over(sum(r.info.count * len(r.info.channels) for r in recordings)))
+
+    def begin_for(self, stations: Sequence[Station], imu: Imu) -> None:
+        """Begin the processes where the recordings of these stations will need them."""
+        seconds = sum(station.record_s for station in stations)
+        rate_hz = next((s.sample_rate_hz for s in stations if s.sample_rate_hz is not None), imu.rate_hz)
+        self.begin(round(seconds * rate_hz) * len(imu.channels))
+
+    def begin(self, values: int) -> None:
+        """Begin the processes for an analysis of so many values, which will come; it does not wait for them."""
+        if self.over(values) is not None:
+            pool = self._taken()
+            if pool is not None:
+                for _ in range(AT_ONCE):
+                    pool.submit(_nothing)
+                self._given_back()
+
+    def each(self, work: Callable[[A], R], items: Sequence[A]) -> list[R]:
+        """See `Spread.each`."""
+        pool = self._taken()
+        try:
+            if pool is None:
+                return [work(item) for item in items]
+            waiting: list[Future[Any]] = [pool.submit(_part, work, item) for item in items]
+            found = [part.result() for part in waiting]
+        except BrokenProcessPool:
+            log.warning("a process that analysed a recording ended before it was done: the service does it itself")
+            self._forget(pool)
+            return [work(item) for item in items]
+        finally:
+            self._given_back()
+        for part in found:
+            if isinstance(part, Refusal):
+                raise part.error()
+        return found
+
+    def processes(self) -> list[int]:
+        """Process ids of the processes that there are."""
+        with self._mutex:
+            return [] if self._pool is None else list(getattr(self._pool, "_processes", {}))
+
+    def close(self) -> None:
+        """End the processes; parts that are under way are cut off."""
+        self._closed = True
+        self._end()
+
+    def _taken(self) -> ProcessPoolExecutor | None:
+        with self._mutex:
+            self._users += 1
+            if self._timer is not None:
+                self._timer.cancel()
+                self._timer = None
+            if self._pool is None and not self._closed:
+                context = multiprocessing.get_context("spawn")
+                self._pool = ProcessPoolExecutor(AT_ONCE, context, _begin)
+            return self._pool
+
+    def _given_back(self) -> None:
+        with self._mutex:
+            self._users -= 1
+            if self._users == 0 and self._pool is not None:
+                self._timer = Timer(self._idle_s, self._end_if_idle)
+                self._timer.daemon = True
+                self._timer.start()
+
+    def _forget(self, pool: ProcessPoolExecutor | None) -> None:
+        with self._mutex:
+            if self._pool is pool:
+                self._pool = None
+
+    def _end_if_idle(self) -> None:
+        with self._mutex:
+            idle = self._users == 0
+        if idle:
+            self._end()
+
+    def _end(self) -> None:
+        with self._mutex:
+            pool, self._pool = self._pool, None
+            if self._timer is not None:
+                self._timer.cancel()
+        if pool is not None:
+            for process in list(getattr(pool, "_processes", {}).values()):
+                process.terminate()
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def spread_processes(closing: ExitStack) -> SpreadProcesses:
+    """Processes that `closing` ends; none is begun yet."""
+    processes = SpreadProcesses()
+    closing.callback(processes.close)
+    return processes
+
+
+def _begin() -> None:
+    """Set up a new process."""
+    from threadpoolctl import threadpool_limits
+
+    begin_process()
+    for name in MODULES:
+        import_module(name)
+    threadpool_limits(1)
+
+
+def _nothing() -> None:
+    """No part of anything: a process begins for it."""
+
+
+def _part(work: Callable[[A], R], item: A) -> R | Refusal:
+    try:
+        return work(item)
+    except (DomainError, ServiceError, ArithmeticError, ValueError) as refused:
+        return Refusal.of(refused)
