@@ -25,7 +25,9 @@ from bench_client.results.scalar_calibration import ScalarCalibrationResult
 from bench_client.results.scale_factor_whole_turns import ScaleFactorWholeTurnsResult
 from bench_client.results.static_run import StaticRunResult
 from bench_client.results.table_program import TableProgramResult
+from bench_client.results.temperature_dependence import TemperatureDependenceResult
 from bench_client.results.thermal_cycle import ThermalCycleResult
+from bench_client.results.thermometer_calibration import ThermometerCalibrationResult
 from bench_client.results.verification_9_orientations import Verification9OrientationsResult
 
 Result = (
@@ -39,6 +41,7 @@ Result = (
     | StaticRunResult
     | TableProgramResult
     | ThermalCycleResult
+    | ThermometerCalibrationResult
     | Verification9OrientationsResult
     | AllanDeviationResult
     | ErrorGrowthResult
@@ -53,6 +56,7 @@ Result = (
     | PlanOrientationsResult
     | RunToRunResult
     | ScalarCalibrationResult
+    | TemperatureDependenceResult
     | OtherResult
 )
 """A result; `isinstance` or `match` says which, and then its `document` has fields of its own."""
@@ -67,6 +71,7 @@ CLASSES: dict[str, type[ResultHead]] = {
     "static_run": StaticRunResult,
     "table_program": TableProgramResult,
     "thermal_cycle": ThermalCycleResult,
+    "thermometer_calibration": ThermometerCalibrationResult,
     "verification_9_orientations": Verification9OrientationsResult,
     "allan_deviation": AllanDeviationResult,
     "error_growth": ErrorGrowthResult,
@@ -81,6 +86,7 @@ CLASSES: dict[str, type[ResultHead]] = {
     "plan_orientations": PlanOrientationsResult,
     "run_to_run": RunToRunResult,
     "scalar_calibration": ScalarCalibrationResult,
+    "temperature_dependence": TemperatureDependenceResult,
 }
 
 
