@@ -29,11 +29,11 @@ def test_an_upgrade_counts_the_jobs_that_there_are(tmp_path: Path, new_job: Call
     url = f"sqlite:///{tmp_path / 'bench.sqlite'}"
     stores, database = open_stores(url)
     ids = [stores.jobs.add(new_job()).id for _ in range(3)]
-    migrated(database, "0020")
+    migrated(database, "0018")
     with sqlite3.connect(tmp_path / "bench.sqlite") as books:
         assert "number" not in {row[1] for row in books.execute("PRAGMA table_info(jobs)")}
         books.execute("UPDATE jobs SET created_at = datetime(created_at, '-1 day') WHERE id = ?", (ids[2],))
-    migrated(database, "0021")
+    migrated(database, "0019")
     with database.engine.connect() as connection:
         found = {row.id: row.number for row in connection.execute(sa.text("SELECT id, number FROM jobs"))}
     assert found == {ids[2]: 1, ids[0]: 2, ids[1]: 3}

@@ -41,10 +41,11 @@ def view_of(service: BenchService, bench_id: str) -> BenchView:
     running = service.jobs.driving_job(bench_id)
     live = service.live.of_bench(bench_id)
     stops = service.stores.benches.standing_stops(bench_id)
+    by_hand = service.stores.manual.open_on(bench_id) is not None
     return BenchView(
         id=bench_id,
         description=description,
-        state="stopped" if stops else "idle" if running is None else "busy",
+        state="stopped" if stops else "busy" if running is not None else "manual" if by_hand else "idle",
         stopped=f"{stops[0].at.isoformat()}: {reasons_of(stops)}" if stops else None,
         stops=[StopView.of(stop) for stop in stops],
         job=running,

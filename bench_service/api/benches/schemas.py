@@ -125,7 +125,7 @@ class BenchView(BaseModel):
 
     id: str
     description: BenchDescription
-    state: str = Field(description='"idle", "busy", or "stopped" until it is released')
+    state: str = Field(description='"idle", "busy" with a job, in "manual" mode, or "stopped" until it is released')
     stopped: str | None = Field(description="Why it is stopped")
     stops: list[StopView] = Field(description="The stops that stand, oldest first; each is released by its id")
     job: str | None = Field(description="The job that drives it")

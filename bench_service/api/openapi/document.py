@@ -81,6 +81,7 @@ def _names(schemas: dict[str, Schema]) -> dict[str, str]:
     names = {name: plain_name(name) for name in schemas}
     names["Body_import_recording"] = UPLOAD
     names["Body_describe_file"] = "FileToDescribe"
+    names["Body_check_certificate_file"] = "CertificateToCheck"
     return names
 
 

@@ -22,7 +22,7 @@ from bench_service.persistence.jobs.job_changes import append_event, found_job, 
 from bench_service.persistence.jobs.job_rows import event_of_row, job_of_row, row_of_job, state_of_row
 from bench_service.persistence.pages import page
 from bench_service.persistence.searching import find_jobs
-from bench_service.persistence.tables.jobs import EventRow, JobRow
+from bench_service.persistence.tables.jobs import EventRow, JobLabelRow, JobRow
 from procedures.core.limits import Verdict
 
 log = logging.getLogger(__name__)
@@ -46,6 +46,7 @@ class SqlJobStore:
                 numbered = replace(job, number=(session.scalar(select(func.max(JobRow.number))) or 0) + 1)
                 session.add(row_of_job(numbered))
                 session.flush()  # a rival that took the number first is a conflict: tried again with the next one
+                session.add_all(JobLabelRow(job_id=job.id, name=k, value=v) for k, v in job.labels.items())
                 append_event(session, job.id, "state", job.created_at, {"state": job.state.value})
                 return numbered
 
