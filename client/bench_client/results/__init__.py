@@ -6,6 +6,8 @@ from bench_client.results.allan_deviation import AllanDeviationResult
 from bench_client.results.calibration_12_orientations import Calibration12OrientationsResult
 from bench_client.results.converter_bench import ConverterBenchResult
 from bench_client.results.error_growth import ErrorGrowthResult
+from bench_client.results.ferraris_calibration import FerrarisCalibrationResult
+from bench_client.results.ferraris_calibration_of_recordings import FerrarisCalibrationOfRecordingsResult
 from bench_client.results.field_calibration import FieldCalibrationResult
 from bench_client.results.free_inertial import FreeInertialResult
 from bench_client.results.gyro_half_turns import GyroHalfTurnsResult
@@ -33,6 +35,7 @@ from bench_client.results.verification_9_orientations import Verification9Orient
 Result = (
     Calibration12OrientationsResult
     | ConverterBenchResult
+    | FerrarisCalibrationResult
     | InitialAlignmentResult
     | MultiPositionCalibrationResult
     | NoOperationResult
@@ -45,6 +48,7 @@ Result = (
     | Verification9OrientationsResult
     | AllanDeviationResult
     | ErrorGrowthResult
+    | FerrarisCalibrationOfRecordingsResult
     | FieldCalibrationResult
     | FreeInertialResult
     | GyroHalfTurnsResult
@@ -63,6 +67,7 @@ Result = (
 CLASSES: dict[str, type[ResultHead]] = {
     "calibration_12_orientations": Calibration12OrientationsResult,
     "converter_bench": ConverterBenchResult,
+    "ferraris_calibration": FerrarisCalibrationResult,
     "initial_alignment": InitialAlignmentResult,
     "multi_position_calibration": MultiPositionCalibrationResult,
     "no_operation": NoOperationResult,
@@ -75,6 +80,7 @@ CLASSES: dict[str, type[ResultHead]] = {
     "verification_9_orientations": Verification9OrientationsResult,
     "allan_deviation": AllanDeviationResult,
     "error_growth": ErrorGrowthResult,
+    "ferraris_calibration_of_recordings": FerrarisCalibrationOfRecordingsResult,
     "field_calibration": FieldCalibrationResult,
     "free_inertial": FreeInertialResult,
     "gyro_half_turns": GyroHalfTurnsResult,

@@ -172,6 +172,31 @@ class TriadSummary(Part):
     budgets: tuple[Budget, ...] = ()
 
 
+class RatePoint(Part):
+    """Scale factor of one axis at one rate and direction, as a departure from the fitted K."""
+
+    axis: str
+    rate_deg_s: float
+    turns: int
+    departure: float
+    standard_uncertainty: float
+    modelled: float
+
+
+class WholeTurns(Part):
+    """Complete results of whole turns for a gyro triad."""
+
+    coefficients: tuple[CalibrationSummaryCoefficient, ...]
+    calibration: TriadCalibration
+    reference_rate_deg_s: float
+    points: tuple[RatePoint, ...]
+    condition: float
+    chi_square: float
+    degrees_of_freedom: int
+    p_value: float | None
+    noise_known: bool
+
+
 class BandCurve(Part):
     """Least, mean and greatest Allan deviation over every start offset (paper A)."""
 

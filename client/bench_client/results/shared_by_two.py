@@ -12,6 +12,7 @@ from bench_client.results.shared import (
     TriadCalibration,
     TriadSummary,
     Verdict,
+    WholeTurns,
 )
 
 Form = Literal["both", "switched", "single"]
@@ -35,6 +36,18 @@ class ConverterModel(Part):
 
     scale: Normalised
     zero: Normalised
+
+
+class FerrarisCalibrationDocument(Part):
+    """Gyros from rests and turns, accelerometers from the rests."""
+
+    checks: tuple[Check, ...] = ()
+    verdict: Verdict
+    warnings: tuple[str, ...] = ()
+    statement: Statement | None = None
+    """None without checks and in results of older versions"""
+    gyro: WholeTurns
+    accelerometer: TriadSummary
 
 
 class TermEstimate(Part):
