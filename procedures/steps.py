@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from procedures.analysis.measured_stations import angle_difference_deg
 from procedures.analysis.thermal.profile_progress import (
     AIR,
     CASE,
@@ -25,6 +26,7 @@ from procedures.bench import Bench
 from procedures.bench.chamber import Chamber, ChamberReading
 from procedures.bench.errors import DeviceFault, SoakNotReached
 from procedures.bench.imu import Stream
+from procedures.bench.turntable import TableReading
 from procedures.core.errors import MissingChannel
 from procedures.core.recording import Channel, Quantity, Station
 from procedures.core.temperature_profile import ProfileLeg, TemperatureProfile
@@ -35,6 +37,10 @@ Blocks = AsyncIterator[NDArray[np.int32]]
 CHAMBER_SCALE_C = 0.001
 """Scale of the channels of the chamber's own readings [°C a count]."""
 CHAMBER_CHANNELS = tuple(Channel(name, Quantity.TEMPERATURE, "degC", CHAMBER_SCALE_C) for name in (AIR, SET_POINT))
+
+
+OVER_DEG_S, OVER_DEG = 0.01, 0.1
+"""Largest rate, and largest distance from the angle of their beginning, at which whole turns are over."""
 
 
 async def record_station(bench: Bench, station: Station) -> Stream:
@@ -65,14 +71,28 @@ async def record_turn(bench: Bench, station: Station) -> Stream:
     stream = await record_station(bench, station)
     if station.turn is None:
         return stream
-    return replace(stream, blocks=_turning(bench, station.turn, stream.blocks))
+    return replace(stream, blocks=_turning(bench, station, station.turn, stream.blocks))
 
 
-async def _turning(bench: Bench, turn: Turn, blocks: Blocks) -> Blocks:
+async def _turning(bench: Bench, station: Station, turn: Turn, blocks: Blocks) -> Blocks:
     await bench.turntable.command_turn(turn)
     async for block in blocks:
         yield block
+    _require_over(station, turn, await bench.turntable.read())
     await bench.turntable.settle()
+
+
+def _require_over(station: Station, turn: Turn, reading: TableReading) -> None:
+    """Check that the turns are in the recording as a whole. Raises `DeviceFault` with what is left of them."""
+    rates = dict(zip(("outer", "middle", "inner"), reading.rates_deg_s or (0.0, 0.0, 0.0), strict=True))
+    begin, shown = (getattr(a, f"{turn.axis}_deg") for a in (station.angles or reading.angles, reading.angles))
+    left_deg = angle_difference_deg(shown, begin)
+    if abs(rates[turn.axis]) > OVER_DEG_S or abs(left_deg) > OVER_DEG:
+        raise DeviceFault(
+            f"the recording ends before the turns do: the {turn.axis} axis is {left_deg:.4g} deg from their end, at "
+            f"{rates[turn.axis]:.4g} deg/s, because it was braked late; give a longer rest_s, or served simulators a "
+            "smaller time_factor"
+        )
 
 
 async def record_profile(bench: Bench, station: Station, request: str) -> Stream:
