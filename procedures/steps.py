@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.analysis.measured_stations import angle_difference_deg
+from procedures.analysis.recursive_bias.dwell import LiveDwell
 from procedures.analysis.thermal.profile_progress import (
     AIR,
     CASE,
@@ -26,9 +26,10 @@ from procedures.bench import Bench
 from procedures.bench.chamber import Chamber, ChamberReading
 from procedures.bench.errors import DeviceFault, SoakNotReached
 from procedures.bench.imu import Stream
-from procedures.bench.turntable import TableReading
+from procedures.bench.turntable import require_turns_over
 from procedures.core.errors import MissingChannel
 from procedures.core.recording import Channel, Quantity, Station
+from procedures.core.stop_rule import StopRule
 from procedures.core.temperature_profile import ProfileLeg, TemperatureProfile
 from procedures.core.turn import Turn
 
@@ -39,12 +40,11 @@ CHAMBER_SCALE_C = 0.001
 CHAMBER_CHANNELS = tuple(Channel(name, Quantity.TEMPERATURE, "degC", CHAMBER_SCALE_C) for name in (AIR, SET_POINT))
 
 
-OVER_DEG_S, OVER_DEG = 0.01, 0.1
-"""Largest rate, and largest distance from the angle of their beginning, at which whole turns are over."""
-
-
 async def record_station(bench: Bench, station: Station) -> Stream:
-    """Switch off for the station's `power_off_s`, on (no-op where it is on), move, settle, begin its recording."""
+    """Switch off for the station's `power_off_s`, on (no-op where it is on), move, settle, begin its recording.
+
+    A station with a stop rule is recorded until the rule ends it, at most `record_s`.
+    """
     if station.power_off_s > 0.0:
         await bench.supply.switch_off()
         await bench.clock.sleep(station.power_off_s)
@@ -52,7 +52,22 @@ async def record_station(bench: Bench, station: Station) -> Stream:
     if station.angles is not None:
         await bench.turntable.move_to(station.angles)
     await bench.clock.sleep(station.settle_s)
-    return bench.imu.record(station.record_s, station)
+    stream = bench.imu.record(station.record_s, station)
+    return stream if station.until is None else replace(stream, blocks=_until_enough(stream, station.until))
+
+
+async def _until_enough(stream: Stream, rule: StopRule) -> Blocks:
+    """The stream's blocks up to the sample with which the rule ends the dwell."""
+    live = LiveDwell(rule, stream.channels, stream.rate_hz, stream.station.record_s)
+    try:
+        async for block in stream.blocks:
+            last = live.add(block)
+            yield block if last is None else block[:last]
+            if last is not None:
+                return
+    finally:
+        if isinstance(stream.blocks, AsyncGenerator):
+            await stream.blocks.aclose()
 
 
 async def _switch_on(bench: Bench, station: Station) -> None:
@@ -78,21 +93,8 @@ async def _turning(bench: Bench, station: Station, turn: Turn, blocks: Blocks) -
     await bench.turntable.command_turn(turn)
     async for block in blocks:
         yield block
-    _require_over(station, turn, await bench.turntable.read())
+    require_turns_over(station.angles, turn, await bench.turntable.read())
     await bench.turntable.settle()
-
-
-def _require_over(station: Station, turn: Turn, reading: TableReading) -> None:
-    """Check that the turns are in the recording as a whole. Raises `DeviceFault` with what is left of them."""
-    rates = dict(zip(("outer", "middle", "inner"), reading.rates_deg_s or (0.0, 0.0, 0.0), strict=True))
-    begin, shown = (getattr(a, f"{turn.axis}_deg") for a in (station.angles or reading.angles, reading.angles))
-    left_deg = angle_difference_deg(shown, begin)
-    if abs(rates[turn.axis]) > OVER_DEG_S or abs(left_deg) > OVER_DEG:
-        raise DeviceFault(
-            f"the recording ends before the turns do: the {turn.axis} axis is {left_deg:.4g} deg from their end, at "
-            f"{rates[turn.axis]:.4g} deg/s, because it was braked late; give a longer rest_s, or served simulators a "
-            "smaller time_factor"
-        )
 
 
 async def record_profile(bench: Bench, station: Station, request: str) -> Stream:

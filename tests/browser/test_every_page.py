@@ -50,6 +50,10 @@ def paths(service: BenchProcess) -> dict[str, str]:
         "stops": "/benches/sim/stops",
         "manual": "/benches/sim/manual",
         "mountings": "/mountings",
+        "accounts": "/accounts",
+        "certificate": "/certificate",
+        "enter_calibration": "/units/SIM-0001/calibrations/new",
+        "log_in": "/log-in",
         "error": "/jobs/none",
     }
 

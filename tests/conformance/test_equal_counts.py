@@ -2,8 +2,9 @@
 
 Over wires time is the wall's: a demand reaches the table at another tick each time, so a recording begins at another
 tick of the launch, and a motion is at another place in it. What a launch is, its coefficients and its noise, depends on
-the seed and on the tick alone. So a recording at rest over wires is a stretch of the launch in process, to the bit. One that
-holds or follows a motion is not: each axis draws its pointing error at each demand, and the motion begins elsewhere.
+the seed and on the tick alone. So a recording at rest over wires is a stretch of the launch in process, to the bit.
+One that holds or follows a motion is not: each axis draws its pointing error at each demand, and the motion begins
+elsewhere.
 """
 
 import asyncio

@@ -77,8 +77,13 @@ def read_queue(bench_id: str, service: Service) -> QueueView:
     queue = service.queues.queue(bench_id)
     holder = service.benches.holder(bench_id)
     places = queue.places(holder is not None)
-    entries = [QueueEntryView.of(entry, places[entry.id]) for entry in queue.entries]
-    return QueueView(bench=queue.bench, running=queue.running, driven_by=holder, entries=entries)
+    named = [entry.id for entry in queue.entries] + ([] if queue.running is None else [queue.running])
+    numbers = service.stores.jobs.numbers(named)
+    entries = [QueueEntryView.of(entry, places[entry.id], numbers.get(entry.id, 0)) for entry in queue.entries]
+    running = None if queue.running is None else numbers.get(queue.running)
+    return QueueView(
+        bench=queue.bench, running=queue.running, running_number=running, driven_by=holder, entries=entries
+    )
 
 
 @router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 413, 507))
