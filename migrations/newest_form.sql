@@ -1,4 +1,4 @@
--- revision 0021
+-- revision 0020
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -290,7 +290,7 @@ CREATE TABLE jobs (
 	started_at DATETIME, 
 	finished_at DATETIME, 
 	result_id VARCHAR, 
-	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, mounting VARCHAR, team VARCHAR DEFAULT '' NOT NULL, 
+	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, mounting VARCHAR, team VARCHAR DEFAULT '' NOT NULL, number INTEGER, 
 	CONSTRAINT pk_jobs PRIMARY KEY (id)
 );
 
@@ -558,6 +558,8 @@ CREATE INDEX ix_jobs_finished_at_id ON jobs (finished_at, id);
 
 CREATE INDEX ix_jobs_id_procedure_unit_bench_requested_by ON jobs (id, procedure, unit, bench, requested_by);
 
+CREATE UNIQUE INDEX ix_jobs_number ON jobs (number);
+
 CREATE INDEX ix_jobs_procedure_id ON jobs (procedure, id);
 
 CREATE INDEX ix_jobs_state_id ON jobs (state, id);
@@ -626,5 +628,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0021');
+INSERT INTO "alembic_version" VALUES ('0020');
 

@@ -12,6 +12,7 @@ from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.orm import InstrumentedAttribute
 from sqlalchemy.sql.functions import FunctionElement
 
+from bench_service.model.job import job_number
 from bench_service.model.search import LabelSought, Search
 from bench_service.persistence.tables.evidence import RecordingRow, ResultRow
 from bench_service.persistence.tables.jobs import JobLabelRow, JobRow
@@ -37,7 +38,7 @@ def find_jobs(query: S, search: Search) -> S:
     if search.text is None:
         return query
     named = (JobRow.id, JobRow.procedure, JobRow.unit, JobRow.bench, JobRow.requested_by)
-    return query.where(or_(_one_holds(named, search.text), _label_holds(search.text, JobRow.id)))
+    return query.where(or_(_one_holds(named, search.text), _of_job(search.text, JobRow.id)))
 
 
 def find_recordings(query: S, search: Search) -> S:
@@ -52,7 +53,7 @@ def find_recordings(query: S, search: Search) -> S:
     station = RecordingRow.station["label"].as_string()
     files = ImportedNames(RecordingRow.source).table_valued("name")
     named = (RecordingRow.id, RecordingRow.unit, RecordingRow.bench, RecordingRow.job_id, station)
-    in_job = _label_holds(search.text, RecordingRow.job_id)
+    in_job = _of_job(search.text, RecordingRow.job_id)
     in_file = exists(select(files.c.name).where(_holds(files.c.name, search.text)))
     return query.where(or_(_one_holds(named, search.text), in_job, in_file))
 
@@ -66,7 +67,7 @@ def find_results(query: S, search: Search) -> S:
     if search.text is None:
         return query
     named = (ResultRow.id, ResultRow.name, ResultRow.unit, ResultRow.job_id)
-    in_job = _label_holds(search.text, ResultRow.job_id)
+    in_job = _of_job(search.text, ResultRow.job_id)
     return query.where(or_(_one_holds(named, search.text), in_job))
 
 
@@ -104,6 +105,12 @@ def _one_holds(columns: Sequence[Any], text: str) -> ColumnElement[bool]:
     for column in columns[1:]:
         joined = joined.concat("\n").concat(func.coalesce(column, ""))
     return or_(*(_holds(column, text) for column in columns)) if "\n" in text else _holds(joined, text)
+
+
+def _of_job(text: str, job: ColumnElement[Any] | InstrumentedAttribute[Any]) -> ColumnElement[bool]:
+    """Restrict to the jobs with a label that holds a text, and to the one whose number the text is."""
+    labelled, number = _label_holds(text, job), job_number(text)
+    return labelled if number is None else or_(labelled, job.in_(select(JobRow.id).where(JobRow.number == number)))
 
 
 def _holds(column: Any, text: str) -> ColumnElement[bool]:

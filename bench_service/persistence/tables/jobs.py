@@ -20,6 +20,7 @@ class JobRow(Table):
         Index("ix_jobs_verdict_id", "verdict", "id"),
         Index("ix_jobs_bench_id", "bench", "id"),
         Index("ix_jobs_id_procedure_unit_bench_requested_by", "id", "procedure", "unit", "bench", "requested_by"),
+        Index("ix_jobs_number", "number", unique=True),
     )
 
     id: Mapped[str] = mapped_column(Id, primary_key=True)
@@ -59,6 +60,8 @@ class JobRow(Table):
     finished_at: Mapped[datetime | None]
     result_id: Mapped[str | None] = mapped_column(Id)
     failure: Mapped[dict[str, Any] | None] = mapped_column(Document)
+    number: Mapped[int] = mapped_column(nullable=True)
+    """Short number, never NULL; to declare that in an existing table, SQLite would have to copy it."""
 
 
 class JobLabelRow(Table):

@@ -1,13 +1,13 @@
 """labels of jobs as rows, and indexes of what long lists are restricted by
 
-Revision: 0021, after 0020
+Revision: 0020, after 0019
 """
 
 import sqlalchemy as sa
 from alembic import op
 
-revision = "0021"
-down_revision = "0020"
+revision = "0020"
+down_revision = "0019"
 branch_labels = None
 depends_on = None
 
