@@ -19,7 +19,7 @@ from procedures.analysis.launch.summary import ChannelSummary, summarise
 from procedures.analysis.launch.surroundings import vibration, with_origins
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.limits import Check, Limit, PlannedCheck, check, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, check, significance, verdict
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import TRIADS, Recording
 from procedures.core.unit import Unit
@@ -223,6 +223,11 @@ def noise_checks(params: NoiseParameters, unit: Unit, duration_s: float, launche
                 found.append(PlannedCheck(check_name, limit, 0.0, freedom, p.value / size))
             if not of_process:
                 found.append(PlannedCheck(check_name, limit))
+    if params.noise_limits.absence_level is not None:
+        names = [c.name for c in unit.channels if c.rate_unit in ("rad/s", "m/s^2")]
+        level = params.noise_limits.absence_level / (2 * max(1, len(names)))
+        limit = Limit("1", minimum=level, source=ABSENCE)
+        found += [PlannedCheck(_absent(name, slow), limit, level=level) for name in names for slow in SLOW]
     return found
 
 
@@ -244,6 +249,12 @@ def _check(s: ChannelSummary, process: str, maximum: float, unit: str, size: flo
 
 
 READY, BASE = "thesis table 1.4, 4.1.2", "ours: base vibration"
+ABSENCE = "thesis 4.1.2: their absence is a sign of quality"
+SLOW = ("rate_random_walk", "rate_ramp")
+
+
+def _absent(channel: str, process: str) -> str:
+    return f"{channel} {process.replace('_', ' ')} absent, p-value"
 
 
 def surroundings_checks(
@@ -264,12 +275,11 @@ def surroundings_checks(
                 found.append(check(f"{name} readiness time", 0.0, limit, note="no warm-up was found"))
         if limits.absence_level is not None:
             level = limits.absence_level / (2 * len(channels))
-            limit = Limit("1", minimum=level, source="thesis 4.1.2: their absence is a sign of quality")
-            for process in ("rate_random_walk", "rate_ramp"):
+            for process in SLOW:
                 p_values = [c.coefficient(process).likelihood.p_value for c in of_launches]
                 least = min((p for p in p_values if p is not None), default=1.0)
                 value = min(1.0, len(p_values) * least)  # Bonferroni: several launches, one chance
-                found.append(check(f"{name} {process.replace('_', ' ')} absent, p-value", value, limit))
+                found.append(significance(_absent(name, process), value, level, source=ABSENCE))
         found += _vibration(name, s.rate_unit, of_launches, limits)
     return found
 

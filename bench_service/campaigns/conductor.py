@@ -13,9 +13,8 @@ from typing import Protocol
 
 from bench_service.background import BackgroundTasks
 from bench_service.campaigns import gates, transitions
-from bench_service.campaigns.campaign import Step
 from bench_service.campaigns.judgement import judge
-from bench_service.campaigns.lineage import failed_calibrations
+from bench_service.campaigns.lineage import calibrations_of, failed_calibrations, recordings_of
 from bench_service.campaigns.run import CampaignRun, StepState
 from bench_service.campaigns.run_log import tell
 from bench_service.campaigns.stores import Stores
@@ -264,20 +263,11 @@ class Conductor:
         step = run.step_of(index)
         request = AnalysisRequest(
             step.does,
-            recordings=self._recordings_of(run, step),
-            calibrations=self._calibrations_of(run, step),
+            recordings=recordings_of(run, step, self._stores),
+            calibrations=calibrations_of(run, step, self._stores),
             parameters=step.parameters,
         )
         return self._analyses.run_method(request, key).id
-
-    def _recordings_of(self, run: CampaignRun, step: Step) -> tuple[str, ...]:
-        jobs = [s.job_id for name in step.recordings_of for s in run.steps if s.name == name and s.job_id]
-        return tuple(r.info.id for job_id in jobs for r in self._stores.recordings.of_job(job_id))
-
-    def _calibrations_of(self, run: CampaignRun, step: Step) -> tuple[str, ...]:
-        """Calibrations that the steps' results gave, in the order of the steps."""
-        results = [s.result_id for name in step.calibrations_of for s in run.steps if s.name == name and s.result_id]
-        return tuple(c.id for c in self._stores.calibrations.of_results(results))
 
     def _abandoned(self, run: CampaignRun, changed: CampaignRun) -> None:
         """Cancel a job that was submitted in vain: another process changed the run first."""

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from bench_service.campaigns.campaign import Step
 from bench_service.campaigns.run import CampaignRun, StepRun
 from bench_service.campaigns.stores import Stores
 from bench_service.model.job import Job
@@ -30,6 +31,18 @@ class StepLineage:
     code_version: str
     simulated: bool
     seed: int | None
+
+
+def recordings_of(run: CampaignRun, step: Step, stores: Stores) -> tuple[str, ...]:
+    """Ids of the recordings that a method's step takes from the jobs of earlier steps, in the order of the steps."""
+    jobs = [s.job_id for name in step.recordings_of for s in run.steps if s.name == name and s.job_id]
+    return tuple(r.info.id for job_id in jobs for r in stores.recordings.of_job(job_id))
+
+
+def calibrations_of(run: CampaignRun, step: Step, stores: Stores) -> tuple[str, ...]:
+    """Ids of the calibrations that the results of earlier steps gave, in the order of the steps."""
+    results = [s.result_id for name in step.calibrations_of for s in run.steps if s.name == name and s.result_id]
+    return tuple(c.id for c in stores.calibrations.of_results(results))
 
 
 def lineage_of(run: CampaignRun, stores: Stores) -> tuple[StepLineage, ...]:

@@ -13,8 +13,8 @@ from pydantic import Field
 
 from procedures.analysis.fitness.findings import FitnessSettings
 from procedures.analysis.fitness.watched import Inspection
-from procedures.analysis.least_squares.chi_square import tail_probability
 from procedures.analysis.recursive_bias import window_noise
+from procedures.analysis.recursive_bias.innovations import InnovationTest, innovation_test
 from procedures.analysis.recursive_bias.kalman import RecursiveBias, white_covariance
 from procedures.analysis.recursive_bias.window_noise import WindowMeans
 from procedures.core import units
@@ -24,8 +24,6 @@ from procedures.core.recording import ACCELEROMETER, GYRO, Recording
 from procedures.core.report import Figure, Report, Series, Table
 from procedures.core.unit import Unit
 from procedures.procedure import Evidence, Method, Outcome, RecordedParameters
-
-P_VALUE_MIN = 0.001
 
 
 class Params(RecordedParameters):
@@ -40,6 +38,16 @@ class Params(RecordedParameters):
     accelerometer_prior_sd_m_s2: float | None = Field(None, gt=0.0, le=100.0)
     gyro_target_sd_deg_h: float = Field(0.005, gt=0.0, le=1e6, description="a third of thesis 4.3's 0.015")
     accelerometer_target_sd_m_s2: float = Field(1.5e-4, gt=0.0, le=100.0, description="a third of thesis 4.3's 0.0005")
+    level: float = Field(
+        0.01,
+        gt=0.0,
+        le=0.2,
+        description="chance that a channel of sound recordings fails: two tests a channel and recording share it",
+    )
+
+    def level_of_each(self, channels: int) -> float:
+        """Level of one test, by Bonferroni; `channels` counts those of all recordings."""
+        return self.level / (2 * max(1, channels))
 
 
 @dataclass(frozen=True)
@@ -63,18 +71,22 @@ class ChannelBias:
     dwell_needed_s: float | None
     """Dwell predicted from the record alone; None where no dwell is long enough or the record is empty."""
     innovations_p_value: float
-    """P-value of the innovations' squares: small where the noise is larger than declared."""
+    """P-value of the innovations' squares, two-sided: small where the noise is larger or smaller than declared."""
     slow_noise_p_value: float
     """P-value of the scatter of ten parts of the recording: small where the channel wanders more than claimed."""
     time_s: tuple[float, ...]
     estimates: tuple[float, ...]
     sds: tuple[float, ...]
+    innovations: InnovationTest | None = None
+    """Test of the innovations; None in results of versions before 1.2.0."""
 
 
 class Result(Outcome):
     """Every channel of every recording."""
 
     biases: tuple[ChannelBias, ...]
+    failed_channels: tuple[str, ...] = ()
+    """Channels that fail the test of their innovations or of their slow noise, each once."""
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
@@ -82,8 +94,11 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     if not evidence.recordings:
         raise UnfitRecording("there is no recording to estimate a bias from")
     biases = tuple(b for r in evidence.recordings for b in _of_recording(r, params, unit))
-    checks = tuple(c for b in biases for c in _checks(b))
-    return Result(checks=checks, verdict=verdict(checks), warnings=tuple(_warnings(biases)), biases=biases)
+    level = params.level_of_each(len(biases))
+    checks = tuple(c for b in biases for c in _checks(b, level))
+    failed = tuple(dict.fromkeys(b.channel for b in biases if _failed(b, level)))
+    warnings = (*_named(biases, level), *_warnings(biases))
+    return Result(checks=checks, verdict=verdict(checks), warnings=warnings, biases=biases, failed_channels=failed)
 
 
 def report(result: Result) -> Report:
@@ -144,6 +159,7 @@ def _of_channel(
     variance = None if prior is None else prior**2
     bias = RecursiveBias(covariance, 0.0, variance)
     estimates = [bias.update(float(value)) for value in z]
+    tested = innovation_test(bias.innovations, taken.length_s, params.level)
     white = RecursiveBias(white_covariance(float(np.mean(np.diagonal(covariance))), len(z)), 0.0, variance)
     enough = None if target is None else bias.enough_at(target)
     needed = (
@@ -163,7 +179,8 @@ def _of_channel(
         target_sd=target,
         enough_after_s=None if enough is None else enough * taken.length_s,
         dwell_needed_s=needed,
-        innovations_p_value=tail_probability(float(bias.innovations @ bias.innovations), len(bias.innovations)),
+        innovations_p_value=tested.p_value,
+        innovations=tested,
         slow_noise_p_value=window_noise.slow_noise_p(z, covariance),
         time_s=tuple((taken.length_s * np.arange(1, len(z) + 1)).tolist()),
         estimates=tuple(estimates),
@@ -181,12 +198,30 @@ def _asked(params: Params, rate_unit: str) -> tuple[float | None, float | None]:
     return None, None
 
 
-def _checks(b: ChannelBias) -> tuple[Check, ...]:
+def _failed(b: ChannelBias, level: float) -> bool:
+    """Whether the channel fails: by its innovations where its noise is known, or by noise slower than that."""
+    return (b.noise == "record" and b.innovations_p_value < level) or b.slow_noise_p_value < level
+
+
+def _named(biases: Sequence[ChannelBias], level: float) -> list[str]:
+    """One sentence for each channel that failed: which, in which recording, by what."""
+    found: list[str] = []
+    for b in biases:
+        if not _failed(b, level):
+            continue
+        said = b.innovations.sentence(level) if b.innovations is not None and b.noise == "record" else ""
+        slow = f"its means wander more than its noise allows (p = {b.slow_noise_p_value:.1g})"
+        reasons = [text for text in (said, slow if b.slow_noise_p_value < level else "") if text]
+        found.append(f"failed channel {b.channel}, {b.recording}: {'; '.join(reasons)}")
+    return found
+
+
+def _checks(b: ChannelBias, level: float) -> tuple[Check, ...]:
     name, size = units.DISPLAY[b.unit]
     where = f"{b.channel}, {b.recording}"
-    found = [significance(f"{where}: scatter of ten parts, p-value", b.slow_noise_p_value, P_VALUE_MIN)]
+    found = [significance(f"{where}: scatter of ten parts, p-value", b.slow_noise_p_value, level)]
     if b.noise == "record":
-        found.append(significance(f"{where}: innovations, p-value", b.innovations_p_value, P_VALUE_MIN))
+        found.append(significance(f"{where}: innovations, p-value", b.innovations_p_value, level))
     if b.target_sd is not None:
         limit = Limit(name, b.target_sd / size, source="target")
         found.append(check(f"{where}: standard uncertainty", b.standard_uncertainty / size, limit))
@@ -219,7 +254,7 @@ def inspection(params: Params, count: int) -> Inspection:
 METHOD = Method(
     "kalman_calibration",
     "Kalman calibration of a constant bias",
-    "1.1.0",
+    "1.2.0",
     Params,
     Result,
     analyse,

@@ -97,11 +97,17 @@ def main() -> int:
             held &= tell(list(pool.map(ships, range(options.whole))), "sound unit, whole")
     with ProcessPoolExecutor(options.workers, initializer=light_bench.use) as pool:
         units = range(-(-options.seeds // options.each))
-        found = [one for of in pool.map(partial(sound, campaign=campaign, each=options.each), units) for one in of]
+        found: list[Ended] = []
+        for of in pool.map(partial(sound, campaign=campaign, each=options.each), units):
+            found += of
+            print(f"  {sum(v == 'pass' for v, _ in found)} of {len(found)} pass", file=sys.stderr, flush=True)
         held &= tell(found[: options.seeds], "sound unit") if options.seeds else True
         every = [f for f in faults(campaign) if not options.only or f.name in options.only]
         wanted = [f.name for f in every if f.resolved]
-        drawn = list(pool.map(partial(faulty, campaign=campaign, wanted=wanted), range(options.fault_seeds)))
+        drawn = []
+        for of_unit in pool.map(partial(faulty, campaign=campaign, wanted=wanted), range(options.fault_seeds)):
+            drawn.append(of_unit)
+            print(f"  faults in unit {len(drawn)}: {[(f, v, good) for f, v, _, good in of_unit]}", file=sys.stderr)
     for fault in every:
         if not fault.resolved:
             print(f"{fault.name}: not resolved by the plan, {fault.size}")

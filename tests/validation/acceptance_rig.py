@@ -39,6 +39,8 @@ SCALED: dict[str, dict[str, Any]] = {
 }
 """Launches and thermal legs as long as they ship, at 5 and 1 Hz, and six soaks of the converter: what limits the
 campaign are processes that only hours show."""
+USED = {"thermal": "thermal_correction", "converter": "converter"}
+"""Corrections that later steps of the campaign use: kind -> field of the unit."""
 RATE_HZ = 100.0
 """Sample rate of the light bench's unit; it ships with 400 Hz."""
 Truth = Callable[[str, UnitTruth, BenchTruth], tuple[UnitTruth, BenchTruth]]
@@ -157,8 +159,8 @@ def _measured(
         known = {c.triad: c for c in (*unit.calibrations, *calibrations)}
         unit = replace(unit, calibrations=tuple(known.values()))
         for correction in procedure.corrections(outcome):
-            field = {"thermal": "thermal_correction", "converter": "converter"}[correction.kind]
-            unit = replace(unit, **{field: correction.value})
+            if correction.kind in USED:
+                unit = replace(unit, **{USED[correction.kind]: correction.value})
     return outcome, procedure.learns(outcome, unit, step), calibrations
 
 

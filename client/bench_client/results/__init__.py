@@ -6,6 +6,8 @@ from bench_client.results.allan_deviation import AllanDeviationResult
 from bench_client.results.calibration_12_orientations import Calibration12OrientationsResult
 from bench_client.results.converter_bench import ConverterBenchResult
 from bench_client.results.error_growth import ErrorGrowthResult
+from bench_client.results.ferraris_calibration import FerrarisCalibrationResult
+from bench_client.results.ferraris_calibration_of_recordings import FerrarisCalibrationOfRecordingsResult
 from bench_client.results.field_calibration import FieldCalibrationResult
 from bench_client.results.free_inertial import FreeInertialResult
 from bench_client.results.gyro_half_turns import GyroHalfTurnsResult
@@ -25,12 +27,15 @@ from bench_client.results.scalar_calibration import ScalarCalibrationResult
 from bench_client.results.scale_factor_whole_turns import ScaleFactorWholeTurnsResult
 from bench_client.results.static_run import StaticRunResult
 from bench_client.results.table_program import TableProgramResult
+from bench_client.results.temperature_dependence import TemperatureDependenceResult
 from bench_client.results.thermal_cycle import ThermalCycleResult
+from bench_client.results.thermometer_calibration import ThermometerCalibrationResult
 from bench_client.results.verification_9_orientations import Verification9OrientationsResult
 
 Result = (
     Calibration12OrientationsResult
     | ConverterBenchResult
+    | FerrarisCalibrationResult
     | InitialAlignmentResult
     | MultiPositionCalibrationResult
     | NoOperationResult
@@ -39,9 +44,11 @@ Result = (
     | StaticRunResult
     | TableProgramResult
     | ThermalCycleResult
+    | ThermometerCalibrationResult
     | Verification9OrientationsResult
     | AllanDeviationResult
     | ErrorGrowthResult
+    | FerrarisCalibrationOfRecordingsResult
     | FieldCalibrationResult
     | FreeInertialResult
     | GyroHalfTurnsResult
@@ -53,12 +60,14 @@ Result = (
     | PlanOrientationsResult
     | RunToRunResult
     | ScalarCalibrationResult
+    | TemperatureDependenceResult
     | OtherResult
 )
 """A result; `isinstance` or `match` says which, and then its `document` has fields of its own."""
 CLASSES: dict[str, type[ResultHead]] = {
     "calibration_12_orientations": Calibration12OrientationsResult,
     "converter_bench": ConverterBenchResult,
+    "ferraris_calibration": FerrarisCalibrationResult,
     "initial_alignment": InitialAlignmentResult,
     "multi_position_calibration": MultiPositionCalibrationResult,
     "no_operation": NoOperationResult,
@@ -67,9 +76,11 @@ CLASSES: dict[str, type[ResultHead]] = {
     "static_run": StaticRunResult,
     "table_program": TableProgramResult,
     "thermal_cycle": ThermalCycleResult,
+    "thermometer_calibration": ThermometerCalibrationResult,
     "verification_9_orientations": Verification9OrientationsResult,
     "allan_deviation": AllanDeviationResult,
     "error_growth": ErrorGrowthResult,
+    "ferraris_calibration_of_recordings": FerrarisCalibrationOfRecordingsResult,
     "field_calibration": FieldCalibrationResult,
     "free_inertial": FreeInertialResult,
     "gyro_half_turns": GyroHalfTurnsResult,
@@ -81,6 +92,7 @@ CLASSES: dict[str, type[ResultHead]] = {
     "plan_orientations": PlanOrientationsResult,
     "run_to_run": RunToRunResult,
     "scalar_calibration": ScalarCalibrationResult,
+    "temperature_dependence": TemperatureDependenceResult,
 }
 
 

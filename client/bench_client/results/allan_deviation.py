@@ -3,10 +3,10 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Statement, Verdict
+from bench_client.results.shared import BandCurve, Check, Density, Statement, Verdict
 
 
-class MethodsAllanDeviationCurve(Part):
+class LaunchCurvesCurve(Part):
     """The deviation of one channel of one recording; all lists go with `tau_s`."""
 
     recording: str
@@ -19,6 +19,8 @@ class MethodsAllanDeviationCurve(Part):
     terms: tuple[int, ...]
     edf: tuple[float, ...]
     noise_exponent: tuple[float, ...]
+    density: Density | None = None
+    band: BandCurve | None = None
 
 
 class AllanDeviationDocument(Part):
@@ -31,7 +33,7 @@ class AllanDeviationDocument(Part):
     """None without checks and in results of older versions"""
     statistic: str
     confidence: float
-    curves: tuple[MethodsAllanDeviationCurve, ...]
+    curves: tuple[LaunchCurvesCurve, ...]
 
 
 class AllanDeviationResult(ResultHead):

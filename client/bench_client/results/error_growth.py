@@ -14,7 +14,7 @@ class NavigationGrowthSummaryCurve(Part):
     sd: tuple[float, ...]
 
 
-class Share(Part):
+class ResultShare(Part):
     """Contribution of one source alone: radii that hold the position with 95 %, in m."""
 
     source: str
@@ -36,7 +36,7 @@ class ErrorGrowthDocument(Part):
     time_s: tuple[float, ...]
     curves: tuple[NavigationGrowthSummaryCurve, ...]
     radius_95_m: tuple[float, ...]
-    shares: tuple[Share, ...]
+    shares: tuple[ResultShare, ...]
     radius_95_1h_m: float
     calibration_radius_95_1h_m: float | None
     uncalibrated_1h_m: float | None

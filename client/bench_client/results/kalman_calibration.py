@@ -6,6 +6,17 @@ from bench_client.results.part import Part, ResultHead
 from bench_client.results.shared import Check, Statement, Verdict
 
 
+class InnovationTest(Part):
+    """Test of one channel's innovations."""
+
+    mean_square: float
+    degrees_of_freedom: int
+    correlation: float
+    size_p_value: float
+    whiteness_p_value: float
+    since_s: float | None
+
+
 class ChannelBias(Part):
     """Bias of one channel of one recording. Lists go with `time_s`, since the recording's beginning; SI, or
     counts.
@@ -27,6 +38,7 @@ class ChannelBias(Part):
     time_s: tuple[float, ...]
     estimates: tuple[float, ...]
     sds: tuple[float, ...]
+    innovations: InnovationTest | None = None
 
 
 class KalmanCalibrationDocument(Part):
@@ -38,6 +50,7 @@ class KalmanCalibrationDocument(Part):
     statement: Statement | None = None
     """None without checks and in results of older versions"""
     biases: tuple[ChannelBias, ...]
+    failed_channels: tuple[str, ...] = ()
 
 
 class KalmanCalibrationResult(ResultHead):

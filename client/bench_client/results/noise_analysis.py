@@ -18,6 +18,7 @@ class NoiseAnalysisDocument(Part):
     launches: tuple[LaunchNoise, ...]
     channels: tuple[ChannelSummary, ...]
     averaging_time_s: float | None
+    drawn_launch: int = 1
 
 
 class NoiseAnalysisResult(ResultHead):

@@ -3,32 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import CalibrationSummaryCoefficient, Check, Statement, TriadCalibration, Verdict
-
-
-class RatePoint(Part):
-    """Scale factor of one axis at one rate and direction, as a departure from the fitted K."""
-
-    axis: str
-    rate_deg_s: float
-    turns: int
-    departure: float
-    standard_uncertainty: float
-    modelled: float
-
-
-class WholeTurns(Part):
-    """Complete results of whole turns for a gyro triad."""
-
-    coefficients: tuple[CalibrationSummaryCoefficient, ...]
-    calibration: TriadCalibration
-    reference_rate_deg_s: float
-    points: tuple[RatePoint, ...]
-    condition: float
-    chi_square: float
-    degrees_of_freedom: int
-    p_value: float | None
-    noise_known: bool
+from bench_client.results.shared import Check, Statement, Verdict, WholeTurns
 
 
 class ScaleFactorWholeTurnsDocument(Part):

@@ -170,3 +170,70 @@ class TriadSummary(Part):
     left_out: Magnitudes | None = None
     suspect: str = ""
     budgets: tuple[Budget, ...] = ()
+
+
+class RatePoint(Part):
+    """Scale factor of one axis at one rate and direction, as a departure from the fitted K."""
+
+    axis: str
+    rate_deg_s: float
+    turns: int
+    departure: float
+    standard_uncertainty: float
+    modelled: float
+
+
+class WholeTurns(Part):
+    """Complete results of whole turns for a gyro triad."""
+
+    coefficients: tuple[CalibrationSummaryCoefficient, ...]
+    calibration: TriadCalibration
+    reference_rate_deg_s: float
+    points: tuple[RatePoint, ...]
+    condition: float
+    chi_square: float
+    degrees_of_freedom: int
+    p_value: float | None
+    noise_known: bool
+
+
+class BandCurve(Part):
+    """Least, mean and greatest Allan deviation over every start offset (paper A)."""
+
+    tau_s: tuple[float, ...]
+    least: tuple[float, ...]
+    mean: tuple[float, ...]
+    greatest: tuple[float, ...]
+
+
+class Density(Part):
+    """One-sided power spectral density ``S(f) = 2·P(f)·Δt`` [rate²/Hz]; all lists run parallel to `frequency_hz`.
+
+    P is the mean power of a bin's modes and Δt the sampling period, so white noise of N [rate·√s] has 2N². Slow
+    bins come from the cells of the whole record, fast ones from its segments; lines that were taken out are not
+    in it.
+    """
+
+    frequency_hz: tuple[float, ...]
+    density: tuple[float, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+
+class SensorCorrection(Part):
+    """Correction of one temperature sensor about the set's reference."""
+
+    channel: str
+    offset_c: float
+    slope: float
+
+
+class ThermometerCorrection(Part):
+    """Corrections of a unit's sensors. Raises `BadParameter` for numbers that are not finite or do not fit
+    together.
+    """
+
+    sensors: tuple[SensorCorrection, ...]
+    reference_c: float
+    covariance: tuple[tuple[float, ...], ...]
+    fitted_range_c: tuple[float, ...]

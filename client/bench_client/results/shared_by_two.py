@@ -3,7 +3,17 @@
 from typing import Literal
 
 from bench_client.results.part import Part
-from bench_client.results.shared import Check, Statement, TriadCalibration, TriadSummary, Verdict
+from bench_client.results.shared import (
+    BandCurve,
+    Check,
+    Density,
+    Statement,
+    ThermometerCorrection,
+    TriadCalibration,
+    TriadSummary,
+    Verdict,
+    WholeTurns,
+)
 
 Form = Literal["both", "switched", "single"]
 
@@ -26,6 +36,18 @@ class ConverterModel(Part):
 
     scale: Normalised
     zero: Normalised
+
+
+class FerrarisCalibrationDocument(Part):
+    """Gyros from rests and turns, accelerometers from the rests."""
+
+    checks: tuple[Check, ...] = ()
+    verdict: Verdict
+    warnings: tuple[str, ...] = ()
+    statement: Statement | None = None
+    """None without checks and in results of older versions"""
+    gyro: WholeTurns
+    accelerometer: TriadSummary
 
 
 class TermEstimate(Part):
@@ -121,15 +143,6 @@ class Stage(Part):
     note: str = ""
 
 
-class BandCurve(Part):
-    """Least, mean and greatest Allan deviation over every start offset (paper A)."""
-
-    tau_s: tuple[float, ...]
-    least: tuple[float, ...]
-    mean: tuple[float, ...]
-    greatest: tuple[float, ...]
-
-
 class Reading(Part):
     """One coefficient by one method. `value` is None where the process was not observed."""
 
@@ -166,6 +179,7 @@ class SpectralLine(Part):
 
     frequency_hz: float
     amplitude: float
+    origin: str = ""
 
 
 class CorrelatedProcess(Part):
@@ -195,18 +209,28 @@ class LevelShift(Part):
     standard_uncertainty: float
 
 
-class Density(Part):
-    """One-sided power spectral density ``S(f) = 2·P(f)·Δt`` [rate²/Hz]; all lists run parallel to `frequency_hz`.
-
-    P is the mean power of a bin's modes and Δt the sampling period, so white noise of N [rate·√s] has 2N². Slow
-    bins come from the cells of the whole record, fast ones from its segments; lines that were taken out are not
-    in it.
+class TemperatureCorrelation(Part):
+    """Correlation of a channel with one temperature over a launch; the noise is the channel's own, most likely
+    one.
     """
 
-    frequency_hz: tuple[float, ...]
-    density: tuple[float, ...]
-    lower: tuple[float, ...]
-    upper: tuple[float, ...]
+    sensor: str
+    r: float
+    slope: float
+    slope_sd: float
+    effective_samples: float
+    p_value: float
+
+
+class Vibration(Part):
+    """Root mean square of a channel between two frequencies, its own noise taken out."""
+
+    from_hz: float
+    to_hz: float
+    total: float
+    own_noise: float
+    vibration: float
+    lines: float
 
 
 class ChannelNoise(Part):
@@ -236,6 +260,8 @@ class ChannelNoise(Part):
     temperature: TemperatureSlope | None = None
     shift: LevelShift | None = None
     density: Density | None = None
+    temperatures: tuple[TemperatureCorrelation, ...] = ()
+    vibration: Vibration | None = None
 
 
 class LaunchNoise(Part):
@@ -266,3 +292,19 @@ class ChannelSummary(Part):
     means: tuple[MeanCoefficient, ...]
     averaging_time_s: float | None
     mean_change_sd: float | None
+
+
+class GyroPolynomial(Part):
+    """Polynomial of one gyro; empty where it does not depend on temperature."""
+
+    coefficients: tuple[float, ...] = ()
+    covariance: tuple[tuple[float, ...], ...] = ()
+
+
+class GyroThermalCorrection(Part):
+    """Polynomials of x, y, z about one reference temperature."""
+
+    gyros: tuple[GyroPolynomial, ...]
+    reference_c: float
+    fitted_range_c: tuple[float, ...]
+    thermometers: ThermometerCorrection | None = None

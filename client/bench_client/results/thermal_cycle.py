@@ -3,8 +3,8 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Statement, Verdict
-from bench_client.results.shared_by_two import ConverterModel, Form
+from bench_client.results.shared import Check, Statement, ThermometerCorrection, Verdict
+from bench_client.results.shared_by_two import ConverterModel, Form, GyroThermalCorrection
 
 
 class LegEvidence(Part):
@@ -88,6 +88,7 @@ class AxisFound(Part):
     bic: tuple[float, ...]
     p_values: tuple[float, ...]
     preferred_order: int
+    order_reason: str = ""
 
 
 class TemperatureRange(Part):
@@ -104,6 +105,8 @@ class ThermalCorrection(Part):
     axes: tuple[AxisCorrection, ...]
     first_stage: tuple[ConverterModel, ...] | None = None
     fitted_range: TemperatureRange | None = None
+    thermometers: ThermometerCorrection | None = None
+    static_sensors: Literal["case", "gyros"] = "case"
 
 
 class SoakFound(Part):
@@ -183,6 +186,41 @@ class AllanFound(Part):
     rise: float
 
 
+class Following(Part):
+    """Law by which the converter's sensor follows the case's."""
+
+    delay_s: float
+    delay_sd_s: float
+    total_delay_s: float
+    total_delay_sd_s: float
+    sensor_lag_s: float
+    sensor_lag_sd_s: float
+    heating_c: tuple[float, ...]
+    residual_sd_c: float
+    p_value: float
+
+
+class Hysteresis(Part):
+    """Corrected accelerometer at one temperature, reached from below less reached from above, in one run."""
+
+    run: str
+    axis: str
+    target_c: float
+    difference_m_s2: float
+    standard_uncertainty_m_s2: float
+    p_value: float
+
+
+class GyroCorrected(Part):
+    """Correction of a gyro that depends on temperature."""
+
+    axis: str
+    order: int
+    reason: str
+    p_before: float
+    p_after: float | None
+
+
 class ThermalCycle(Part):
     """Complete results of a thermal cycle."""
 
@@ -202,6 +240,12 @@ class ThermalCycle(Part):
     gyro_noise: tuple[GyroNoise, ...]
     allan: tuple[AllanFound, ...]
     warnings: tuple[str, ...]
+    following: Following | None = None
+    converter_lag_s: float | None = None
+    thermometers: bool = False
+    hysteresis: tuple[Hysteresis, ...] = ()
+    gyro_correction: GyroThermalCorrection | None = None
+    gyros_corrected: tuple[GyroCorrected, ...] = ()
 
 
 class ThermalCycleDocument(Part):

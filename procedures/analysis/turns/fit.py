@@ -264,14 +264,19 @@ def fit_turns(
     first = turn_estimator(motion, slopes, (), reference_rad_s, None, flaws, np.eye(3))
     matrix = (first.gain @ outputs.T.ravel()).reshape(3, 4)[:, 1:]
     plan = turn_estimator(motion, motion.axis_b @ matrix.T, terms, reference_rad_s, noise, flaws, matrix)
+    return fitted(plan, outputs, noise is not None)
+
+
+def fitted(plan: TurnEstimator, outputs: Array, noise_known: bool) -> TurnFit:
+    """Fit integrated outputs (n, 3) [rad] by an estimator; unknown noise is scaled to the residuals."""
     parameters = (plan.gain @ outputs.T.ravel()).reshape(3, -1)
     modelled = np.einsum("cnk,ck->nc", plan.design, parameters)
     residuals = outputs - modelled
     whitened = plan.weights @ residuals.T.ravel()
     chi_square, freedom = float(whitened @ whitened), residuals.size - parameters.size
-    factor = 1.0 if noise is not None or freedom == 0 else chi_square / freedom
+    factor = 1.0 if noise_known or freedom == 0 else chi_square / freedom
     noise_covariance = factor * plan.noise_covariance
     output_sd = np.sqrt(factor * np.diagonal(np.linalg.inv(plan.weights.T @ plan.weights))).reshape(3, -1).T
-    p_value = judged_p_value(chi_square, freedom, noise is not None)
+    p_value = judged_p_value(chi_square, freedom, noise_known)
     covariance = noise_covariance + plan.table_per_sd @ plan.table_per_sd.T
     return TurnFit(plan, parameters, covariance, noise_covariance, residuals, output_sd, chi_square, freedom, p_value)

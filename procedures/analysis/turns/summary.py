@@ -1,7 +1,7 @@
 """Results of whole turns for a gyro triad, as plain JSON-ready numbers."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -83,20 +83,28 @@ def analyse_turns(
     seconds = means.windows[:, 1] - means.windows[:, 0]
     motion = turning(stations, seconds, site)
     outputs = means.outputs * seconds[:, None]
-    _require_turns(motion, outputs, means.labels)
+    require_turns(motion, outputs, means.labels)
     noise = triad_covariance(record, means.windows)
     reference = reference_rate_deg_s * units.DEG
     fit = fit_turns(motion, outputs, terms, reference, noise, uncertainty)
+    made = whole_turns(fit, terms, motion, outputs, np.arange(len(outputs)), noise is not None)
+    return replace(made, reference_rate_deg_s=reference_rate_deg_s)
+
+
+def whole_turns(
+    fit: TurnFit, terms: Sequence[Term], motion: Turning, outputs: Array, turning_stations: Array, noise_known: bool
+) -> WholeTurns:
+    """Numbers of a fit, ready to be stored; the rate points are those of the stations that turn."""
     return WholeTurns(
         _coefficients(fit, terms),
         _calibration(fit),
-        reference_rate_deg_s,
-        _points(motion, outputs, fit),
+        float(np.max(np.abs(motion.rate_rad_s))) / units.DEG,
+        _points(motion, outputs, fit, turning_stations),
         fit.estimator.condition,
         fit.chi_square,
         fit.degrees_of_freedom,
         fit.p_value,
-        noise is not None,
+        noise_known,
     )
 
 
@@ -108,7 +116,7 @@ def _stations(recordings: Sequence[Recording]) -> list[Station]:
     return [s for s in stations if s is not None]
 
 
-def _require_turns(motion: Turning, outputs: Array, labels: Sequence[str]) -> None:
+def require_turns(motion: Turning, outputs: Array, labels: Sequence[str]) -> None:
     """Check that each station's own channel counted about the turns that were made, in their direction."""
     for i, channel in enumerate(motion.channels):
         made = motion.angle_rad[i] * np.sign(motion.axis_b[i, channel])
@@ -125,7 +133,9 @@ def _coefficients(fit: TurnFit, terms: Sequence[Term]) -> tuple[Coefficient, ...
     names = coefficient_names(terms)
     total, noise = np.sqrt(np.diagonal(fit.covariance)), np.sqrt(np.diagonal(fit.noise_covariance))
     table = np.sqrt(np.sum(fit.estimator.table_per_sd**2, axis=1))
-    sources = {s: fit.estimator.of_source(s) for s in ("orthogonality", "pointing")}
+    seen = [s for s in dict.fromkeys(fit.estimator.source) if np.any(fit.estimator.of_source(s) > 0.0)]
+    names_of = dict.fromkeys(("orthogonality", "pointing", *seen))
+    sources = {s: fit.estimator.of_source(s) for s in names_of}
     values = fit.parameters.ravel()
     return tuple(
         Coefficient(
@@ -148,12 +158,13 @@ def _calibration(fit: TurnFit) -> TriadCalibration:
     return triad_calibration("gyro", "rad/s", "rad/s", fit.parameters[:, :LINEAR], covariance)
 
 
-def _points(motion: Turning, outputs: Array, fit: TurnFit) -> tuple[RatePoint, ...]:
+def _points(motion: Turning, outputs: Array, fit: TurnFit, stations: Array) -> tuple[RatePoint, ...]:
     bias, matrix = fit.parameters[:, 0], fit.parameters[:, 1:LINEAR]
     known = motion.seconds[:, None] * bias + motion.earth_rad @ matrix.T
     turned = motion.turned_b @ matrix.T
     points: list[RatePoint] = []
-    for i, c in enumerate(motion.channels):
+    for i in stations.tolist():
+        c = motion.channels[i]
         departure = (outputs[i, c] - known[i, c]) / turned[i, c] - 1.0
         direction = float(np.sign(motion.axis_b[i, c]))
         points.append(

@@ -1,0 +1,145 @@
+"""Calibration of both triads on six faces, by rests and by rotations through 360 degrees (Ferraris' way).
+
+Each axis of the unit points upwards and downwards along the table's outer axis; there the unit rests, and turns through
+whole turns there and back. Gravity at the six rests gives the accelerometers' b and K; of the gyros the rests and the
+sums of the turns give b, the differences of the turns K, without the Earth's rate. The outer axis must be endless.
+"""
+
+from collections.abc import AsyncIterator, Sequence
+from math import ceil
+
+import numpy as np
+from pydantic import Field
+
+from procedures import ferraris, steps
+from procedures.analysis.calibration.plan import triad_plan
+from procedures.analysis.calibration.station_noise import triad_covariance
+from procedures.analysis.calibration.station_plan import windows
+from procedures.analysis.turns.ferraris import face_stations, ferraris_estimator, rests_and_turns
+from procedures.analysis.turns.plan import coefficient_names
+from procedures.bench import Bench
+from procedures.bench.imu import Stream
+from procedures.core import units
+from procedures.core.coefficient_name import CoefficientName
+from procedures.core.errors import BadParameter
+from procedures.core.imu_model import COEFFICIENT_NAMES
+from procedures.core.limits import Limit, PlannedCheck
+from procedures.core.recording import AXES, Recording, Station
+from procedures.core.turn import PEAK_ACCELERATION
+from procedures.ferraris import FerrarisLimits, Result
+from procedures.multi_position import predicted
+from procedures.procedure import Context, PredictedUncertainty, Prediction, Procedure
+from procedures.site_parameters import TableParameters, declared_table
+
+ACCELERATION_SHARE = 0.9
+"""Share of the outer axis' acceleration for ramps without a given length; the rest is for the servo."""
+
+
+class Params(TableParameters):
+    """Rests, turns, site and limits. None takes the unit's or the bench's value."""
+
+    rest_s: float | None = Field(None, ge=5.0, le=86_400.0, description="at each face; None: the averaging time")
+    turns: int = Field(1, ge=1, le=1000, description="whole turns there, and as many back")
+    rate_deg_s: float = Field(30.0, ge=0.1, le=3600.0)
+    ramp_s: float | None = Field(None, gt=0.0, le=600.0, description="None: what the outer axis' acceleration allows")
+    settle_s: float = Field(2.0, ge=0.0, le=3600.0)
+    limits: FerrarisLimits = Field(default_factory=lambda: FerrarisLimits.model_validate({}))
+
+
+def resolve(params: Params, context: Context) -> Params:
+    """Rest from the unit; ramps, site and table accuracy from the bench."""
+    outer = context.bench.outer
+    ramp_s = PEAK_ACCELERATION * params.rate_deg_s / (ACCELERATION_SHARE * outer.acceleration_deg_s2)
+    own = {"rest_s": context.unit.averaging_time_s, "ramp_s": ceil(10.0 * ramp_s) / 10.0}
+    full = params.filled({**own, **declared_table(context)})
+    full.require_sources(context, corrected=False)
+    return full
+
+
+def schedule(params: Params) -> tuple[Station, ...]:
+    """Face after face: a rest, turns there, turns back. Raises `BadParameter` where a rate would not be reached."""
+    if params.rest_s is None or params.ramp_s is None:
+        raise BadParameter("rest_s", None, "resolve the parameters first: rest and ramp come from unit and bench")
+    try:
+        return face_stations(params.rest_s, params.turns, params.rate_deg_s, params.ramp_s, params.settle_s)
+    except ValueError as refusal:
+        raise BadParameter("turns", params.turns, str(refusal)) from refusal
+
+
+def predict(params: Params, context: Context) -> Prediction:
+    """Duration and the uncertainty of each coefficient of both triads. Raises `BadParameter`, `Undetermined`."""
+    params = resolve(params, context)
+    stations = schedule(params)
+    for station in stations:
+        if station.angles is not None and (found := context.bench.violations(station.angles, station.turn)):
+            raise BadParameter("rate_deg_s", params.rate_deg_s, f"station {station.label}: {'; '.join(found)}")
+    spans = windows(stations, context.bench.axis_motion)
+    still = [s for s in stations if s.turn is None]
+    site = params.site(context)
+    plan = triad_plan("accelerometer", context.unit, still, context.bench.axis_motion, site, params.table(site))
+    uncertainties = (*_gyro(params, context, stations), *predicted(plan))
+    unknown = context.unit.gyro is None or context.unit.accelerometer is None
+    warnings = ("the noise of a triad is not known: of it nothing is predicted",) if unknown else ()
+    basis = "the unit's calibration" if context.unit.known_matrix("gyro") is not None else "nominal scale factors"
+    return Prediction(float(spans[-1, 1]), uncertainties, warnings, basis if uncertainties else "")
+
+
+def _gyro(params: Params, context: Context, stations: Sequence[Station]) -> list[PredictedUncertainty]:
+    spans = windows(stations, context.bench.axis_motion)
+    noise = triad_covariance(context.unit.gyro, spans)
+    if noise is None:
+        return []
+    site, known = params.site(context), context.unit.known_matrix("gyro")
+    motion = rests_and_turns(stations, spans[:, 1] - spans[:, 0], site)
+    made = ferraris_estimator(motion, noise, params.table(site), np.eye(3) if known is None else known)
+    total, own = made.covariance.diagonal() ** 0.5, made.noise_covariance.diagonal() ** 0.5
+    table = (made.table_per_sd**2).sum(axis=1) ** 0.5
+    parts = zip(coefficient_names(()), total.tolist(), own.tolist(), table.tolist(), strict=True)
+    return [
+        PredictedUncertainty(CoefficientName("gyro", n), "rad/s" if n.startswith("b_") else "1", sd, of_noise, of_table)
+        for n, sd, of_noise, of_table in parts
+    ]
+
+
+async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
+    """Move, settle, record at rest or while the table turns, station after station."""
+    for station in stations:
+        yield await steps.record_turn(bench, station)
+
+
+def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
+    """Least squares over rests and turns of both triads."""
+    params = resolve(params, context)
+    site = params.site(context)
+    return ferraris.calibrated(recordings, site, params.table(site), context.unit, params.limits)
+
+
+def quantities(params: Params, context: Context) -> tuple[str, ...]:
+    """Checks and coefficients that a result will have."""
+    scale = tuple(f"gyro scale factor {axis}, 3σ" for axis in AXES)
+    residuals = tuple(f"{triad} {ferraris.RESIDUALS}" for triad in ("gyro", "accelerometer"))
+    named = tuple(f"{triad}.{name}" for triad in ("gyro", "accelerometer") for name in COEFFICIENT_NAMES)
+    return (*scale, "accelerometer condition number", *residuals, *named)
+
+
+def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
+    """Checks of the scale factors' uncertainty, by the plan, and the tests of the residuals."""
+    params = resolve(params, context)
+    sd = {u.name: u.standard_uncertainty / units.PPM for u in _gyro(params, context, schedule(params))}
+    limit = Limit("ppm", maximum=params.limits.gyro_scale_3_sigma_ppm, source="ours")
+    level = params.limits.residual_p_value_min
+    test = Limit("1", minimum=level, source="ours: a test of significance")
+    scale = [
+        PlannedCheck(f"gyro scale factor {axis}, 3σ", limit, None, None, 3.0 * sd[f"gyro.K{k}{k}"])
+        for k, axis in enumerate(AXES, start=1)
+        if sd
+    ]
+    return (*scale, *(PlannedCheck(f"{t} {ferraris.RESIDUALS}", test, level=level) for t in ("gyro", "accelerometer")))
+
+
+PROCEDURE = Procedure(
+    *("ferraris_calibration", "Calibration on six faces, by rests and turns", "1.0.0"),
+    *(Params, Result, resolve, schedule, predict, acquire, analyse, ferraris.report, ferraris.calibrations),
+    quantities=quantities,
+    planned_checks=planned_checks,
+)

@@ -1,0 +1,95 @@
+"""Ferraris' calibration: parameters, result and analysis that the procedure and the method share."""
+
+from collections.abc import Sequence
+
+from pydantic import Field
+
+from procedures.analysis.calibration.summary import TriadSummary
+from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.calibration.triad_analysis import analyse_means
+from procedures.analysis.turns.ferraris import analyse_ferraris, rest_means
+from procedures.analysis.turns.summary import WholeTurns
+from procedures.core import units
+from procedures.core.imu_model import TriadCalibration
+from procedures.core.limits import Check, Limit, check, significance, verdict
+from procedures.core.recording import AXES, Recording
+from procedures.core.report import Report
+from procedures.core.site import Site
+from procedures.core.unit import Unit
+from procedures.parameters import Parameters
+from procedures.procedure import Outcome
+from procedures.reports import calibration as pictures
+from procedures.reports import whole_turns as of_turns
+
+
+class FerrarisLimits(Parameters):
+    """Requirements on the calibration itself (this program's own)."""
+
+    gyro_scale_3_sigma_ppm: float = Field(20.0, gt=0.0, le=1e6, description="three standard uncertainties")
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of each triad's residuals")
+    condition_max: float = Field(100.0, ge=1.0, le=1e9, description="of the accelerometers' design")
+
+
+class Result(Outcome):
+    """Gyros from rests and turns, accelerometers from the rests."""
+
+    gyro: WholeTurns
+    accelerometer: TriadSummary
+
+
+def calibrated(
+    recordings: Sequence[Recording], site: Site, table: TableUncertainty, unit: Unit | None, limits: FerrarisLimits
+) -> Result:
+    """Both triads. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
+    gyro = analyse_ferraris(recordings, site, table, unit.gyro if unit else None)
+    force, _ = analyse_means(rest_means(recordings), site, table, unit.accelerometer if unit else None)
+    checks = (*_gyro_checks(gyro, limits), *_force_checks(force, limits))
+    known = (("gyro", gyro.noise_known), ("accelerometer", force.noise_known))
+    warnings = tuple(
+        f"the noise of the {triad} triad is not known: its uncertainties come from the residuals"
+        for triad, found in known
+        if not found
+    )
+    return Result(checks=checks, verdict=verdict(checks), warnings=warnings, gyro=gyro, accelerometer=force)
+
+
+def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
+    """Calibrations of both triads."""
+    return result.gyro.calibration, result.accelerometer.calibration
+
+
+def report(result: Result) -> Report:
+    """Coefficients of both triads, budgets, residuals and magnitudes."""
+    note = "U = b + K·ω: b from the rests and the sums of turns there and back, K from their differences."
+    force = result.accelerometer
+    tables = (
+        pictures.coefficient_table("Coefficients of the gyro triad", result.gyro.coefficients, note),
+        pictures.triad_table(force),
+        pictures.budget_table("accelerometer", force.budgets),
+        of_turns.rate_table(result.gyro),
+    )
+    return Report(sections=(*tables, *pictures.triad_figures(force), pictures.station_table(force.magnitudes)))
+
+
+RESIDUALS = "residuals, p-value of chi-square"
+
+
+def _gyro_checks(found: WholeTurns, limits: FerrarisLimits) -> list[Check]:
+    limit = Limit("ppm", maximum=limits.gyro_scale_3_sigma_ppm, source="ours")
+    checks = [
+        check(
+            f"gyro scale factor {axis}, 3σ", 3.0 * found.coefficient(f"K{k}{k}").standard_uncertainty / units.PPM, limit
+        )
+        for k, axis in enumerate(AXES, start=1)
+    ]
+    if found.p_value is not None:
+        checks.append(significance(f"gyro {RESIDUALS}", found.p_value, limits.residual_p_value_min))
+    return checks
+
+
+def _force_checks(found: TriadSummary, limits: FerrarisLimits) -> list[Check]:
+    checks = [check("accelerometer condition number", found.condition, Limit("1", maximum=limits.condition_max))]
+    if found.p_value is not None:
+        level, note = limits.residual_p_value_min, found.residual_note
+        checks.append(significance(f"accelerometer {RESIDUALS}", found.p_value, level, note))
+    return checks
