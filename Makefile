@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal thermometers imports misfit access acceptance
+VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal thermometers dwells imports misfit access acceptance
 FOREIGN := basil edie instro ixcom visa
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
 
@@ -55,7 +55,8 @@ check: $(VENV)/.ready  ## format, lint, types, import contracts
 	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/lint-imports --no-cache && $(BIN)/basedpyright
 
 validate: $(VENV)/.ready  ## Monte Carlo against theory over 1000 simulated units and more
-	@held=0; for part in $(VALIDATIONS); do echo "== $$part"; $(BIN)/python -m tests.validation.$$part || held=1; done; exit $$held
+	@held=0; for part in $(VALIDATIONS); do echo "== $$part"; $(BIN)/python -m tests.validation.$$part || held=1; done; \
+	ALL_FORMS=1 $(BIN)/python -m pytest -q -n 2 tests/storage/test_upgrades.py || held=1; exit $$held
 
 bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 	@kept=0; for part in $(BENCHMARKS); do $(BIN)/python -m $$part || kept=1; done; exit $$kept

@@ -4,7 +4,9 @@ from collections.abc import Callable
 from concurrent import futures
 from concurrent.futures import Future
 from contextvars import copy_context
-from threading import Thread
+from functools import partial
+from queue import Full, Queue
+from threading import Lock, Thread
 from typing import Generic, TypeVar
 
 T = TypeVar("T")
@@ -25,6 +27,40 @@ def in_background(name: str, work: Callable[[], T]) -> "Future[T]":
 
     Thread(target=copy_context().run, args=(run,), name=name, daemon=True).start()
     return outcome
+
+
+class WorkInOrder:
+    """Work that may hang, one piece after the other in one background thread; so much may wait and no more. For any
+    thread."""
+
+    def __init__(self, name: str, most: int) -> None:
+        """Set up with `most`: the number of pieces that may wait."""
+        self._name = name
+        self._waiting: Queue[tuple[Future[None], Callable[[], None]]] = Queue(most)
+        self._starting = Lock()
+        self._thread: Thread | None = None
+
+    def add(self, work: Callable[[], None]) -> "Future[None] | None":
+        """Have a piece done after those that wait; the future has its error. None: too many wait already."""
+        with self._starting:
+            if self._thread is None:
+                self._thread = Thread(target=self._run, name=self._name, daemon=True)
+                self._thread.start()
+        outcome: Future[None] = Future()
+        try:
+            self._waiting.put_nowait((outcome, partial(copy_context().run, work)))
+        except Full:
+            return None
+        return outcome
+
+    def _run(self) -> None:
+        while True:
+            outcome, work = self._waiting.get()
+            try:
+                work()
+                outcome.set_result(None)
+            except Exception as failure:  # raised again where the outcome is read
+                outcome.set_exception(failure)
 
 
 class NonBlockingQuery(Generic[T]):

@@ -17,12 +17,12 @@ from bench_service.campaigns.stores import Stores
 from bench_service.evidence.analyses import AnalysisService
 from bench_service.evidence.batches.runner import RunnerMaker
 from bench_service.evidence.batches.service import BatchService
-from bench_service.evidence.estimates import EstimateService
 from bench_service.evidence.imports import ImportService
 from bench_service.evidence.raw_data.nightly import NightlyStorage
 from bench_service.evidence.raw_data.service import RawDataService, StorageSettings
 from bench_service.evidence.recomputation import RecomputationService
 from bench_service.evidence.reports.service import ReportService
+from bench_service.evidence.so_far.service import EstimateService
 from bench_service.evidence.units import register
 from bench_service.evidence.upkeep import NightlyScrub, UpkeepService
 from bench_service.evidence.work_processes import WorkApart
@@ -199,6 +199,6 @@ class BenchService:
 
 def _estimates(stores: Stores, job_id: str) -> str:
     """Work out a job's estimates here: only a command's own service does, its numerics are loaded for that alone."""
-    from bench_service.evidence.estimating import Estimating
+    from bench_service.evidence.so_far.estimating import Estimating
 
     return Estimating(stores, stores.jobs.get).text(job_id)

@@ -258,6 +258,14 @@ CREATE TABLE idempotency_keys (
 	CONSTRAINT pk_idempotency_keys PRIMARY KEY ("key")
 );
 
+CREATE TABLE job_labels (
+	job_id VARCHAR NOT NULL, 
+	name VARCHAR NOT NULL, 
+	value VARCHAR NOT NULL, 
+	CONSTRAINT pk_job_labels PRIMARY KEY (job_id, name), 
+	CONSTRAINT fk_job_labels_job_id_jobs FOREIGN KEY(job_id) REFERENCES jobs (id)
+);
+
 CREATE TABLE jobs (
 	id VARCHAR NOT NULL, 
 	procedure VARCHAR NOT NULL, 
@@ -282,7 +290,7 @@ CREATE TABLE jobs (
 	started_at DATETIME, 
 	finished_at DATETIME, 
 	result_id VARCHAR, 
-	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, mounting VARCHAR, team VARCHAR DEFAULT '' NOT NULL, 
+	failure JSON, pause_requested BOOLEAN DEFAULT 0 NOT NULL, attempt INTEGER DEFAULT '1' NOT NULL, deadline_at DATETIME, queued_at DATETIME, not_before DATETIME, retries INTEGER DEFAULT '0' NOT NULL, retries_left INTEGER DEFAULT '0' NOT NULL, reservation VARCHAR, requested_by VARCHAR DEFAULT '' NOT NULL, prompt JSON, mounting VARCHAR, team VARCHAR DEFAULT '' NOT NULL, number INTEGER, 
 	CONSTRAINT pk_jobs PRIMARY KEY (id)
 );
 
@@ -538,15 +546,27 @@ CREATE INDEX ix_correction_decisions_correction_id_id ON correction_decisions (c
 
 CREATE INDEX ix_corrections_unit_id ON corrections (unit, id);
 
+CREATE INDEX ix_job_labels_name_job_id ON job_labels (name, job_id);
+
+CREATE INDEX ix_job_labels_name_value_job_id ON job_labels (name, value, job_id);
+
+CREATE INDEX ix_jobs_bench_id ON jobs (bench, id);
+
 CREATE INDEX ix_jobs_bench_state_priority_queued_at_id ON jobs (bench, state, priority, queued_at, id);
 
 CREATE INDEX ix_jobs_finished_at_id ON jobs (finished_at, id);
+
+CREATE INDEX ix_jobs_id_procedure_unit_bench_requested_by ON jobs (id, procedure, unit, bench, requested_by);
+
+CREATE UNIQUE INDEX ix_jobs_number ON jobs (number);
 
 CREATE INDEX ix_jobs_procedure_id ON jobs (procedure, id);
 
 CREATE INDEX ix_jobs_state_id ON jobs (state, id);
 
 CREATE INDEX ix_jobs_unit_id ON jobs (unit, id);
+
+CREATE INDEX ix_jobs_verdict_id ON jobs (verdict, id);
 
 CREATE INDEX ix_manual_demands_lease_id ON manual_demands (lease, id);
 
@@ -564,6 +584,8 @@ CREATE INDEX ix_recordings_job_id_id ON recordings (job_id, id);
 
 CREATE INDEX ix_recordings_raw_state_stored_bytes ON recordings (raw, state, stored_bytes);
 
+CREATE INDEX ix_recordings_simulated_id ON recordings (simulated, id);
+
 CREATE INDEX ix_recordings_state_stored_bytes ON recordings (state, stored_bytes);
 
 CREATE INDEX ix_recordings_unit_id ON recordings (unit, id);
@@ -576,9 +598,15 @@ CREATE INDEX ix_result_corrections_correction_id ON result_corrections (correcti
 
 CREATE INDEX ix_result_recordings_recording_id ON result_recordings (recording_id);
 
+CREATE INDEX ix_results_id_name_unit_job_id ON results (id, name, unit, job_id);
+
 CREATE INDEX ix_results_job_id_id ON results (job_id, id);
 
+CREATE INDEX ix_results_name_id ON results (name, id);
+
 CREATE INDEX ix_results_unit_id ON results (unit, id);
+
+CREATE INDEX ix_results_verdict_id ON results (verdict, id);
 
 CREATE INDEX ix_sessions_account ON sessions (account);
 

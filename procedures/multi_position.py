@@ -14,12 +14,13 @@ from pydantic import Field
 from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.extra_terms import ExtraFit, Kind, TermEstimate, fit_terms, require_terms, terms_of
 from procedures.analysis.calibration.misfit import MISFIT_MAX
-from procedures.analysis.calibration.plan import TriadPlan, predicted_parts
+from procedures.analysis.calibration.plan import IN_RUN_SOURCE, TriadPlan, predicted_parts
 from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
 from procedures.analysis.calibration.station_means import StationMeans, launch_warnings, station_means
 from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
 from procedures.analysis.calibration.triad_analysis import analyse_inputs, noise_of_means
+from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.coefficient_name import CoefficientName
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration, triad_calibration
@@ -185,6 +186,33 @@ def _extended(triad: str, means: StationMeans, fit: ExtraFit) -> Extended:
 
 def _of(extended: Sequence[Extended], summary: TriadSummary) -> Extended | None:
     return next((e for e in extended if e.calibration.triad == summary.calibration.triad), None)
+
+
+def triad_checks(
+    t: TriadSummary, in_run_maximum: float, condition_max: float, residual_p_value_min: float
+) -> list[Check]:
+    """Checks of a triad's calibration: error per axis in sample, condition, and residuals by p-value or misfit."""
+    triad, m = t.calibration.triad, t.magnitudes
+    unit, size = units.DISPLAY[m.unit]
+    checks = [
+        check(
+            f"{triad} bias in run, δ/√3",
+            m.per_axis / size,
+            Limit(unit, maximum=in_run_maximum, source=IN_RUN_SOURCE),
+            m.per_axis_sd / size,
+            degrees_of_freedom=len(m.after) - 1.0,
+        ),
+        check(f"{triad} condition number", t.condition, Limit("1", maximum=condition_max)),
+    ]
+    if t.p_value is not None:
+        name = f"{triad} residuals, p-value of chi-square"
+        checks.append(significance(name, t.p_value, residual_p_value_min, t.residual_note))
+    elif t.misfit is not None:
+        limit = Limit("1", maximum=MISFIT_MAX, source="ours")
+        checks.append(
+            check(f"{triad} residuals over what noise and table allow", t.misfit, limit, note=f"worst: {t.worst}")
+        )
+    return checks
 
 
 def _checks(t: TriadSummary, extended: Extended | None, params: FitParameters) -> list[Check]:

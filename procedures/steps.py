@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from procedures.analysis.recursive_bias.dwell import LiveDwell
 from procedures.analysis.thermal.profile_progress import (
     AIR,
     CASE,
@@ -27,6 +28,7 @@ from procedures.bench.errors import DeviceFault, SoakNotReached
 from procedures.bench.imu import Stream
 from procedures.core.errors import MissingChannel
 from procedures.core.recording import Channel, Quantity, Station
+from procedures.core.stop_rule import StopRule
 from procedures.core.temperature_profile import ProfileLeg, TemperatureProfile
 from procedures.core.turn import Turn
 
@@ -38,7 +40,10 @@ CHAMBER_CHANNELS = tuple(Channel(name, Quantity.TEMPERATURE, "degC", CHAMBER_SCA
 
 
 async def record_station(bench: Bench, station: Station) -> Stream:
-    """Switch off for the station's `power_off_s`, on (no-op where it is on), move, settle, begin its recording."""
+    """Switch off for the station's `power_off_s`, on (no-op where it is on), move, settle, begin its recording.
+
+    A station with a stop rule is recorded until the rule ends it, at most `record_s`.
+    """
     if station.power_off_s > 0.0:
         await bench.supply.switch_off()
         await bench.clock.sleep(station.power_off_s)
@@ -46,7 +51,22 @@ async def record_station(bench: Bench, station: Station) -> Stream:
     if station.angles is not None:
         await bench.turntable.move_to(station.angles)
     await bench.clock.sleep(station.settle_s)
-    return bench.imu.record(station.record_s, station)
+    stream = bench.imu.record(station.record_s, station)
+    return stream if station.until is None else replace(stream, blocks=_until_enough(stream, station.until))
+
+
+async def _until_enough(stream: Stream, rule: StopRule) -> Blocks:
+    """The stream's blocks up to the sample with which the rule ends the dwell."""
+    live = LiveDwell(rule, stream.channels, stream.rate_hz, stream.station.record_s)
+    try:
+        async for block in stream.blocks:
+            last = live.add(block)
+            yield block if last is None else block[:last]
+            if last is not None:
+                return
+    finally:
+        if isinstance(stream.blocks, AsyncGenerator):
+            await stream.blocks.aclose()
 
 
 async def _switch_on(bench: Bench, station: Station) -> None:

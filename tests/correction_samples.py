@@ -6,9 +6,9 @@ from procedures.analysis.thermal.converter import zero_and_scale
 from procedures.analysis.thermal.normalised import fit_normalised
 from procedures.core.arrays import Array
 from procedures.core.converter import ConverterModel, Normalised
-from procedures.core.gyro_thermal import GyroPolynomial, GyroThermalCorrection
+from procedures.core.temperature.gyros import GyroPolynomial, GyroThermalCorrection
+from procedures.core.temperature.thermometers import SensorCorrection, ThermometerCorrection
 from procedures.core.thermal_correction import AxisCorrection, Form, ThermalCorrection
-from procedures.core.thermometers import SensorCorrection, ThermometerCorrection
 from procedures.core.unit_correction import UnitCorrection
 
 

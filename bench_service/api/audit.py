@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import logging
 from datetime import datetime
 from functools import partial
 from typing import Annotated, Any
@@ -23,12 +24,13 @@ from bench_service.api.http.dependencies import (
     as_utf8,
 )
 from bench_service.api.http.errors import FieldError, problems, respond
-from bench_service.background import in_background
+from bench_service.background import WorkInOrder
 from bench_service.formats.plain_json import faults, mended, shown
 from bench_service.mapping import copied
-from bench_service.telemetry.audit import AuditEntry, AuditTrail, record
+from bench_service.telemetry.audit import AuditEntry, AuditTrail, write
 from bench_service.telemetry.log_context import request_id
 from bench_service.telemetry.redaction import without_tokens
+from bench_service.wall_clock import new_id, now
 
 router = APIRouter(prefix="/api/v1/audit", tags=["audit"])
 
@@ -80,6 +82,11 @@ STOP = "stop"
 """Name of the route that stops a bench."""
 STOP_S = 0.3
 """Longest time that the answer to a stop waits for its audit entry; a later entry is written all the same [s]."""
+STOPS_WAITING = 1000
+"""Maximum number of stops whose entries wait for a database that hangs; of further ones the log has the entry. A thread
+for each would leave none for the stops themselves, were somebody to send them by the thousand."""
+
+log = logging.getLogger(__name__)
 
 
 class Audited:
@@ -88,6 +95,7 @@ class Audited:
     def __init__(self, app: ASGIApp, trail: AuditTrail) -> None:
         self._app = app
         self._trail = trail
+        self._of_stops = WorkInOrder("audit of stops", STOPS_WAITING)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http" or scope["method"] in READING:
@@ -123,12 +131,17 @@ class Audited:
             return
         act.noted = True
         target = headers.get(b"location", b"").decode() or shown(act.request.scope["path"])
-        work = partial(record, self._trail, act.who, route.name, target, str(status), **act.detail())
+        entry = AuditEntry(new_id(), now(), act.who, route.name, target, str(status), act.detail())
+        work = partial(write, self._trail, entry)
         if route.name != STOP:
             await run_in_threadpool(work)
             return
         # in a thread of its own, and not waited for for long: a stop is answered while the database is not
-        await asyncio.wait((asyncio.wrap_future(in_background("audit of a stop", work)),), timeout=STOP_S)
+        written = self._of_stops.add(work)
+        if written is None:
+            log.error("an entry of the audit trail could not be written (%d wait already): %s", STOPS_WAITING, entry)
+        else:
+            await asyncio.wait((asyncio.wrap_future(written),), timeout=STOP_S)
 
 
 class _Act:

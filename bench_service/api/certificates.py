@@ -42,7 +42,7 @@ class CheckedCertificate(BaseModel):
     faults: list[str] = Field(description="What is wrong; empty where it is valid")
 
 
-@router.post("/check", responses=problems(413))
+@router.post("/check", responses=problems(413, 507))
 async def check_certificate_file(
     service: Service,
     certificate: Annotated[UploadFile, File(description="The certificate, XML")],

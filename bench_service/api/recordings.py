@@ -22,6 +22,7 @@ from bench_service.formats.import_request import ImportFile
 from bench_service.formats.overview import overview
 from bench_service.formats.plain_json import shown
 from bench_service.formats.proposal.model import Proposal
+from bench_service.jobs.numbers import job_id_of
 from bench_service.mapping import copied
 from bench_service.model.raw_data import RawState
 from bench_service.model.records import RecordingState, StoredRecording
@@ -89,19 +90,20 @@ DATA: dict[int | str, dict[str, object]] = {
 }
 
 
-@router.get("", responses=problems())
+@router.get("", responses=problems(404))
 def list_recordings(
     service: Service,
     search: Searched,
-    job: Annotated[str | None, Query(max_length=100)] = None,
+    job: Annotated[str | None, Query(max_length=100, description="Of this job: its id, or its number")] = None,
     unit: Annotated[str | None, Query(max_length=100)] = None,
     simulated: bool | None = None,
     after: After = None,
     limit: Limit = 50,
 ) -> RecordingPage:
     """List the recordings, newest first."""
+    job_id = None if job is None else job_id_of(service.stores, job)
     page = service.stores.recordings.list(
-        job_id=job, unit=unit, simulated=simulated, search=search, after=after, limit=limit
+        job_id=job_id, unit=unit, simulated=simulated, search=search, after=after, limit=limit
     )
     return RecordingPage(items=[RecordingView.of(r) for r in page.items], next=page.next)
 

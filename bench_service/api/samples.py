@@ -11,7 +11,8 @@ from fastapi.responses import StreamingResponse
 
 from bench_service.api.http.admitted_stream import AdmittedStream, place_in_turn
 from bench_service.api.http.dependencies import Service
-from bench_service.api.http.errors import problems
+from bench_service.api.http.errors import binary, problems
+from bench_service.api.http.job_numbers import JobByNumber
 from bench_service.api.recordings import EXPORTS
 from bench_service.evidence.recordings import require_undamaged
 from bench_service.evidence.samples import treatment_of
@@ -35,7 +36,7 @@ DATA: dict[int | str, dict[str, object]] = {
     200: {"description": "A file in the format that was asked for", "content": {"application/octet-stream": BYTES}}
 }
 ZIP: dict[int | str, dict[str, object]] = {
-    200: {"description": "A zip with a file a recording and manifest.json", "content": {"application/zip": BYTES}}
+    200: {"description": "A zip with a file a recording and manifest.json", "content": binary("application/zip")}
 }
 
 
@@ -83,7 +84,12 @@ async def read_samples(
     return await _admitted(begun, form, "application/octet-stream", f"{recording_id}.{form.value}")
 
 
-@router.get("/jobs/{job_id}/samples", response_class=StreamingResponse, responses={**problems(404, 409), **ZIP})
+@router.get(
+    "/jobs/{job_id}/samples",
+    response_class=StreamingResponse,
+    responses={**problems(404, 409), **ZIP},
+    dependencies=[JobByNumber],
+)
 async def read_samples_of_job(
     job_id: str,
     service: Service,

@@ -30,7 +30,7 @@ AT_ONCE = 2
 """Number of processes."""
 MANY_VALUES = 5_000_000
 """Number of samples of all channels from which an analysis takes longer than handing its parts over."""
-IDLE_S = 10.0
+IDLE_S = 60.0
 """Time without work after which the processes end [s, real time]."""
 MODULES = (
     "procedures.launches",

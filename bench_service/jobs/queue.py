@@ -32,6 +32,8 @@ class QueueEntry:
     attempt: int
     not_before: datetime | None = None
     reservation: str | None = None
+    team: str = ""
+    """Team of the campaign run to which the job belongs: it need not wait for what that team has reserved."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,8 @@ class BenchQueue:
         mine = next((r for r in self.reservations if r.id == entry.reservation), None)
         for reservation in self.reservations:
             concerned = {Reserved.BENCH: self.bench, Reserved.UNIT: entry.unit}[reservation.kind]
-            if reservation.name == concerned and not reservation.admits(mine):
+            same_team = bool(entry.team) and entry.team == reservation.team
+            if reservation.name == concerned and not same_team and not reservation.admits(mine):
                 yield reservation
 
 

@@ -3,7 +3,7 @@
 Every method is one transaction: it commits, or it raises and nothing of it remains.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Protocol
@@ -32,6 +32,14 @@ class JobStore(Protocol):
 
     def get(self, job_id: str) -> Job:
         """Return one job by its id. Raises `NotFound`."""
+        ...
+
+    def id_of(self, number: int) -> str:
+        """Return the id of the job with a number. Raises `NotFound`."""
+        ...
+
+    def numbers(self, ids: Sequence[str]) -> dict[str, int]:
+        """Numbers of jobs by their ids; an id of none is left out."""
         ...
 
     def list(

@@ -59,6 +59,8 @@ LEGAL: dict[JobState, frozenset[JobState]] = {
 """From each state, the states that may follow. From failed to queued only where `Job.resumable` allows it."""
 
 FAULTS = (BenchError, NotSettled, SoakNotReached, NotPowered, DeviceFault, DeviceBusy, Disconnected)
+NUMBER_DIGITS = 9
+"""Digits of the largest number of a job."""
 BENCH_FAULTS = frozenset(fault.__name__ for fault in FAULTS)
 """Kinds of transient failure of the bench, which a retry may cure; a demand out of range is not one."""
 
@@ -117,6 +119,8 @@ class Job(JobTerms):
     finished_at: datetime | None = None
     result_id: str | None = None
     failure: Failure | None = None
+    number: int = 0
+    """Short number for people, counted from 1 in each database; 0 before the job is stored."""
 
     @property
     def resumable(self) -> bool:
@@ -124,6 +128,12 @@ class Job(JobTerms):
         if self.state is JobState.FAILED:
             return self.failure is not None and self.failure.kind in RESUMABLE
         return self.state in (JobState.PAUSED, JobState.INTERRUPTED)
+
+
+def job_number(text: str) -> int | None:
+    """Read a job's number as people write it, 123 or #123; None for any other text."""
+    digits = text.removeprefix("#")
+    return int(digits) if digits.isascii() and digits.isdigit() and len(digits) <= NUMBER_DIGITS else None
 
 
 @dataclass(frozen=True)

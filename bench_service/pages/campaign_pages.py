@@ -44,10 +44,18 @@ def campaigns_page(request: Request) -> HTMLResponse:
 @router.get("/campaign-runs/{run_id}")
 def campaign_run_page(run_id: str, request: Request) -> HTMLResponse:
     """Page of a campaign run: its steps, their results, and the reason that it waits for."""
-    run = service_of(request).stores.campaigns.run(run_id)
+    stores = service_of(request).stores
+    run = stores.campaigns.run(run_id)
+    jobs = [job for step in run.steps for job in (step.job_id, *step.earlier_jobs) if job]
     missed = {step.name: [c for c in step.checks if not c.passed] for step in run.steps}
     done = sum(s.finished_at is not None or s.state is StepState.SKIPPED for s in run.steps)
-    context = {"run": run, "missed": missed, "explanation": _explanation(run), "done": done}
+    context = {
+        "run": run,
+        "missed": missed,
+        "explanation": _explanation(run),
+        "done": done,
+        "numbers": stores.jobs.numbers(jobs),
+    }
     return templates.TemplateResponse(request, "campaign_run.html", context)
 
 

@@ -45,8 +45,10 @@ def recordings_page(request: Request) -> HTMLResponse:
 @router.get("/recordings/{recording_id}")
 def recording_page(recording_id: str, request: Request) -> HTMLResponse:
     """Page of a recording: what it is, and its samples over any stretch."""
-    stored = service_of(request).stores.recordings.get(recording_id)
-    return _page(request, "recording.html", recording=stored)
+    stores = service_of(request).stores
+    stored = stores.recordings.get(recording_id)
+    numbers = stores.jobs.numbers([stored.job_id] if stored.job_id else [])
+    return _page(request, "recording.html", recording=stored, numbers=numbers)
 
 
 @router.get("/audit")

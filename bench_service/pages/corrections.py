@@ -3,10 +3,10 @@
 import numpy as np
 
 from procedures.core.converter import ConverterTriad, Normalised
-from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.report import Cell, Table
+from procedures.core.temperature.gyros import GyroThermalCorrection
+from procedures.core.temperature.thermometers import ThermometerCorrection
 from procedures.core.thermal_correction import COEFFICIENTS, ThermalCorrection
-from procedures.core.thermometers import ThermometerCorrection
 from procedures.core.unit_correction import UnitCorrection
 from procedures.core.units import DEG_PER_HOUR
 

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 
 from bench_service.formats.calibration_exports.forms import CalibrationForm
+from bench_service.jobs.numbers import job_id_of
 from bench_service.model.job import FINAL, Event, Job, JobState
 from bench_service.model.records import StoredResult
 from bench_service.pages.corrections import correction_table
@@ -132,6 +133,7 @@ def home(request: Request) -> HTMLResponse:
 def job_page(job_id: str, request: Request) -> HTMLResponse:
     """Page of a job: progress, stations, recordings, and its result once there is one."""
     service = service_of(request)
+    job_id = job_id_of(service.stores, job_id)
     last_event, _ = service.stores.jobs.last_event(job_id)  # before the job: what comes later reloads the page
     job = service.stores.jobs.get(job_id)
     live = service.live.of_job(job)
@@ -160,7 +162,9 @@ def job_page(job_id: str, request: Request) -> HTMLResponse:
 def result_page(result_id: str, request: Request) -> HTMLResponse:
     """Page of a result: verdict, checks, tables, plots, lineage."""
     service = service_of(request)
-    return _page(request, "result.html", **_reported(service, service.stores.results.get(result_id)))
+    result = service.stores.results.get(result_id)
+    numbers = service.stores.jobs.numbers([result.job_id] if result.job_id else [])
+    return _page(request, "result.html", numbers=numbers, **_reported(service, result))
 
 
 @router.get("/units/{serial}")

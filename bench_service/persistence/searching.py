@@ -1,30 +1,25 @@
-"""Searches of jobs, recordings and results as SQL. Knows how labels and file names stand in JSON documents.
+"""Searches of jobs, recordings and results as SQL. Knows how names of files stand in JSON documents.
 
 Ids sort by time, so a moment bounds the ids too: a search for an old month does not walk over everything newer.
 """
 
+from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Any, TypeVar
 
-from sqlalchemy import ColumnElement, Select, exists, or_, select
+from sqlalchemy import ColumnElement, Select, exists, func, or_, select
 from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.orm import InstrumentedAttribute
 from sqlalchemy.sql.functions import FunctionElement
 
+from bench_service.model.job import job_number
 from bench_service.model.search import LabelSought, Search
 from bench_service.persistence.tables.evidence import RecordingRow, ResultRow
-from bench_service.persistence.tables.jobs import JobRow
+from bench_service.persistence.tables.jobs import JobLabelRow, JobRow
 
 S = TypeVar("S", bound=Select[Any])
 CLOCK_DIFFERS = timedelta(hours=1)
 """Longest time by which the moment in an id may differ from the moment that is stored with it."""
-
-
-class JsonPairs(FunctionElement[Any]):
-    """Keys and values of a JSON object of texts, as rows."""
-
-    name = "json_pairs"
-    inherit_cache = True
 
 
 class ImportedNames(FunctionElement[Any]):
@@ -39,11 +34,11 @@ def find_jobs(query: S, search: Search) -> S:
     query = _made(query, JobRow.id, JobRow.created_at, search)
     if search.verdict is not None:
         query = query.where(JobRow.verdict == search.verdict.value)
-    query = query.where(*(_has_label(label) for label in search.labels))
+    query = query.where(*(_has_label(label, JobRow.id) for label in search.labels))
     if search.text is None:
         return query
     named = (JobRow.id, JobRow.procedure, JobRow.unit, JobRow.bench, JobRow.requested_by)
-    return query.where(or_(*(_holds(column, search.text) for column in named), _label_holds(search.text)))
+    return query.where(or_(_one_holds(named, search.text), _of_job(search.text, JobRow.id)))
 
 
 def find_recordings(query: S, search: Search) -> S:
@@ -52,29 +47,28 @@ def find_recordings(query: S, search: Search) -> S:
     job = RecordingRow.job_id == JobRow.id
     if search.verdict is not None:
         query = query.where(exists().where(job, JobRow.verdict == search.verdict.value))
-    query = query.where(*(exists().where(job, _has_label(label)) for label in search.labels))
+    query = query.where(*(_has_label(label, RecordingRow.job_id) for label in search.labels))
     if search.text is None:
         return query
     station = RecordingRow.station["label"].as_string()
     files = ImportedNames(RecordingRow.source).table_valued("name")
     named = (RecordingRow.id, RecordingRow.unit, RecordingRow.bench, RecordingRow.job_id, station)
-    in_job = exists().where(job, _label_holds(search.text))
+    in_job = _of_job(search.text, RecordingRow.job_id)
     in_file = exists(select(files.c.name).where(_holds(files.c.name, search.text)))
-    return query.where(or_(*(_holds(column, search.text) for column in named), in_job, in_file))
+    return query.where(or_(_one_holds(named, search.text), in_job, in_file))
 
 
 def find_results(query: S, search: Search) -> S:
     """Restrict a query of results; labels are those of the job whose recordings were analysed."""
     query = _made(query, ResultRow.id, ResultRow.created_at, search)
-    job = ResultRow.job_id == JobRow.id
     if search.verdict is not None:
         query = query.where(ResultRow.verdict == search.verdict.value)
-    query = query.where(*(exists().where(job, _has_label(label)) for label in search.labels))
+    query = query.where(*(_has_label(label, ResultRow.job_id) for label in search.labels))
     if search.text is None:
         return query
     named = (ResultRow.id, ResultRow.name, ResultRow.unit, ResultRow.job_id)
-    in_job = exists().where(job, _label_holds(search.text))
-    return query.where(or_(*(_holds(column, search.text) for column in named), in_job))
+    in_job = _of_job(search.text, ResultRow.job_id)
+    return query.where(or_(_one_holds(named, search.text), in_job))
 
 
 def _made(query: S, key: InstrumentedAttribute[str], at: InstrumentedAttribute[datetime], search: Search) -> S:
@@ -95,29 +89,32 @@ def first_id(moment: datetime, shift: timedelta = timedelta(0)) -> str:
     return f"{digits[:8]}-{digits[8:]}"
 
 
-def _has_label(label: LabelSought) -> ColumnElement[bool]:
-    pairs = JsonPairs(JobRow.labels).table_valued("key", "value")
-    wanted = [pairs.c.key == label.name] + ([] if label.value is None else [pairs.c.value == label.value])
-    return exists(select(pairs.c.key).where(*wanted))
+def _has_label(label: LabelSought, job: ColumnElement[Any] | InstrumentedAttribute[Any]) -> ColumnElement[bool]:
+    """Restrict to the jobs that have a label: a walk over an index of the labels, however long the history."""
+    having = select(JobLabelRow.job_id).where(JobLabelRow.name == label.name)
+    return job.in_(having if label.value is None else having.where(JobLabelRow.value == label.value))
 
 
-def _label_holds(text: str) -> ColumnElement[bool]:
-    pairs = JsonPairs(JobRow.labels).table_valued("key", "value")
-    return exists(select(pairs.c.key).where(or_(_holds(pairs.c.key, text), _holds(pairs.c.value, text))))
+def _label_holds(text: str, job: ColumnElement[Any] | InstrumentedAttribute[Any]) -> ColumnElement[bool]:
+    return job.in_(select(JobLabelRow.job_id).where(_one_holds((JobLabelRow.name, JobLabelRow.value), text)))
+
+
+def _one_holds(columns: Sequence[Any], text: str) -> ColumnElement[bool]:
+    """Return whether one of some columns holds a text: one comparison with all of them in a row, a line each."""
+    joined = func.coalesce(columns[0], "")
+    for column in columns[1:]:
+        joined = joined.concat("\n").concat(func.coalesce(column, ""))
+    return or_(*(_holds(column, text) for column in columns)) if "\n" in text else _holds(joined, text)
+
+
+def _of_job(text: str, job: ColumnElement[Any] | InstrumentedAttribute[Any]) -> ColumnElement[bool]:
+    """Restrict to the jobs with a label that holds a text, and to the one whose number the text is."""
+    labelled, number = _label_holds(text, job), job_number(text)
+    return labelled if number is None else or_(labelled, job.in_(select(JobRow.id).where(JobRow.number == number)))
 
 
 def _holds(column: Any, text: str) -> ColumnElement[bool]:
     return column.icontains(text, autoescape=True)
-
-
-@compiles(JsonPairs, "sqlite")
-def _pairs_sqlite(element: JsonPairs, compiler: Any, **given: Any) -> str:
-    return f"json_each({compiler.process(element.clauses, **given)})"
-
-
-@compiles(JsonPairs, "postgresql")
-def _pairs_postgres(element: JsonPairs, compiler: Any, **given: Any) -> str:
-    return f"json_each_text({compiler.process(element.clauses, **given)})"
 
 
 @compiles(ImportedNames, "sqlite")

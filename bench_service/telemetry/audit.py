@@ -69,7 +69,11 @@ class AuditTrail(Protocol):
 
 def record(trail: AuditTrail, who: str, action: str, target: str, outcome: str, **detail: Any) -> None:
     """Add an entry to the trail. Never raises for a failing database: the act was done, with or without its record."""
-    entry = AuditEntry(new_id(), now(), who, action, target, outcome, detail)
+    write(trail, AuditEntry(new_id(), now(), who, action, target, outcome, detail))
+
+
+def write(trail: AuditTrail, entry: AuditEntry) -> None:
+    """Add an entry to the trail, or to the log where the database fails. Never raises for that."""
     try:
         trail.add(entry)
     except ServiceError as error:

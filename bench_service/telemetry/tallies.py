@@ -8,17 +8,19 @@ process restarts, then as the last.
 
 from bisect import bisect_left
 from collections import Counter
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from threading import Lock
 from typing import Protocol
 
+from bench_service.background import in_background
 from bench_service.wall_clock import monotonic_s, now
 
 OVERLAP = timedelta(seconds=60)
 PAGE = 5000
 RECORDINGS_S = 30.0
-"""Maximum age of the sum over all recordings [s]: it walks an index."""
+"""Age at which the sum over all recordings is made anew [s]: it walks an index, beside the scrapes."""
 DURATION_S = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5)
 """Upper ends of the buckets of durations and waits [s]; one more bucket has no upper end."""
 
@@ -78,6 +80,7 @@ class Tallies:
         self.stations = 0
         self.recorded_bytes = 0
         self._recorded_at_s: float | None = None
+        self._adding: Future[int] | None = None
         self._lock = Lock()
         self._begin_anew()
 
@@ -108,9 +111,22 @@ class Tallies:
                 self._newest = min(self._newest, at)
                 self._recent = {k: None for k in self._recent if k[1] >= self._newest - OVERLAP}
             self.stations = self._ended_stations + self.store.stations_of_open_jobs()
-            if self._recorded_at_s is None or monotonic_s() - self._recorded_at_s > RECORDINGS_S:
-                self.recorded_bytes = self.store.recorded_bytes()
-                self._recorded_at_s = monotonic_s()
+            self._add_up_recordings()
+
+    def _add_up_recordings(self) -> None:
+        """Make the sum over all recordings: the first one here, later ones in a thread of their own.
+
+        An error of the thread is raised by the scrape after it.
+        """
+        if self._recorded_at_s is None:
+            self.recorded_bytes = self.store.recorded_bytes()
+            self._recorded_at_s = monotonic_s()
+        if self._adding is not None and self._adding.done():
+            adding, self._adding = self._adding, None
+            self.recorded_bytes = adding.result()
+        if self._adding is None and monotonic_s() - self._recorded_at_s > RECORDINGS_S:
+            self._adding = in_background("sum of recordings", self.store.recorded_bytes)
+            self._recorded_at_s = monotonic_s()
 
     def _count(self, ending: Ending) -> None:
         key = (ending.id, ending.finished_at)

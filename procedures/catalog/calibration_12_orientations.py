@@ -14,9 +14,7 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis.calibration.estimator import Weighting
-from procedures.analysis.calibration.misfit import MISFIT_MAX
 from procedures.analysis.calibration.plan import (
-    IN_RUN_SOURCE,
     TriadPlan,
     basis,
     in_run_check,
@@ -32,16 +30,18 @@ from procedures.analysis.calibration.station_means import launch_warnings
 from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS, windows
 from procedures.analysis.calibration.summary import TriadSummary
 from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers, analyse_gyros
+from procedures.analysis.recursive_bias.dwell import DwellsSaved, dwells_saved
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units
 from procedures.core.errors import BadParameter, Undetermined
 from procedures.core.frames import orientation_beta_gamma, orientation_gamma_beta
 from procedures.core.imu_model import COEFFICIENT_NAMES, TriadCalibration
-from procedures.core.limits import Check, Limit, PlannedCheck, check, significance, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
-from procedures.multi_position import predicted
+from procedures.dwells import StopAt, saved_table
+from procedures.multi_position import predicted, triad_checks
 from procedures.procedure import Context, Outcome, Parameters, Prediction, Procedure
 from procedures.reports import calibration as pictures
 from procedures.site_parameters import TableParameters, declared_table
@@ -81,6 +81,9 @@ class Params(TableParameters):
     )
     dwell_s: float | None = Field(None, ge=1.0, le=86_400.0, description="None: the unit's averaging time")
     settle_s: float = Field(2.0, ge=0.0, le=3600.0)
+    stop_at: StopAt | None = Field(
+        None, description="end each dwell when its means are known so well; dwell_s is longest"
+    )
     weighting: Weighting = Field(
         "noise_and_table",
         description="noise_and_table: least squares that allows for the table's declared accuracy; noise: the table's "
@@ -102,6 +105,9 @@ class Result(Outcome):
     thermal: ThermalShare | None = Field(
         None, exclude_if=lambda share: share is None, description="of the accelerometers, where they were corrected"
     )
+    dwells: DwellsSaved | None = Field(
+        None, exclude_if=lambda saved: saved is None, description="of a stop rule: each dwell, and the time saved"
+    )
 
 
 def resolve(params: Params, context: Context) -> Params:
@@ -109,7 +115,7 @@ def resolve(params: Params, context: Context) -> Params:
     full = params.filled({"dwell_s": context.unit.averaging_time_s, **declared_table(context)})
     require_correctable(full.thermal_correction, full.dwell_s, context.unit)
     full.require_sources(context, full.thermal_correction == "current")
-    return full
+    return full if full.stop_at is None else full.model_copy(update={"stop_at": full.stop_at.resolved(context.unit)})
 
 
 def schedule(params: Params) -> tuple[Station, ...]:
@@ -126,6 +132,7 @@ def schedule(params: Params) -> tuple[Station, ...]:
             params.settle_s,
             params.dwell_s,
             temperatures=params.thermal_correction == "current",
+            until=None if params.stop_at is None else params.stop_at.rule,
         )
         for i, (beta, gamma) in enumerate(params.orientations)
     )
@@ -134,11 +141,14 @@ def schedule(params: Params) -> tuple[Station, ...]:
 def predict(params: Params, context: Context) -> Prediction:
     """Duration, the uncertainty of every coefficient, and the limits out of reach. Raises `Undetermined`."""
     params = resolve(params, context)
+    longest_s = params.dwell_s or 0.0
+    params = _as_expected(params)
     stations = schedule(params)
     plans = [_plan(triad, params, context) for triad in TRIAD_NAMES]
     _require_scalar(params, plans[1])
     uncertainties = tuple(u for plan in plans for u in predicted(plan))
     thermal = (_NOT_PREDICTED,) if params.thermal_correction == "current" else ()
+    thermal += () if params.stop_at is None else params.stop_at.warnings(longest_s)
     duration_s = float(windows(stations, context.bench.axis_motion)[-1, 1])
     rests_on = basis(plans) if uncertainties else ""
     return Prediction(duration_s, uncertainties, _warnings(params, plans) + thermal, rests_on)
@@ -168,7 +178,15 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     second, share, doubts = analyse_accelerometers(recordings, site, uncertainty, accelerometer, settings)
     checks = tuple(c for t in (first, second) for c in _checks(t, params.limits))
     warnings = _warnings(params, plans) + launch_warnings(recordings) + doubts
-    return Result(checks=checks, verdict=verdict(checks), warnings=warnings, triads=(first, second), thermal=share)
+    triads = (first, second)
+    return Result(
+        checks=checks,
+        verdict=verdict(checks),
+        warnings=warnings,
+        triads=triads,
+        thermal=share,
+        dwells=dwells_saved(recordings),
+    )
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
@@ -184,7 +202,7 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
 
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:
     """Checks of the error per axis δ/√3, in sample."""
-    params = resolve(params, context)
+    params = _as_expected(resolve(params, context))
     limits = params.limits
     maxima = {"gyro": limits.gyro_bias_in_run_deg_h, "accelerometer": limits.accelerometer_bias_in_run_m_s2}
     level = limits.residual_p_value_min
@@ -203,7 +221,15 @@ def report(result: Result) -> Report:
     figures = [f for t in result.triads for f in pictures.triad_figures(t)]
     stations = [pictures.station_table(m) for m in magnitudes]
     thermal = [] if result.thermal is None else pictures.thermal_tables(result.thermal, magnitudes[0].labels)
-    return Report(sections=(*tables, *thermal, *figures, *stations))
+    dwells = [] if result.dwells is None else [saved_table(result.dwells)]
+    return Report(sections=(*tables, *dwells, *thermal, *figures, *stations))
+
+
+def _as_expected(params: Params) -> Params:
+    """The parameters with the dwell that the stop rule is expected to make of it, for plans."""
+    if params.stop_at is None or params.dwell_s is None:
+        return params
+    return params.model_copy(update={"dwell_s": params.stop_at.expected_s(params.dwell_s)})
 
 
 def _plan(triad: str, params: Params, context: Context) -> TriadPlan:
@@ -253,33 +279,13 @@ def _warnings(params: Params, plans: Sequence[TriadPlan]) -> tuple[str, ...]:
 
 
 def _checks(t: TriadSummary, limits: Limits) -> list[Check]:
-    triad, m = t.calibration.triad, t.magnitudes
-    unit, size = units.DISPLAY[m.unit]
-    gyro = triad == "gyro"
+    gyro = t.calibration.triad == "gyro"
     in_run = limits.gyro_bias_in_run_deg_h if gyro else limits.accelerometer_bias_in_run_m_s2
-    checks = [
-        check(
-            f"{triad} bias in run, δ/√3",
-            m.per_axis / size,
-            Limit(unit, maximum=in_run, source=IN_RUN_SOURCE),
-            m.per_axis_sd / size,
-            degrees_of_freedom=len(m.after) - 1.0,
-        ),
-        check(f"{triad} condition number", t.condition, Limit("1", maximum=limits.condition_max)),
-    ]
-    if t.p_value is not None:
-        name = f"{triad} residuals, p-value of chi-square"
-        checks.append(significance(name, t.p_value, limits.residual_p_value_min, t.residual_note))
-    elif t.misfit is not None:
-        limit = Limit("1", maximum=MISFIT_MAX, source="ours")
-        checks.append(
-            check(f"{triad} residuals over what noise and table allow", t.misfit, limit, note=f"worst: {t.worst}")
-        )
-    return checks
+    return triad_checks(t, in_run, limits.condition_max, limits.residual_p_value_min)
 
 
 PROCEDURE = Procedure(
-    *("calibration_12_orientations", "Calibration in twelve orientations", "1.4.0"),
+    *("calibration_12_orientations", "Calibration in twelve orientations", "1.5.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report, calibrations),
     uses_corrections=lambda params: ("thermal", "gyros") if params.thermal_correction == "current" else (),
     quantities=quantities,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, MissingChannel, UnfitRecording
 from procedures.core.measured import Measured
+from procedures.core.stop_rule import StopRule
 from procedures.core.table_angles import TableAngles
 from procedures.core.temperature_profile import TemperatureProfile
 from procedures.core.turn import Turn
@@ -133,6 +134,8 @@ class Station:
     """Voltage of the unit's supply, set before it is switched on; None: as it is set."""
     profile: TemperatureProfile | None = None
     """Temperature profile of the chamber meanwhile; the recording ends with the last soak, at most after `record_s`."""
+    until: StopRule | None = None
+    """Rule that may end the recording before `record_s`; None: it lasts so long."""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from procedures.core.arrays import Array
 from procedures.core.converter import ConverterTriad
 from procedures.core.errors import BadParameter
-from procedures.core.thermometers import ThermometerCorrection
+from procedures.core.temperature.thermometers import ThermometerCorrection
 
 ALPHAS = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
 BETAS = ("beta_1", "beta_2", "beta_3", "beta_4")

@@ -7,12 +7,12 @@ import numpy as np
 from procedures.core.arrays import Array
 from procedures.core.converter import ConverterTriad
 from procedures.core.errors import BadParameter, NoCalibration
-from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import TRIADS, Channel
+from procedures.core.temperature.gyros import GyroThermalCorrection
+from procedures.core.temperature.thermometers import ThermometerCorrection
 from procedures.core.thermal_correction import ThermalCorrection
-from procedures.core.thermometers import ThermometerCorrection
 from procedures.core.unit_correction import CorrectionKind
 
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"

@@ -8,9 +8,9 @@ from typing import Literal
 
 from procedures.core.converter import ConverterTriad
 from procedures.core.errors import BadParameter
-from procedures.core.gyro_thermal import GyroThermalCorrection
+from procedures.core.temperature.gyros import GyroThermalCorrection
+from procedures.core.temperature.thermometers import ThermometerCorrection
 from procedures.core.thermal_correction import ThermalCorrection
-from procedures.core.thermometers import ThermometerCorrection
 
 CorrectionKind = Literal["thermal", "converter", "thermometers", "gyros"]
 

@@ -30,10 +30,10 @@ from procedures.analysis.thermal.regime import RegimeSettings, regimes
 from procedures.analysis.thermal.runs import without_lag
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.gyro_thermal import GyroPolynomial, GyroThermalCorrection
 from procedures.core.limits import Limit, check, verdict
 from procedures.core.recording import GYRO, Quantity, Recording
 from procedures.core.report import Report
+from procedures.core.temperature.gyros import GyroPolynomial, GyroThermalCorrection
 from procedures.core.unit import Unit
 from procedures.core.unit_correction import UnitCorrection
 from procedures.procedure import STATIONS, Evidence, Method, Outcome, RecordedParameters
@@ -265,5 +265,5 @@ METHOD = Method(
     *("temperature_dependence", "Dependence of recordings on temperature", "1.0.0"),
     *(Params, Result, analyse, report),
     corrections=corrections,
-    inspection=lambda _params, _count: Inspection(replace(STATIONS.settings, least_samples=FEWEST), temperatures=True),
+    inspection=lambda params, _: Inspection(replace(STATIONS.settings, least_samples=FEWEST), params.channels),
 )

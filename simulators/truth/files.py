@@ -1,6 +1,7 @@
 """Truth files in TOML, in the units people read: each key with its unit, each refusal with field, value and range."""
 
 from dataclasses import fields, replace
+from functools import lru_cache
 from importlib.resources import files
 from json import dumps
 from pathlib import Path
@@ -231,8 +232,9 @@ def load_bench(path: Path) -> BenchTruth:
     return parse_bench(path.read_text(encoding="utf-8"))
 
 
+@lru_cache(maxsize=1)
 def default_unit() -> UnitTruth:
-    """Return the shipped unit, "SIM-0001"."""
+    """Return the shipped unit, "SIM-0001": one value, which nothing can change."""
     return parse_unit(_shipped("default_unit.toml"))
 
 

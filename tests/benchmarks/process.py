@@ -50,20 +50,21 @@ class Service:
     def processor_s(self) -> float:
         """Processor time so far of the process and of those that it has begun [s]."""
         whole = 0.0
-        for process in (psutil.Process(self.process.pid), *self._children()):
+        for process in (psutil.Process(self.process.pid), *self.children()):
             with suppress(psutil.NoSuchProcess):
                 times = process.cpu_times()
                 whole += times.user + times.system + times.children_user + times.children_system
         return whole
 
     def _others(self) -> Generator[tuple[str, int]]:
-        for process in self._children():
+        for process in self.children():
             with suppress(psutil.NoSuchProcess):
                 line = " ".join(process.cmdline())
                 kinds = ("supervise", "resource_tracker", "spawn_main")
                 yield f"{next((kind for kind in kinds if kind in line), 'other')} {process.pid}", process.pid
 
-    def _children(self) -> list[psutil.Process]:
+    def children(self) -> list[psutil.Process]:
+        """The processes that it has begun, and those that these have begun."""
         with suppress(psutil.NoSuchProcess):
             return psutil.Process(self.process.pid).children(recursive=True)
         return []

@@ -34,13 +34,18 @@ class Revision:
         return _said(["git", "-C", str(self.folder), "describe", "--always", "--dirty=+"])
 
     @contextmanager
-    def service(self, prefix: tuple[str, ...] = ()) -> Generator[Service]:
-        """Its service on an empty SQLite database; `prefix` comes before its command, as a profiler's does."""
+    def service(
+        self, prefix: tuple[str, ...] = (), whole: tuple[str, ...] = (), environment: dict[str, str] | None = None
+    ) -> Generator[Service]:
+        """Its service on an empty SQLite database; `prefix` comes before its command, as a profiler's does.
+
+        `whole`: a command in place of its own; `environment`: variables in addition.
+        """
         with tempfile.TemporaryDirectory(prefix="bench-") as folder:
             port = free_port()
-            environment = {"BENCH_DATABASE_URL": f"sqlite:///{folder}/bench.sqlite", "BENCH_PORT": str(port)}
-            arguments = [*prefix, str(self.python), "-m", "bench_service", "serve"]
-            with command(arguments, port, environment, self.folder) as running:
+            own = {"BENCH_DATABASE_URL": f"sqlite:///{folder}/bench.sqlite", "BENCH_PORT": str(port)}
+            arguments = [*prefix, *(whole or (str(self.python), "-m", "bench_service", "serve"))]
+            with command(arguments, port, own | (environment or {}), self.folder) as running:
                 yield running
 
     def script(self, text: str) -> str:

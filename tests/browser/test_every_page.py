@@ -48,6 +48,12 @@ def paths(service: BenchProcess) -> dict[str, str]:
         "recording": f"/recordings/{recording}",
         "campaign_run": f"/campaign-runs/{run}",
         "stops": "/benches/sim/stops",
+        "manual": "/benches/sim/manual",
+        "mountings": "/mountings",
+        "accounts": "/accounts",
+        "certificate": "/certificate",
+        "enter_calibration": "/units/SIM-0001/calibrations/new",
+        "log_in": "/log-in",
         "error": "/jobs/none",
     }
 

@@ -17,10 +17,10 @@ from procedures.analysis.calibration.triad_analysis import AccelerometerSettings
 from procedures.catalog.calibration_12_orientations import PROCEDURE, Params, schedule
 from procedures.core.converter import ConverterModel, Normalised
 from procedures.core.errors import BadParameter, MissingChannel
-from procedures.core.gyro_thermal import GyroPolynomial, GyroThermalCorrection
 from procedures.core.recording import ACCELEROMETER, GYRO, Channel, MemoryRecording, Quantity, RecordingInfo
+from procedures.core.temperature.gyros import GyroPolynomial, GyroThermalCorrection
+from procedures.core.temperature.thermometers import SensorCorrection, ThermometerCorrection
 from procedures.core.thermal_correction import AxisCorrection, Form, TemperatureRange, ThermalCorrection
-from procedures.core.thermometers import SensorCorrection, ThermometerCorrection
 from procedures.core.unit import TriadRecord
 from simulators.chamber.behaviour import response
 from simulators.truth.thermal import REFERENCE_C, AccelerometerThermalTruth, ConverterTruth, UnitThermalTruth

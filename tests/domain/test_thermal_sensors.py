@@ -13,7 +13,7 @@ from procedures.catalog.thermal_cycle import Params, Result
 from procedures.core import units
 from procedures.core.errors import UnfitRecording
 from procedures.core.noise import NoiseCoefficients
-from procedures.core.thermometers import SensorCorrection, ThermometerCorrection
+from procedures.core.temperature.thermometers import SensorCorrection, ThermometerCorrection
 from procedures.core.unit import TriadRecord
 from procedures.procedure import Context
 from simulators.truth.thermal import REFERENCE_C, GyroThermalTruth, UnitThermalTruth

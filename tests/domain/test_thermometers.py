@@ -12,7 +12,7 @@ from procedures.catalog.thermometer_calibration import Params
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import Verdict
 from procedures.core.recording import MemoryRecording
-from procedures.core.thermometers import SensorCorrection, ThermometerCorrection
+from procedures.core.temperature.thermometers import SensorCorrection, ThermometerCorrection
 from procedures.procedure import Context
 from simulators.truth import declared_unit, default_bench, default_unit
 from tests.validation.thermometer_rig import SETTINGS, compared, drawn, recordings
@@ -85,3 +85,15 @@ def test_a_short_soak_is_said_and_widens_the_claim():
     long = thermometer_calibration.predict(thermometer_calibration.resolve(Params(), CONTEXT), CONTEXT)
     assert not long.warnings
     assert predicted.uncertainties[1].standard_uncertainty > 2.0 * long.uncertainties[1].standard_uncertainty
+
+
+def test_a_sensor_that_is_stuck_or_gone_is_named():
+    given = recordings(drawn(2), 2)
+    for column, value, words in ((3, 21.0, "temperature_gyro_y went by 0.00"), (1, -32768.0, "converter was disc")):
+        wrong = []
+        for one in given:
+            raw = one.raw.astype(np.float64)
+            raw[:, column] = value
+            wrong.append(MemoryRecording(one.info, raw))
+        with pytest.raises(UnfitRecording, match=words):
+            read_soaks(wrong, SETTINGS)

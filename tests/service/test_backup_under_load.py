@@ -115,7 +115,7 @@ def _hashes(client: Client, job: str) -> str:
 
 
 def _until(true: Callable[[], object]) -> None:
-    deadline = monotonic_s() + 30
+    deadline = monotonic_s() + 90
     while not true():
         assert monotonic_s() < deadline
         pause(0.02)

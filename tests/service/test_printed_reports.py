@@ -94,7 +94,7 @@ def test_a_result_s_report_has_the_stored_numbers_and_says_who_what_and_how(cali
         assert recording["content_hash"] in text
     for words in (
         "SIMULATED",
-        "Simple acceptance",
+        "simple acceptance",
         "as found",
         "U (k = 2)",
         "Instruments",

@@ -46,7 +46,8 @@ def test_the_longest_texts_fit_whatever_they_are_made_of(channel: StopChannel, l
     word = StopWord(letter * 5000, letter * 5000, "http")
     assert channel.ask(word)
     (found,) = other(channel).standing()
-    assert (found.reason, found.by) == (letter * 500, letter * 100)
+    shown = "\\udc80" if letter == "\udc80" else letter  # no database takes it as it is
+    assert (found.reason, found.by) == ((shown * 500)[:500], (shown * 500)[:100])
 
 
 def test_words_asked_at_once_are_all_kept_and_one_too_many_leaves_the_bench_stopped(channel: StopChannel) -> None:

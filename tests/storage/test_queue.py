@@ -254,3 +254,17 @@ def test_a_failed_job_is_resumed_where_its_fault_may_be_gone(stores: Stores, new
     stores.jobs.transition(late.id, JobState.FAILED, at=NOW, failure=Failure("DeadlinePassed", "late", 0))
     assert stores.jobs.resume(late.id, NOW).deadline_at is None
     assert stores.jobs.events(late.id)[-1].data == {"deadline_lifted": (NOW - SECOND).isoformat()}
+
+
+def test_jobs_of_a_teams_campaign_do_not_wait_for_what_that_team_has_reserved(stores: Stores, new_job: NewJob) -> None:
+    stores.reservations.add(replace(reservation(Reserved.BENCH, "sim"), team="alpha"))
+    strangers = [stores.jobs.add(new_job(priority=1, team=team)) for team in ("", "beta")]
+    theirs = stores.jobs.add(new_job(priority=900, team="alpha"))
+    claimed = claim_next(stores)
+    assert claimed is not None
+    assert claimed.id == theirs.id
+    finish(stores, claimed)
+    assert claim_next(stores) is None
+    assert claim_next(stores, 61.0) == replace(
+        strangers[0], state=JobState.RUNNING, context={"met": "now"}, started_at=NOW + 61 * SECOND
+    )

@@ -105,3 +105,15 @@ def test_an_entry_that_is_completed_after_the_release_ends_no_job_of_later(
     assert entry(stores).enter("sim", word) is None
     later = stores.jobs.get(job.id)
     assert (later.state, later.cancel_requested) == (JobState.RUNNING, False)
+
+
+@pytest.mark.parametrize("text", ["Pr\udcfcfstand brennt", "a \ud83d", "NUL \0 within"])
+def test_a_reason_with_characters_that_no_database_holds_is_stored_with_escapes(stores: Stores, text: str) -> None:
+    """As `bench stop --reason` gives it on a terminal of another encoding: an entry that fails is never released."""
+    word = StopWord(text, "\udcff on a host", "command", at=now() - LATE)
+    entry(stores).enter("sim", word)
+    (stop,) = stores.benches.standing_stops("sim")
+    assert stop.id == word.id
+    assert stop.reason.isprintable()
+    assert stop.reason[0] == text[0]
+    assert len(noted(stores)) == 1

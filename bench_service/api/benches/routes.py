@@ -41,10 +41,11 @@ def view_of(service: BenchService, bench_id: str) -> BenchView:
     running = service.jobs.driving_job(bench_id)
     live = service.live.of_bench(bench_id)
     stops = service.stores.benches.standing_stops(bench_id)
+    by_hand = service.stores.manual.open_on(bench_id) is not None
     return BenchView(
         id=bench_id,
         description=description,
-        state="stopped" if stops else "idle" if running is None else "busy",
+        state="stopped" if stops else "busy" if running is not None else "manual" if by_hand else "idle",
         stopped=f"{stops[0].at.isoformat()}: {reasons_of(stops)}" if stops else None,
         stops=[StopView.of(stop) for stop in stops],
         job=running,
@@ -76,8 +77,13 @@ def read_queue(bench_id: str, service: Service) -> QueueView:
     queue = service.queues.queue(bench_id)
     holder = service.benches.holder(bench_id)
     places = queue.places(holder is not None)
-    entries = [QueueEntryView.of(entry, places[entry.id]) for entry in queue.entries]
-    return QueueView(bench=queue.bench, running=queue.running, driven_by=holder, entries=entries)
+    named = [entry.id for entry in queue.entries] + ([] if queue.running is None else [queue.running])
+    numbers = service.stores.jobs.numbers(named)
+    entries = [QueueEntryView.of(entry, places[entry.id], numbers.get(entry.id, 0)) for entry in queue.entries]
+    running = None if queue.running is None else numbers.get(queue.running)
+    return QueueView(
+        bench=queue.bench, running=queue.running, running_number=running, driven_by=holder, entries=entries
+    )
 
 
 @router.post("/{bench_id}/stop", status_code=202, responses=problems(404, 413, 507))

@@ -125,7 +125,7 @@ class BenchView(BaseModel):
 
     id: str
     description: BenchDescription
-    state: str = Field(description='"idle", "busy", or "stopped" until it is released')
+    state: str = Field(description='"idle", "busy" with a job, in "manual" mode, or "stopped" until it is released')
     stopped: str | None = Field(description="Why it is stopped")
     stops: list[StopView] = Field(description="The stops that stand, oldest first; each is released by its id")
     job: str | None = Field(description="The job that drives it")
@@ -142,6 +142,7 @@ class QueueEntryView(BaseModel):
     """A job in a queue, and why it waits."""
 
     job: str
+    number: int = Field(description="The job's short number")
     position: int = Field(description="From 1, in the order of the queue")
     ahead: int = Field(description="Jobs that go before it as things stand, the running one included")
     waiting: str = Field(description="Why it does not run yet")
@@ -152,9 +153,9 @@ class QueueEntryView(BaseModel):
     reservation: str | None
 
     @classmethod
-    def of(cls, entry: QueueEntry, place: Place) -> "QueueEntryView":
-        """Convert a queue entry and its place to their HTTP view."""
-        return copied(cls, entry, place, job=entry.id)
+    def of(cls, entry: QueueEntry, place: Place, number: int) -> "QueueEntryView":
+        """Convert a queue entry, its place and its job's number to their HTTP view."""
+        return copied(cls, entry, place, job=entry.id, number=number)
 
 
 class QueueView(BaseModel):
@@ -162,6 +163,7 @@ class QueueView(BaseModel):
 
     bench: str
     running: str | None = Field(description="The job that drives the bench")
+    running_number: int | None = Field(description="Its short number")
     driven_by: str | None
     entries: list[QueueEntryView]
 

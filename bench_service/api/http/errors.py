@@ -57,6 +57,12 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     }
 
 
+def binary(media_type: str) -> dict[str, Any]:
+    """The `content` of an answer of bytes. It is sent as `media_type`; generators of clients know the second name."""
+    schema = {"schema": {"type": "string", "format": "binary"}}
+    return {media_type: schema, "application/octet-stream": schema}
+
+
 def made(status: int, parameter: str, *operations: str) -> dict[int | str, dict[str, Any]]:
     """The good answer of a create, with OpenAPI links from the new thing's id to the operations that take it."""
     link = {

@@ -2,15 +2,13 @@
 
 from fastapi import Response
 
+from bench_service.api.http.errors import binary
 from bench_service.evidence.admission import Turns
 
 PRINTED = Turns("printed reports", at_once=1, waiting=8)
 """Printed reports: one is made at a time, each takes a second or a few."""
 PDF: dict[int | str, dict[str, object]] = {
-    200: {
-        "description": "The report as PDF/A-3, with its data attached",
-        "content": {"application/pdf": {"schema": {"type": "string", "format": "binary"}}},
-    }
+    200: {"description": "The report as PDF/A-3, with its data attached", "content": binary("application/pdf")}
 }
 
 

@@ -4,7 +4,7 @@ from fastapi import APIRouter
 
 from bench_service.api.http.dependencies import Service
 from bench_service.api.http.errors import problems
-from bench_service.evidence.estimate_documents import JobEstimates
+from bench_service.evidence.so_far.documents import JobEstimates
 
 router = APIRouter(prefix="/api/v1/jobs", tags=["jobs"])
 

@@ -20,6 +20,7 @@ from bench_service.api.http.dependencies import (
     Service,
 )
 from bench_service.api.http.errors import made, problems
+from bench_service.api.http.job_numbers import JobByNumber
 from bench_service.api.http.queries import Searched
 from bench_service.api.jobs import event_stream
 from bench_service.api.jobs.schemas import (
@@ -45,7 +46,7 @@ from bench_service.model.request import JobRequest
 from bench_service.service import BenchService
 from bench_service.wall_clock import now
 
-router = APIRouter(prefix="/api/v1/jobs", tags=["jobs"])
+router = APIRouter(prefix="/api/v1/jobs", tags=["jobs"], dependencies=[JobByNumber])
 
 OF_A_JOB = (
     "read_job",

@@ -112,6 +112,7 @@ class JobView(BaseModel):
     """A job with its state, parameters and progress."""
 
     id: str
+    number: int = Field(description="Short number in this database; 123 and #123 stand for the id in every address")
     procedure: str
     procedure_version: str
     unit: str

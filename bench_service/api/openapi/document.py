@@ -21,6 +21,7 @@ TAGS = {
     "benches": "Benches: state, queue, software stops.",
     "reservations": "Benches and units that are kept free for a client until a moment.",
     "mountings": "Units on plates of benches, and the azimuth that was read for each.",
+    "manual mode": "A bench driven by hand under a lease: demands one by one, within the limits.",
     "campaigns": "Sequences of jobs with limits, their runs, schedules and trends.",
     "access": "The session of a request, accounts of people, tokens of programs, approvals of procedures.",
     "audit": "The audit trail: every request that may have changed something.",
@@ -80,6 +81,7 @@ def _names(schemas: dict[str, Schema]) -> dict[str, str]:
     names = {name: plain_name(name) for name in schemas}
     names["Body_import_recording"] = UPLOAD
     names["Body_describe_file"] = "FileToDescribe"
+    names["Body_check_certificate_file"] = "CertificateToCheck"
     return names
 
 

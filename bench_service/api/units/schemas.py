@@ -11,10 +11,10 @@ from bench_service.mapping import copied
 from bench_service.model.calibrations import Approval
 from bench_service.wall_clock import now
 from procedures.core.converter import ConverterTriad
-from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.recording import Channel
+from procedures.core.temperature.gyros import GyroThermalCorrection
+from procedures.core.temperature.thermometers import ThermometerCorrection
 from procedures.core.thermal_correction import ThermalCorrection
-from procedures.core.thermometers import ThermometerCorrection
 from procedures.core.unit import TriadRecord, Unit
 from procedures.core.unit_correction import CorrectionKind
 

@@ -23,6 +23,16 @@ class StopWord:
     booked: bool = False
     """True once the database has it."""
 
+    def __post_init__(self) -> None:
+        """Escape the characters of its texts that no database and no answer can hold.
+
+        A terminal of another encoding gives them. A stop that the database never takes is never released.
+        """
+        for name in ("reason", "by"):
+            text: str = getattr(self, name)
+            plain = text.replace("\0", "\\x00").encode(errors="backslashreplace").decode()
+            object.__setattr__(self, name, plain)
+
     def document(self) -> dict[str, Any]:
         """The request as a JSON object, its texts cut to the room of a record."""
         return {**asdict(self), "at": self.at.isoformat(), "reason": self.reason[:REASON], "by": self.by[:BY]}

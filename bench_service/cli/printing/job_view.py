@@ -14,7 +14,7 @@ def job_view(job: dict[str, Any]) -> Table:
     done, place, prompt, failure = job["progress"], job["queue"], job["prompt"], job["error"]
     left_s = done["eta_s"]
     rows = {
-        "job": job["id"],
+        "job": f"#{job['number']}, {job['id']}",
         "procedure": f"{job['procedure']} {job['procedure_version']}",
         "unit": f"{job['unit']} on bench {job['bench']}",
         "state": state_of(job),

@@ -102,11 +102,12 @@ def calibration_table(calibrations: list[dict[str, Any]]) -> Table:
 def job_table(jobs: list[dict[str, Any]]) -> Table:
     """Table of jobs, newest first."""
     table = Table()
-    for column in ("job", "procedure", "unit", "state", "verdict", "stations", "submitted"):
+    for column in ("", "job", "procedure", "unit", "state", "verdict", "stations", "submitted"):
         table.add_column(column, no_wrap=column == "job")
     for job in jobs:
         done = job["progress"]
         table.add_row(
+            f"#{job['number']}",
             job["id"],
             job["procedure"],
             job["unit"],
@@ -186,9 +187,9 @@ def mounting_table(mountings: list[dict[str, Any]]) -> Table:
 
 def queue_table(entries: list[dict[str, Any]]) -> Table:
     """Table of the jobs that wait for a bench, in the order in which they start."""
-    table = _table("place", "job", "unit", "priority", "queued", "waiting")
+    table = _table("place", "", "job", "unit", "priority", "queued", "waiting")
     for one in entries:
-        numbers = str(one["position"]), one["job"], Text(one["unit"]), str(one["priority"])
+        numbers = str(one["position"]), f"#{one['number']}", one["job"], Text(one["unit"]), str(one["priority"])
         table.add_row(*numbers, moment(one["queued_at"]), Text(one["waiting"]))
     return table
 

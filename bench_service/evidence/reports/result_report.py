@@ -22,7 +22,7 @@ from bench_service.model.job import Job
 from bench_service.model.records import StoredResult
 
 SIMULATED = "SIMULATED: the data come from a simulated bench and no real unit."
-SIMPLE = "Simple acceptance: a value is compared with its limit, its uncertainty is not taken off."
+SIMPLE = "simple acceptance, the uncertainty of a value is not taken off"
 
 
 @dataclass(frozen=True)
@@ -92,32 +92,36 @@ def verdict_blocks(result: StoredResult) -> Iterator[Block]:
 
 
 def _rule(document: dict[str, Any]) -> str:
-    """The decision rule: the document's own sentence where it has one."""
-    stated = document.get("decision_rule")
-    return stated if isinstance(stated, str) and stated else SIMPLE
+    """Decision rules of the checks in words; of a result without them, the one that held then."""
+    rules = dict.fromkeys(c["decision"]["rule"] for c in document.get("checks", []) if c.get("decision"))
+    return f"Decision rule: {'; '.join(rules) or SIMPLE}."
 
 
 def _checks(checks: list[dict[str, Any]]) -> PrintedTable:
-    rows: list[tuple[str, ...]] = []
-    for c in sorted(checks, key=lambda c: c["passed"]):
-        limit, sd = c["limit"], c.get("standard_uncertainty")
-        expanded = None if sd is None else calibration_parts.FACTOR * sd
-        bounds = [
-            f"{sign} {limit[end]:g}" for end, sign in (("minimum", "≥"), ("maximum", "≤")) if limit[end] is not None
-        ]
-        rows.append(
-            (
-                "pass" if c["passed"] else "FAIL",
-                c["name"],
-                to_uncertainty(c["value"], expanded),
-                "–" if expanded is None else two_digits(expanded),
-                " and ".join(bounds),
-                limit["unit"],
-                c.get("note", ""),
-            )
-        )
-    columns = ("", "check", "value", "U (k = 2)", "limit", "unit", "note")
-    return PrintedTable("Checks", columns, tuple(rows), (2, 3), calibration_parts.EXPANDED)
+    rows = tuple(_check(c) for c in sorted(checks, key=lambda c: c["passed"]))
+    columns = ("", "check", "value", "U", "k", "limit", "unit", "note")
+    note = "U = k·u is the expanded uncertainty; values have its second digit. Conditional: within U of the limit."
+    return PrintedTable("Checks", columns, rows, (2, 3, 4), note)
+
+
+def _check(c: dict[str, Any]) -> tuple[str, ...]:
+    """Cells of one check; a result from before the decision rules has its factor of two."""
+    limit, sd, decision = c["limit"], c.get("standard_uncertainty"), c.get("decision") or {}
+    factor = decision.get("coverage_factor") or calibration_parts.FACTOR
+    expanded = decision.get("expanded_uncertainty")
+    if expanded is None and sd is not None:
+        expanded = factor * sd
+    bounds = [f"{sign} {limit[end]:g}" for end, sign in (("minimum", "≥"), ("maximum", "≤")) if limit[end] is not None]
+    return (
+        decision.get("outcome") or ("pass" if c["passed"] else "fail"),
+        c["name"],
+        to_uncertainty(c["value"], expanded),
+        "–" if expanded is None else two_digits(expanded),
+        "–" if expanded is None else f"{factor:.3g}",
+        " and ".join(bounds),
+        limit["unit"],
+        c.get("note", ""),
+    )
 
 
 def _calibrations(stores: EvidenceStores, of: ResultReport) -> Iterator[Block]:
@@ -144,7 +148,7 @@ def _people(of: ResultReport) -> Iterator[Block]:
             ("requested", job.created_at.isoformat(timespec="seconds")),
             ("begun", job.started_at.isoformat(timespec="seconds") if job.started_at else "–"),
             ("ended", job.finished_at.isoformat(timespec="seconds") if job.finished_at else "–"),
-            ("job", job.id),
+            ("job", f"#{job.number}, {job.id}"),
             ("bench", job.bench),
             *rows,
         ]

@@ -5,6 +5,7 @@ import { fill, h, moment } from "./dom.js";
 import { t } from "./words.js";
 
 const ROLES = [["viewer", t("viewer: looks and stops")], ["operator", t("operator: runs approved procedures")], ["engineer", t("engineer: runs, imports, decides")], ["admin", t("admin: accounts too")]];
+const NOBODY = t("None yet: nobody has to log in. The first account is made on the host, with `bench user add NAME --role admin`, and switches log-in on.");
 const at = (id) => document.getElementById(id);
 
 const roles = (chosen, name) => h("select", { "aria-label": name }, ...ROLES.map(([role, text]) => h("option", { value: role, selected: role === chosen }, text)));
@@ -27,7 +28,7 @@ function person(one) {
 async function people() {
   const all = await read("/api/v1/accounts");
   at("accounts").replaceChildren(all.length ? table(t("People"), [t("Name"), t("Role"), t("Team"), t("Known by"), t("Made"), t("Do")], all.map(person))
-    : h("p", { class: "note" }, t("None yet: nobody has to log in. The first account is made on the host, with `bench user add NAME --role admin`, and switches log-in on.")));
+    : h("p", { class: "note" }, NOBODY));
   at("new-account").hidden = !all.length;
 }
 
@@ -75,7 +76,7 @@ async function begin() {
   sent("new-account", "/api/v1/accounts", people, ({ name, role, team, password }) => ({ name, role, team: team.trim(), ...(password && { password }) }));
   sent("new-token", "/api/v1/tokens", shown, ({ name, role, team, days }) => ({ name, role, team: team.trim(), days: Number(days) }));
   await approvals();
-  if (!mine.rights.includes("access")) { at("trouble").textContent = t("Accounts and tokens are for an admin."); return; }
+  if (!mine.rights.includes("access")) { at("trouble").textContent = mine.log_in_needed ? t("Accounts and tokens are for an admin.") : NOBODY; return; }
   at("access").hidden = false;
   await Promise.all([people(), tokens()]);
 }

@@ -117,7 +117,9 @@ export class SchemaForm {
   }
 
   part(schema, whole, path, defaults) {
-    return Object.entries(schema.properties || {}).map(([name, given]) => {
+    const bare = ([, given]) => { const kind = kindOf(given, whole); return kind.mixed || kind.type === "array" || (kind.type === "object" && (kind.nullable || !kind.properties)); };
+    const all = Object.entries(schema.properties || {}), ordered = [...all.filter((one) => !bare(one)), ...all.filter(bare)];  // what is typed as JSON comes last
+    return ordered.map(([name, given]) => {
       const own = defaults && name in defaults ? { ...given, default: defaults[name] } : given, kind = kindOf(own, whole);
       if (kind.type === "object" && kind.properties && !kind.mixed && !kind.nullable) {
         return h("fieldset", {}, h("legend", {}, plainName(name)), ...this.part(kind, whole, [...path, name], kind.default));

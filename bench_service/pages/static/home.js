@@ -46,11 +46,12 @@ function show({ bench, job }) {
   if (!card) { reload(); return; }
   stops(card, bench);
   const live = feed.lives.get(bench.id), progress = live && live.job && job && live.job.id === job.id ? live.job : null;
-  const { safety } = bench, free = !job && bench.state !== "busy";
+  const { safety } = bench, free = !job && !["busy", "manual"].includes(bench.state);
   fill(card.querySelector(".state"),
     h("p", {}, badge(bench.state), " ", job
-      ? [t("Busy with"), " ", h("a", { href: job.page }, job.procedure), ` ${t("on")} `, h("a", { href: `/units/${part(job.unit)}` }, job.unit), ` (${short(job.id)}). `,
+      ? [t("Busy with"), " ", h("a", { href: job.page }, job.procedure), ` ${t("on")} `, h("a", { href: `/units/${part(job.unit)}` }, job.unit), ` (#${job.number}). `,
         progress ? `${progress.label}. ${t("Left:")} ${span(progress.eta_s)} ${t("of bench time")}, ${span(progress.eta_wall_s)} ${t("of real time")}.` : ""]
+      : bench.state === "manual" ? h("a", { href: `/benches/${part(bench.id)}/manual` }, t("In manual mode."))
       : bench.driven_by ? t("Idle.") : t("No worker drives it now: its jobs wait."), bench.queued ? [" ", h("a", { href: "/queue" }, `${bench.queued} ${t("queued")}`), "."] : ""),
     job && h("progress", { max: 1, value: progress ? progress.fraction : job.progress.fraction, "aria-label": t("Progress") }),
     h("p", { class: safety.safe !== true && free ? "warning" : "note" }, job && !bench.stops.length && safety.safe === false
@@ -61,7 +62,7 @@ function show({ bench, job }) {
 function jobs({ items }) {
   fill(document.getElementById("jobs"), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Latest jobs") }, h("table", {}, h("thead", {}, h("tr", {}, ...["Procedure", "Unit", "State", "Verdict", "Stations", "Submitted", "Labels", "Job"].map((name) => h("th", {}, t(name))))),
     h("tbody", {}, ...items.map((job) => h("tr", {}, h("td", {}, h("a", { href: job.page }, job.procedure)), h("td", {}, job.unit), h("td", {}, badge(job.state)), h("td", {}, job.verdict && badge(job.verdict)),
-      h("td", { class: "n" }, `${job.progress.station} / ${job.progress.stations}`), h("td", {}, moment(job.created_at)), h("td", {}, Object.entries(job.labels).map(([k, v]) => `${k}: ${v}`).join("; ")), h("td", {}, h("code", { title: job.id }, short(job.id)))))))));
+      h("td", { class: "n" }, `${job.progress.station} / ${job.progress.stations}`), h("td", {}, moment(job.created_at)), h("td", {}, Object.entries(job.labels).map(([k, v]) => `${k}: ${v}`).join("; ")), h("td", {}, h("code", { title: job.id }, `#${job.number}`))))))));
 }
 
 feed.on("bench", ({ news }) => show(news));

@@ -1,7 +1,7 @@
 // Import of a recorded file: the service proposes a description, a person corrects and confirms it.
 import { ask } from "./api.js";
 import { busy } from "./act.js";
-import { fill, h, number } from "./dom.js";
+import { h, number } from "./dom.js";
 import { t } from "./words.js";
 
 const at = (id) => document.getElementById(id), wizard = at("wizard");
@@ -9,6 +9,7 @@ const UNITS = { angular_rate: ["rad/s", "deg/s", "deg/h", "count"], specific_for
 const FIRST_BYTES = 4000, FIRST_ROWS = 8;
 let proposal = null, rows = [], doubts = [], byHand = false;
 
+const put = (element, ...children) => element.replaceChildren(...children.flat(3).filter((child) => child));
 const files = () => [...at("files").files];
 const options = (list, chosen) => list.map((one) => h("option", { value: one, selected: one === chosen }, one === "" ? "–" : one));
 
@@ -67,12 +68,12 @@ function show(found, first) {
   at("import-time-unit").replaceChildren(...options(["s", "ms", "us", "ns", "100us", "clock"], description.time_unit || "s"));
   at("import-rate").value = description.rate_hz ?? "";
   if (description.unit) at("import-unit").value = description.unit;
-  fill(at("looked"), h("p", {}, `${found.title}${found.rows === null ? "" : `, ${found.rows} ${t("rows")}`}. ${found.rate_hz ? `${number(found.rate_hz)} Hz. ` : ""}${(found.notes || []).join(" ")}`),
+  put(at("looked"), h("p", {}, `${found.title}${found.rows === null ? "" : `, ${found.rows} ${t("rows")}`}. ${found.rate_hz ? `${number(found.rate_hz)} Hz. ` : ""}${(found.notes || []).join(" ")}`),
     found.tables.length > 1 && h("label", {}, t("Table of the file"), tables(found)),
     ...found.suspicious.map((text) => h("p", { class: "warning" }, text)), ...found.clocks.map((one) => h("p", { class: "note" }, `${t("Clock")} ${one.column}: ${one.meaning}${one.rate_hz ? `, ${number(one.rate_hz)} Hz` : ""}${one.problem ? `; ${one.problem}` : ""}`)),
     first.length > 0 && h("details", { open: true }, h("summary", {}, t("First rows of the file")), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("First rows of the file") }, h("table", {}, h("tbody", {}, ...first.map((cells) => h("tr", {}, ...cells.map((one) => h("td", {}, one)))))))));
-  fill(at("import-columns"), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Columns of the file") }, h("table", {}, h("thead", {}, h("tr", {}, ...["Import", "Column", "Channel", "Quantity", "Unit", "Scale", "Mean", "From"].map((name) => h("th", {}, t(name))))), h("tbody", {}, ...rows.map((one) => one.element)))));
-  fill(at("import-doubts"), found.unknown.length > 0 && h("p", {}, t("The file does not say this. Tick each once it is right above:")), ...found.unknown.map(asked));
+  put(at("import-columns"), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Columns of the file") }, h("table", {}, h("thead", {}, h("tr", {}, ...["Import", "Column", "Channel", "Quantity", "Unit", "Scale", "Mean", "From"].map((name) => h("th", {}, t(name))))), h("tbody", {}, ...rows.map((one) => one.element)))));
+  put(at("import-doubts"), found.unknown.length > 0 && h("p", {}, t("The file does not say this. Tick each once it is right above:")), ...found.unknown.map(asked));
   write();
 }
 

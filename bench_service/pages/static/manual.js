@@ -29,7 +29,7 @@ function head() {
 
 function show() {
   fill(place, ...head());
-  begin.hidden = Boolean(lease);
+  document.getElementById("beginning").hidden = Boolean(lease);
   demands.hidden = !lease;
 }
 
@@ -97,7 +97,8 @@ document.addEventListener("keydown", (event) => {
   busy(form.querySelector("button"), form.querySelector("output"), () => demand("halt", {}));
 });
 
-const row = (name, value, unit, digits) => h("tr", {}, h("td", {}, name), h("td", { class: "n" }, typeof value === "number" ? value.toFixed(digits) : value), h("td", {}, unit));
+const plain = (value, digits) => (Number(value.toFixed(digits)) || 0).toFixed(digits);  // never -0.0000
+const row = (name, value, unit, digits) => h("tr", {}, h("td", {}, name), h("td", { class: "n" }, typeof value === "number" ? plain(value, digits) : value), h("td", {}, unit));
 
 function readings(live) {
   const { devices, manual } = live, rates = devices.rates_deg_s || [];
@@ -105,7 +106,7 @@ function readings(live) {
   const { chamber } = devices;
   rows.push(row(t("Table"), devices.moving ? t("moves") : t("rests"), manual ? manual.doing.replaceAll("_", " ") : ""));
   if (chamber) rows.push(row(t("Air"), chamber.air_c, "°C", 2), row(t("Set point"), chamber.target_c === null ? t("off") : chamber.target_c, "°C", 2));
-  rows.push(row(t("Supply of the unit"), devices.unit_on ? t("on: power") : t("off"), ""));
+  rows.push(row(t("Supply of the unit"), devices.unit_on ? t("switched on") : t("off"), ""));
   if (devices.voltage_v !== null) rows.push(row(t("Voltage"), devices.voltage_v, "V", 3));
   if (devices.current_a !== null) rows.push(row(t("Current"), devices.current_a, "A", 3));
   for (const sensor of manual ? manual.sensors : []) rows.push(row(sensor.name, number(sensor.value), sensor.unit));

@@ -39,13 +39,20 @@ function repeats() {
     const key = JSON.stringify([one.unit, one.bench, one.plate]);
     groups.set(key, [...(groups.get(key) || []), one]);
   }
-  const several = [...groups.values()].filter((group) => group.length > 1);
-  fill(document.getElementById("repeats"), several.length ? h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Repeatability") }, h("table", {},
-    h("thead", {}, h("tr", {}, ...["Unit", "Bench", "Plate", "Mountings", "Spread, ″", "One reading, ″", "Seat"].map((name) => h("th", {}, t(name))))),
-    h("tbody", {}, ...several.map((group) => h("tr", {}, h("td", {}, group[0].unit), h("td", {}, group[0].bench), h("td", {}, group[0].plate), h("td", { class: "n" }, group.length),
-      h("td", { class: "n" }, number(Number(spreadArcsec(group).toFixed(2)))), h("td", { class: "n" }, number(Number(Math.sqrt(group.reduce((sum, one) => sum + one.azimuth_sd_arcsec ** 2, 0) / group.length).toFixed(2)))),
-      h("td", {}, verb(t("From the unit's calibrations"), { path: "/api/v1/results", body: () => ({ method: "mounting_repeatability", calibrations: chosen(group[0].unit) }), then: (made) => { location.href = `/results/${part(made.id)}`; } }))))))
-    : h("p", { class: "note" }, t("A unit that was mounted twice on the same plate has a spread.")));
+  const several = [...groups.values()].filter((group) => group.length > 1), place = document.getElementById("repeats");
+  if (!several.length) {
+    fill(place, h("p", { class: "note" }, t("A unit that was mounted twice on the same plate has a spread.")));
+    return;
+  }
+  const heads = h("tr", {}, ...["Unit", "Bench", "Plate", "Mountings", "Spread, ″", "One reading, ″", "Seat"].map((name) => h("th", {}, t(name))));
+  fill(place, h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Repeatability") }, h("table", {}, h("thead", {}, heads), h("tbody", {}, ...several.map(repeat)))));
+}
+
+function repeat(group) {
+  const [{ unit, bench, plate }] = group, reading = Math.sqrt(group.reduce((sum, one) => sum + one.azimuth_sd_arcsec ** 2, 0) / group.length);
+  return h("tr", {}, h("td", {}, unit), h("td", {}, bench), h("td", {}, plate), h("td", { class: "n" }, group.length),
+    h("td", { class: "n" }, spreadArcsec(group).toFixed(2)), h("td", { class: "n" }, reading.toFixed(2)),
+    h("td", {}, verb(t("From the unit's calibrations"), { path: "/api/v1/results", body: () => ({ method: "mounting_repeatability", calibrations: chosen(unit) }), then: (made) => { location.href = `/results/${part(made.id)}`; } })));
 }
 
 const calibrations = new Map();

@@ -1,7 +1,7 @@
 // What every page does: says at once when the service is away, shows stops and prompts, local times, name and theme.
 import { wire } from "./act.js";
 import { send, part, me, iAm, Refused } from "./api.js";
-import { h, localTimes, moment, short } from "./dom.js";
+import { h, localTimes, moment } from "./dom.js";
 import * as feed from "./feed.js";
 import { attitude } from "./table3d.js";
 import { t } from "./words.js";
@@ -98,7 +98,7 @@ function show() {
 function status({ bench, job }) {
   const place = document.querySelector(`form.stop[data-bench="${CSS.escape(bench.id)}"] .status`);
   if (!place) return;
-  const text = bench.state === "stopped" ? t("stopped") : job ? `${t("busy")}: ${job.procedure} ${short(job.id)}` : bench.driven_by ? t("idle") : t("no worker");
+  const text = bench.state === "stopped" ? t("stopped") : job ? `${t("busy")}: ${job.procedure} #${job.number}` : bench.driven_by ? t("idle") : t("no worker");
   if (place.textContent !== text) place.textContent = text;
   place.className = `status ${bench.state}`;
 }

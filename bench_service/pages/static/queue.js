@@ -1,7 +1,7 @@
 // Queues of the benches: order, priority, hold, cancel, and why each job waits; reservations with holder and time left.
 import { ask, me, part, read } from "./api.js";
 import { busy, verb } from "./act.js";
-import { fill, h, moment, short, span } from "./dom.js";
+import { fill, h, moment, span } from "./dom.js";
 import * as feed from "./feed.js";
 import { t } from "./words.js";
 
@@ -16,11 +16,11 @@ function cancel(job) {
 function row(entry, index, entries) {
   const output = h("output", { role: "status" });
   const to = (priority) => async (event) => { if (await busy(event.target, output, () => ask("PATCH", `/api/v1/jobs/${part(entry.job)}`, { priority }))) all(); };
-  const before = entries[index - 1], priority = h("input", { type: "number", min: 1, max: 1000, value: entry.priority, "aria-label": t("Priority of job {job}", { job: short(entry.job) }) });
+  const before = entries[index - 1], priority = h("input", { type: "number", min: 1, max: 1000, value: entry.priority, "aria-label": t("Priority of job {job}", { job: `#${entry.number}` }) });
   priority.addEventListener("change", (event) => to(Number(priority.value))(event));
-  return h("tr", { "data-job": entry.job }, h("td", { class: "n" }, index + 1), h("td", {}, h("a", { href: `/jobs/${entry.job}` }, h("code", {}, short(entry.job)))), h("td", {}, entry.unit), h("td", {}, priority),
+  return h("tr", { "data-job": entry.job }, h("td", { class: "n" }, index + 1), h("td", {}, h("a", { href: `/jobs/${entry.job}` }, h("code", {}, `#${entry.number}`))), h("td", {}, entry.unit), h("td", {}, priority),
     h("td", {}, entry.waiting || ""), h("td", {}, h("div", { class: "verbs" },
-      before && h("button", { type: "button", onclick: to(Math.max(1, before.priority - 1)), "aria-label": t("Move job {job} up", { job: short(entry.job) }) }, "↑"),
+      before && h("button", { type: "button", onclick: to(Math.max(1, before.priority - 1)), "aria-label": t("Move job {job} up", { job: `#${entry.number}` }) }, "↑"),
       verb(t("Hold"), { path: `/api/v1/jobs/${part(entry.job)}/pause`, then: all }), cancel(entry.job), output)));
 }
 
@@ -41,7 +41,7 @@ async function one(section) {
   const running = queue.running;
   if (document.querySelector("dialog[open]")) return;
   fill(section.querySelector(".reservations"), ...reserve(bench, held));
-  fill(section.querySelector(".list"), h("p", {}, running ? [t("Now:"), " ", h("a", { href: `/jobs/${running}` }, short(running))] : queue.driven_by ? t("Nothing runs.") : t("No worker drives it now: its jobs wait.")),
+  fill(section.querySelector(".list"), h("p", {}, running ? [t("Now:"), " ", h("a", { href: `/jobs/${running}` }, `#${queue.running_number}`)] : queue.driven_by ? t("Nothing runs.") : t("No worker drives it now: its jobs wait.")),
     queue.entries.length ? h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Waiting jobs") }, h("table", {}, h("thead", {}, h("tr", {}, ...["№", "Job", "Unit", "Priority", "Why it waits", "Do"].map((name) => h("th", {}, t(name))))), h("tbody", {}, ...queue.entries.map(row))))
       : h("p", { class: "note" }, t("Nothing waits.")));
 }

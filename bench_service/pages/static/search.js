@@ -1,7 +1,7 @@
 // Search over the whole history of jobs.
 import { part, read } from "./api.js";
 import { busy } from "./act.js";
-import { badge, h, moment, short } from "./dom.js";
+import { badge, h, moment } from "./dom.js";
 import { t } from "./words.js";
 
 const form = document.getElementById("search"), found = document.getElementById("found"), older = document.getElementById("older");
@@ -9,7 +9,7 @@ let next = null, body = null;
 
 export function jobRow(job) {
   return h("tr", {}, h("td", {}, h("a", { href: job.page }, job.procedure)), h("td", {}, h("a", { href: `/units/${part(job.unit)}` }, job.unit)), h("td", {}, badge(job.state)), h("td", {}, job.verdict && badge(job.verdict)),
-    h("td", {}, moment(job.created_at)), h("td", {}, job.requested_by), h("td", {}, Object.entries(job.labels).map(([k, v]) => `${k}: ${v}`).join("; ")), h("td", {}, h("code", { title: job.id }, short(job.id))),
+    h("td", {}, moment(job.created_at)), h("td", {}, job.requested_by), h("td", {}, Object.entries(job.labels).map(([k, v]) => `${k}: ${v}`).join("; ")), h("td", {}, h("code", { title: job.id }, `#${job.number}`)),
     h("td", {}, h("a", { href: `/start?from=${job.id}` }, t("again"))));
 }
 

@@ -14,7 +14,7 @@ def open_run(database_url: str, code_version: str) -> Run:
     """Prepare an analysis process, see `WorkProcesses`: "method" and "again" give a result's id, the others JSON."""
     from threadpoolctl import threadpool_limits
 
-    from bench_service.evidence.estimating import Estimating
+    from bench_service.evidence.so_far.estimating import Estimating
 
     stores, _ = open_stores(database_url)  # it is closed with the process
     catalogue = Catalogue()

@@ -1,4 +1,4 @@
-"""What wants the raw data of recordings, in SQL: calibrations that count, holds, and analyses that have not ended."""
+"""Claims on the raw data of recordings, in SQL: calibrations that count, holds, and analyses that have not ended."""
 
 from collections.abc import Iterable, Iterator
 

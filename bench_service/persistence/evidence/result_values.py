@@ -21,8 +21,8 @@ from bench_service.persistence.tables.jobs import JobRow
 from procedures.core.imu_model import COEFFICIENT_NAMES
 
 Q = TypeVar("Q", bound=Select[*tuple[Any, ...]])
-AT_ONCE = 20
-"""Number of rows read at once; where the quantity is a JSON pointer, each with its document."""
+AT_ONCE, DOCUMENTS = 250, 20
+"""Number of rows read at once, and where the quantity is a JSON pointer, each with its document."""
 ABOUT = (
     ResultRow.id,
     ResultRow.job_id,
@@ -36,7 +36,7 @@ ABOUT = (
 def of_verdicts(query: Q, unit: str, procedure: str, simulated: bool) -> Q:
     """Limit a query to the results that gave jobs of the unit their verdict, newest first; no repeated analyses."""
     return (
-        query.join(JobRow, JobRow.result_id == ResultRow.id)
+        query.join(JobRow, and_(JobRow.id == ResultRow.job_id, JobRow.result_id == ResultRow.id))
         .where(ResultRow.unit == unit, ResultRow.name == procedure, ResultRow.simulated == simulated)
         .order_by(ResultRow.id.desc())
     )
@@ -69,7 +69,7 @@ def newest_first(
     session: Session, query: Select[*tuple[Any, ...]], before: str | None
 ) -> Iterator[Row[*tuple[Any, ...]]]:
     """All rows of a query that begins with the newest id, or with the newest one older than `before`."""
-    query = query.limit(AT_ONCE)
+    query = query.limit(DOCUMENTS if ResultRow.document.key in query.selected_columns else AT_ONCE)
     while rows := session.execute(query if before is None else query.where(ResultRow.id < before)).all():
         yield from rows
         before = rows[-1].id

@@ -5,7 +5,8 @@ processes that want different ends for one job, one wins and the other gets `Ill
 """
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from datetime import datetime
 from typing import Any
 
@@ -21,7 +22,7 @@ from bench_service.persistence.jobs.job_changes import append_event, found_job, 
 from bench_service.persistence.jobs.job_rows import event_of_row, job_of_row, row_of_job, state_of_row
 from bench_service.persistence.pages import page
 from bench_service.persistence.searching import find_jobs
-from bench_service.persistence.tables.jobs import EventRow, JobRow
+from bench_service.persistence.tables.jobs import EventRow, JobLabelRow, JobRow
 from procedures.core.limits import Verdict
 
 log = logging.getLogger(__name__)
@@ -42,16 +43,30 @@ class SqlJobStore:
                 if known is not None:
                     return job_of_row(found_job(session, known))
                 remember(session, idempotency, "job", job.id, job.created_at)
-                session.add(row_of_job(job))
-                session.flush()
+                numbered = replace(job, number=(session.scalar(select(func.max(JobRow.number))) or 0) + 1)
+                session.add(row_of_job(numbered))
+                session.flush()  # a rival that took the number first is a conflict: tried again with the next one
+                session.add_all(JobLabelRow(job_id=job.id, name=k, value=v) for k, v in job.labels.items())
                 append_event(session, job.id, "state", job.created_at, {"state": job.state.value})
-                return job
+                return numbered
 
         return again_after_conflict(once)
 
     def get(self, job_id: str) -> Job:
         with self._database.read() as session:
             return job_of_row(found_job(session, job_id))
+
+    def id_of(self, number: int) -> str:
+        with self._database.read() as session:
+            found = session.scalar(select(JobRow.id).where(JobRow.number == number))
+        if found is None:
+            raise NotFound("job", f"#{number}")
+        return found
+
+    def numbers(self, ids: Sequence[str]) -> dict[str, int]:
+        query = select(JobRow.id, JobRow.number).where(JobRow.id.in_(ids))
+        with self._database.read() as session:
+            return {row.id: row.number for row in session.execute(query)}
 
     def list(
         self,

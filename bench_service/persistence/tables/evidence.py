@@ -37,6 +37,7 @@ class RecordingRow(Table):
         Index("ix_recordings_job_id_id", "job_id", "id"),
         Index("ix_recordings_unit_id", "unit", "id"),
         Index("ix_recordings_state_stored_bytes", "state", "stored_bytes"),
+        Index("ix_recordings_simulated_id", "simulated", "id"),
         Index("ix_recordings_raw_state_stored_bytes", "raw", "state", "stored_bytes"),
         Index(
             "uq_recordings_complete_station",
@@ -68,7 +69,8 @@ class RecordingRow(Table):
     state: Mapped[str]
     created_at: Mapped[datetime]
     source: Mapped[dict[str, Any]]
-    checkpoint: Mapped[dict[str, Any] | None] = mapped_column(Document)
+    checkpoint: Mapped[dict[str, Any] | None] = mapped_column(Document, deferred=True)
+    """State of the simulated world after it: long, and not read with a list."""
     measured: Mapped[dict[str, Any] | None] = mapped_column(Document)
     raw: Mapped[str] = mapped_column(server_default="stored")
     raw_changed_at: Mapped[datetime | None]
@@ -104,7 +106,13 @@ class HoldRow(Table):
 
 class ResultRow(Table):
     __tablename__ = "results"
-    __table_args__ = (Index("ix_results_job_id_id", "job_id", "id"), Index("ix_results_unit_id", "unit", "id"))
+    __table_args__ = (
+        Index("ix_results_job_id_id", "job_id", "id"),
+        Index("ix_results_unit_id", "unit", "id"),
+        Index("ix_results_name_id", "name", "id"),
+        Index("ix_results_verdict_id", "verdict", "id"),
+        Index("ix_results_id_name_unit_job_id", "id", "name", "unit", "job_id"),
+    )
 
     id: Mapped[str] = mapped_column(Id, primary_key=True)
     kind: Mapped[str]

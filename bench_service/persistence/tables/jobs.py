@@ -17,6 +17,10 @@ class JobRow(Table):
         Index("ix_jobs_unit_id", "unit", "id"),
         Index("ix_jobs_bench_state_priority_queued_at_id", "bench", "state", "priority", "queued_at", "id"),
         Index("ix_jobs_finished_at_id", "finished_at", "id"),
+        Index("ix_jobs_verdict_id", "verdict", "id"),
+        Index("ix_jobs_bench_id", "bench", "id"),
+        Index("ix_jobs_id_procedure_unit_bench_requested_by", "id", "procedure", "unit", "bench", "requested_by"),
+        Index("ix_jobs_number", "number", unique=True),
     )
 
     id: Mapped[str] = mapped_column(Id, primary_key=True)
@@ -56,6 +60,22 @@ class JobRow(Table):
     finished_at: Mapped[datetime | None]
     result_id: Mapped[str | None] = mapped_column(Id)
     failure: Mapped[dict[str, Any] | None] = mapped_column(Document)
+    number: Mapped[int] = mapped_column(nullable=True)
+    """Short number, never NULL; to declare that in an existing table, SQLite would have to copy it."""
+
+
+class JobLabelRow(Table):
+    """A label of a job, copied from its document: a search by label reads no document."""
+
+    __tablename__ = "job_labels"
+    __table_args__ = (
+        Index("ix_job_labels_name_value_job_id", "name", "value", "job_id"),
+        Index("ix_job_labels_name_job_id", "name", "job_id"),
+    )
+
+    job_id: Mapped[str] = mapped_column(Id, ForeignKey("jobs.id"), primary_key=True)
+    name: Mapped[str] = mapped_column(Id, primary_key=True)
+    value: Mapped[str] = mapped_column(Id)
 
 
 class EventRow(Table):

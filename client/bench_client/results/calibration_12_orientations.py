@@ -19,6 +19,23 @@ class ThermalShare(Part):
     from_sensors: dict[str, float]
 
 
+class DwellEnded(Part):
+    """Duration of one dwell under a stop rule."""
+
+    label: str
+    duration_s: float
+    longest_s: float
+    by_rule: bool
+
+
+class DwellsSaved(Part):
+    """Time that a stop rule saved in a job."""
+
+    dwells: tuple[DwellEnded, ...]
+    saved_s: float
+    share: float
+
+
 class Calibration12OrientationsDocument(Part):
     """Coefficients of both triads, their goodness of fit at the stations, and the verdict."""
 
@@ -30,6 +47,8 @@ class Calibration12OrientationsDocument(Part):
     triads: tuple[TriadSummary, ...]
     thermal: ThermalShare | None = None
     """of the accelerometers, where they were corrected"""
+    dwells: DwellsSaved | None = None
+    """of a stop rule: each dwell, and the time saved"""
 
 
 class Calibration12OrientationsResult(ResultHead):

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import qr, solve_triangular
+from scipy.linalg import solve_triangular
 
 from procedures.analysis.calibration.table_errors import SOURCES, TableErrors
 from procedures.analysis.least_squares.determination import require_full_rank
 from procedures.analysis.least_squares.inverse import scaled_pinv
-from procedures.analysis.least_squares.whitening import whitener
+from procedures.analysis.least_squares.whitening import whiteners
 from procedures.core.arrays import Array
 
 Weighting = Literal["noise_and_table", "noise"]
@@ -83,28 +83,28 @@ def estimator(what: str, vectors: Array, noise_covariance: Array, of_table: Arra
     """
     design = np.column_stack([np.ones(len(vectors)), vectors])
     condition = require_full_rank(what, design, ("b_i", "K_i1", "K_i2", "K_i3"))
-    whiteners = np.array([whitener(c) for c in noise_covariance])
+    weights = whiteners(noise_covariance)
     flaws = None if of_table is None else of_table[:, :, np.any(of_table != 0.0, axis=(0, 1))]
     if flaws is None or flaws.shape[2] == 0:
-        gain, covariance = _by_channel(design, whiteners)
+        gain, covariance = _by_channel(design, weights)
     else:
-        gain = _with_flaws(design, whiteners, flaws)
+        gain = _with_flaws(design, weights, flaws)
         rows = gain.reshape(12, -1)
         covariance = _times_each(gain, noise_covariance).reshape(12, -1) @ rows.T
     return Estimator(design, gain, covariance, condition)
 
 
-def _by_channel(design: Array, whiteners: Array) -> tuple[Array, Array]:
-    """Gain (12, 3, n) and covariance (12, 12) of three separate fits, whiteners (3, n, n)."""
+def _by_channel(design: Array, whitening: Array) -> tuple[Array, Array]:
+    """Gain (12, 3, n) and covariance (12, 12) of three separate fits, whitening (3, n, n)."""
     gain, covariance = np.zeros((3, 4, 3, len(design))), np.zeros((3, 4, 3, 4))
-    for channel, weights in enumerate(whiteners):
+    for channel, weights in enumerate(whitening):
         pseudo_inverse = scaled_pinv(weights @ design)
         gain[channel, :, channel] = pseudo_inverse @ weights
         covariance[channel, :, channel] = pseudo_inverse @ pseudo_inverse.T
     return gain.reshape(12, 3, -1), covariance.reshape(12, 12)
 
 
-def _with_flaws(design: Array, whiteners: Array, flaws: Array) -> Array:
+def _with_flaws(design: Array, whitening: Array, flaws: Array) -> Array:
     """Gain (12, 3, n) where flaws (n, 3, P) at one standard deviation each are estimated together with the triad.
 
     With ``W·C·Wᵀ = 1`` the least squares of ``|W(U − A·x − F·p)|² + |p|²`` over x and p has the x of S = C + F·Fᵀ
@@ -114,14 +114,14 @@ def _with_flaws(design: Array, whiteners: Array, flaws: Array) -> Array:
     n, p = len(design), flaws.shape[2]
     scale = np.linalg.norm(design, axis=0)
     stacked = np.zeros((3 * n + p, p + 12))
-    for channel, weights in enumerate(whiteners):
+    for channel, weights in enumerate(whitening):
         rows = slice(channel * n, channel * n + n)
         stacked[rows, :p] = weights @ flaws[:, channel]
         stacked[rows, p + 4 * channel : p + 4 * channel + 4] = weights @ design / scale
     stacked[3 * n :, :p] = np.eye(p)
-    q, r = qr(stacked, mode="economic")
+    q, r = np.linalg.qr(stacked)
     whitened = np.asarray(solve_triangular(r[p:, p:], q[: 3 * n, p:].T)).reshape(12, 3, n)
-    return _times_each(whitened, whiteners) / np.tile(scale, 3)[:, None, None]
+    return _times_each(whitened, whitening) / np.tile(scale, 3)[:, None, None]
 
 
 def _times_each(gain: Array, matrices: Array) -> Array:

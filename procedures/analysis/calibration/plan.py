@@ -23,6 +23,8 @@ from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
 from procedures.core.unit import Unit
 
+MOST_SCATTERS = 1000
+"""Dwells of one plan whose scatter is kept."""
 BIASES = (0, 4, 8)
 SCALE_FACTORS = (1, 6, 11)
 
@@ -49,15 +51,37 @@ class TriadPlan:
     """True if K comes from a calibration, not from nominal outputs."""
     weighting: Weighting = "noise_and_table"
 
-    _at_dwell: dict[float | None, "AtDwell | None"] = field(init=False, default_factory=dict, compare=False, repr=False)
-    """Estimators that were made, by their dwell: several limits ask for the same ones."""
+    scatters: dict[float, "Scatter | None"] = field(default_factory=dict, compare=False, repr=False)
+    """Scatter at other dwells than the planned one: several limits, and plans that differ in nothing else, share it."""
 
     def at_dwell(self, dwell_s: float | None = None) -> "AtDwell | None":
         """Noise and estimator at the planned or another dwell; None for unknown noise. Raises `Undetermined`."""
-        if dwell_s not in self._at_dwell:
-            noise = self.noise_covariance(dwell_s)
-            self._at_dwell[dwell_s] = None if noise is None else AtDwell(noise, self.estimator(noise))
-        return self._at_dwell[dwell_s]
+        if dwell_s is None:
+            return self._planned
+        noise = self.noise_covariance(dwell_s)
+        return None if noise is None else AtDwell(noise, self.estimator(noise))
+
+    @cached_property
+    def _planned(self) -> "AtDwell | None":
+        noise = self.noise_covariance()
+        return None if noise is None else AtDwell(noise, self.estimator(noise))
+
+    def scatter(self, dwell_s: float | None = None) -> "Scatter | None":
+        """Scatter between calibrations at a dwell; None for unknown noise. Raises `Undetermined`."""
+        if dwell_s is None:
+            return self._scatter(None)
+        if dwell_s not in self.scatters:
+            if len(self.scatters) >= MOST_SCATTERS:
+                self.scatters.clear()
+            self.scatters[dwell_s] = self._scatter(dwell_s)
+        return self.scatters[dwell_s]
+
+    def _scatter(self, dwell_s: float | None) -> "Scatter | None":
+        planned = self.at_dwell(dwell_s)
+        if planned is None:
+            return None
+        gls = planned.estimator
+        return Scatter(np.diagonal(gls.noise_covariance), self.share(gls).standard_uncertainty("pointing"))
 
     def noise_covariance(self, dwell_s: float | None = None) -> Array | None:
         """Covariance of the station means, (3, n, n), at the planned or another dwell; None for unknown noise."""
@@ -83,6 +107,14 @@ class AtDwell:
 
     noise_covariance: Array
     estimator: Estimator
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Change from one calibration to the next: variances by noise, standard uncertainties by pointing, each (12,)."""
+
+    noise_variance: Array
+    pointing: Array
 
 
 @dataclass(frozen=True)
@@ -112,7 +144,17 @@ def triad_plan(
     vectors, table = _geometry(triad, tuple(angles), site, uncertainty)
     known = unit.known_matrix(triad)
     matrix = np.eye(3) if known is None else known
-    return TriadPlan(triad, unit, tuple(stations), tuple(axes), vectors, table, matrix, known is not None, weighting)
+    moves = tuple((s.angles, s.settle_s, s.power_off_s) for s in stations)
+    shared = _scatters(triad, unit.triad(triad), moves, tuple(axes), site, uncertainty, matrix.tobytes(), weighting)
+    return TriadPlan(
+        triad, unit, tuple(stations), tuple(axes), vectors, table, matrix, known is not None, weighting, shared
+    )
+
+
+@lru_cache(maxsize=64)
+def _scatters(*_everything_but_dwells: object) -> dict[float, Scatter | None]:
+    """Scatters by dwell, shared by plans that are otherwise the same: an answer is 200 bytes."""
+    return {}
 
 
 @lru_cache(maxsize=64)
@@ -182,13 +224,11 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
     """
 
     def uncertainty(dwell_s: float | None) -> float:
-        planned = plan.at_dwell(dwell_s)
-        if planned is None:
+        scatter = plan.scatter(dwell_s)
+        if scatter is None:
             return 0.0
-        gls = planned.estimator
-        pointing = plan.share(gls).standard_uncertainty("pointing")
         columns = list(requirement.columns)
-        variance = np.diagonal(gls.noise_covariance)[columns] + pointing[columns] ** 2
+        variance = scatter.noise_variance[columns] + scatter.pointing[columns] ** 2
         size = np.diagonal(plan.matrix) if requirement.display == "ppm" else np.ones(3)
         return float(np.max(np.sqrt(variance) / np.abs(size)))
 
@@ -196,7 +236,8 @@ def unresolved(plan: TriadPlan, requirement: Requirement) -> str | None:
     if expected <= requirement.limit:
         return None
     r = requirement
-    dwell = dwell_for(uncertainty, r.limit, max(s.record_s for s in plan.stations))
+    planned = {s.record_s for s in plan.stations}
+    dwell = dwell_for(uncertainty, r.limit, max(planned), expected if len(planned) == 1 else None)
     way_out = (
         f"a dwell of about {_length(dwell)} at each station would be needed{_alone(r)}"
         if dwell is not None

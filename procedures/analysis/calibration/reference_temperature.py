@@ -26,9 +26,10 @@ from procedures.analysis.thermal.regime import RegimeSettings
 from procedures.core.arrays import Array
 from procedures.core.converter import at_reference
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.imu_model import COEFFICIENT_NAMES
 from procedures.core.recording import Recording
+from procedures.core.temperature.gyros import GyroThermalCorrection
+from procedures.core.temperature.thermometers import ThermometerCorrection
 from procedures.core.thermal_correction import (
     EXTRAPOLATED_C,
     POWERS_OF_ALPHA,
@@ -38,7 +39,6 @@ from procedures.core.thermal_correction import (
     ThermalCorrection,
     terms,
 )
-from procedures.core.thermometers import ThermometerCorrection
 from procedures.core.unit import Unit
 
 SENSORS = ("temperature_case", "temperature_converter")

@@ -62,7 +62,7 @@ def flicker_covariance(noise: NoiseCoefficients, windows: ArrayLike) -> Array:
     return noise.bias_instability**2 * _unit_flicker(low_s, high_s, tuple(spans.ravel().tolist()))
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=256)
 def _unit_flicker(low_s: float, high_s: float, spans: tuple[float, ...]) -> Array:
     """Flicker covariance of B = 1 over a band of relaxation times [s]: the axes of a triad share it, (n, n)."""
     low, high = np.log((low_s, high_s))

@@ -17,6 +17,7 @@ THESIS_ORIENTATIONS = (
 
 LONGEST_DWELL_S = 10.0 * 365.25 * 86_400.0
 """Ten years at one station: a dwell that would have to be longer counts as none at all."""
+COARSE_DWELLS_S = (*(10.0**k for k in range(-2, 9)), LONGEST_DWELL_S)
 
 
 def move_time_s(start: TableAngles, stop: TableAngles, axes: Sequence[tuple[float, float]]) -> float:
@@ -53,25 +54,34 @@ def windows(stations: Sequence[Station], axes: Sequence[tuple[float, float]], re
     return np.array(spans).reshape(-1, 2)
 
 
-def dwell_for(uncertainty: Callable[[float], float], limit: float, shortest_s: float) -> float | None:
+def dwell_for(
+    uncertainty: Callable[[float], float], limit: float, shortest_s: float, expected: float | None = None
+) -> float | None:
     """Shortest dwell [s] of at least `shortest_s` at which an uncertainty comes down to its limit; None where even
-    `LONGEST_DWELL_S` is too short.
+    `LONGEST_DWELL_S` is too short. `expected`: the uncertainty at the shortest, where it is known already.
 
-    The uncertainty is taken to fall with the dwell until slow noise stops it; found to 1 % by Brent's method over
-    the logarithms, after a coarse search.
+    The uncertainty is taken to fall with the dwell T until slow noise stops it, and never faster than 1/T, as that of
+    quantization does; found to 1 % by Brent's method over the logarithms, after a coarse search over decades of a
+    second, the same ones for every plan.
     """
-    dwells = np.geomspace(shortest_s, max(LONGEST_DWELL_S, shortest_s), 9)
-    reached = next((i for i, dwell in enumerate(dwells) if uncertainty(float(dwell)) <= limit), None)
-    if reached is None:
-        return None
-    if reached == 0:
-        return float(dwells[0])
-    low, high = np.log(dwells[reached - 1 : reached + 1])
-    excess: dict[float, float] = {}
+    low_s, high_s = shortest_s, shortest_s
+    low = high = uncertainty(shortest_s) if expected is None else expected
+    while high > limit:
+        longer = [dwell for dwell in COARSE_DWELLS_S if dwell > high_s]
+        if not longer:
+            return None
+        low_s, low = high_s, high
+        high_s = next((dwell for dwell in longer if dwell >= low_s * low / limit), longer[-1])
+        high = uncertainty(high_s)
+    if high_s == shortest_s:
+        return float(shortest_s)
+    ends = float(np.log(low_s)), float(np.log(high_s))
+    excess = {at: float(np.log(value / limit)) for at, value in zip(ends, (low, high), strict=True)}
 
     def above(logarithm: float) -> float:
-        excess[logarithm] = float(np.log(uncertainty(float(np.exp(logarithm))) / limit))
+        if logarithm not in excess:
+            excess[logarithm] = float(np.log(uncertainty(float(np.exp(logarithm))) / limit))
         return excess[logarithm]
 
-    brentq(above, low, high, xtol=0.005, rtol=1e-12)
+    brentq(above, *ends, xtol=0.005, rtol=1e-12)
     return float(np.exp(min(at for at, over in excess.items() if over <= 0.0)))

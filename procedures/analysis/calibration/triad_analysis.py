@@ -31,10 +31,10 @@ from procedures.analysis.calibration.table_errors import TableErrors, TableUncer
 from procedures.analysis.calibration.verification import magnitudes
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
-from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.recording import Recording
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
+from procedures.core.temperature.gyros import GyroThermalCorrection
 from procedures.core.thermal_correction import ThermalCorrection
 from procedures.core.unit import TriadRecord
 

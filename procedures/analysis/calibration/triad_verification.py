@@ -19,11 +19,11 @@ from procedures.analysis.calibration.table_errors import TableUncertainty, table
 from procedures.analysis.calibration.verification import Magnitudes, error_covariance, magnitudes
 from procedures.analysis.least_squares.chi_square import chi_square, tail_probability
 from procedures.core.arrays import Array
-from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.recording import Recording
 from procedures.core.site import Site
 from procedures.core.table_angles import TableAngles
+from procedures.core.temperature.gyros import GyroThermalCorrection
 from procedures.core.thermal_correction import ThermalCorrection
 from procedures.core.unit import Unit
 

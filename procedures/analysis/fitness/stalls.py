@@ -122,11 +122,13 @@ class Stalls:
         """
         width = WINDOW if same.shape[1] >= 2 * WINDOW else same.shape[1]
         windows = same.shape[1] // width
-        parts = same[:, : windows * width].reshape(len(same), windows, width).mean(axis=2)
-        for c, row in enumerate(parts):
-            moving = row[row < 1.0]
-            if len(moving) and (windows > 1 or np.isnan(self._part[c])):
-                self._part[c] = np.quantile(moving, USUAL)
+        whole = same[:, : windows * width].reshape(len(same), windows, width)
+        # Bytes are summed, not converted; fewer than 2·WINDOW repeats fit into one.
+        counts = np.sort(np.add.reduce(whole.view(np.uint8), axis=2, dtype=np.uint8), axis=1)
+        moving = np.count_nonzero(counts < width, axis=1).tolist()
+        for c, number in enumerate(moving):
+            if number and (windows > 1 or np.isnan(self._part[c])):
+                self._part[c] = _quantile(counts[c, :number], USUAL) / width
         return np.where(np.isnan(self._part), LEAST_PART, self._part)
 
     def _runs(self, group: Group, rows: Mask, start: int, part: Array, same: Mask) -> None:
@@ -171,6 +173,14 @@ class Stalls:
         each = float(np.sum(np.log(np.maximum(witnesses, LEAST_PART))))
         each = max(each, float(np.log(together))) if together > 0.0 else each
         return max(float(SHORTEST), np.floor((np.log(CHANCE) - np.log(max(self._seen, 1))) / each) + 1.0)
+
+
+def _quantile(ascending: NDArray[np.uint8], share: float) -> float:
+    """The quantile of some ascending numbers, (n,), interpolated linearly between two of them."""
+    at = share * (len(ascending) - 1)
+    below = int(at)
+    low, high = int(ascending[below]), int(ascending[min(below + 1, len(ascending) - 1)])
+    return low + (high - low) * (at - below)
 
 
 def _around(same: Mask, rows: Mask, begin: int, end: int) -> Around | None:

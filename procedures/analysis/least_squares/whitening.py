@@ -14,3 +14,10 @@ def whitener(covariance: Array) -> Array:
     size = np.sqrt(np.diagonal(covariance))
     factor = cholesky(covariance / np.outer(size, size), lower=True)
     return np.asarray(np.linalg.inv(factor), dtype=np.float64) / size
+
+
+def whiteners(covariances: Array) -> Array:
+    """`whitener` of each of several covariances at once, shape (k, n, n)."""
+    size = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    factors = np.linalg.cholesky(covariances / (size[:, :, None] * size[:, None, :]))
+    return np.asarray(np.linalg.inv(factors), dtype=np.float64) / size[:, None, :]

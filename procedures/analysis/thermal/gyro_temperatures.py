@@ -7,8 +7,8 @@ import numpy as np
 from procedures.analysis.cells import cell_means
 from procedures.analysis.thermal.profile_progress import SENSORS
 from procedures.core.arrays import Array
-from procedures.core.gyro_thermal import GyroThermalCorrection
 from procedures.core.recording import Recording
+from procedures.core.temperature.gyros import GyroThermalCorrection
 
 GYRO_SENSORS = SENSORS[2:]
 """Channels of the gyros' own thermometers, x, y, z."""

@@ -22,7 +22,7 @@ from procedures.analysis.thermal.profile_progress import AIR, DISCONNECTED_CODE,
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.recording import Recording
-from procedures.core.thermometers import SensorCorrection, ThermometerCorrection
+from procedures.core.temperature.thermometers import SensorCorrection, ThermometerCorrection
 
 CELL_S = 1.0
 """Units send their temperatures once a second."""
@@ -96,6 +96,13 @@ def read_soaks(recordings: Sequence[Recording], settings: SoakSettings) -> Soake
         air.append(float(cells.rates[-1].mean()))
         found.append(_at_start(recording.info.id, since, cells.rates[:-1], settings))
     reading, sd = (np.array(rows).T for rows in zip(*found, strict=True))
+    span = float(np.ptp(targets))
+    for name, row in zip(SENSORS, reading, strict=True):
+        if span > 0.0 and float(np.ptp(row)) < 0.1 * span:
+            raise UnfitRecording(
+                f"{name} went by {np.ptp(row):.2f} °C while the chamber went by {span:g} °C: it is stuck, or stands "
+                "outside the chamber"
+            )
     return Soaked(SENSORS, np.array(targets), np.array(air), reading, sd)
 
 

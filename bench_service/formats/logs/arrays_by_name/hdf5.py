@@ -17,6 +17,8 @@ NAME = "hdf5"
 TITLE = "HDF5, and MATLAB .mat version 7.3"
 MAGIC = b"\x89HDF\r\n\x1a\n"
 LARGEST_CHUNK = 64 * MEGABYTE
+NARROW = 16
+"""Columns of a dataset up to which a block is turned as a whole."""
 _UNITS = ("unit", "units", "Unit", "Units", "UNITS", "unit_string")
 _MATLAB_NUMBERS = (
     b"double",
@@ -132,28 +134,33 @@ class Hdf5:
         count = table.rows or 0
         start = 0
         try:
+            items = {place.path: self._file[place.path] for place, _ in wanted}
             while start < count:
                 stop = min(count, start + BLOCK_ROWS)
                 read: dict[str, Any] = {}
-                yield [self._part(place, index, start, stop, read) for place, index in wanted]
+                yield [_part(place, items[place.path], index, slice(start, stop), read) for place, index in wanted]
                 start = stop
         except (OSError, RuntimeError) as error:
             raise UnreadableFile(
                 self._name, f"rows {start + 1} to {min(count, start + BLOCK_ROWS)} cannot be read: {_words(error)}"
             ) from error
 
-    def _part(self, place: _Place, index: int, start: int, stop: int, read: dict[str, Any]) -> Numbers:
-        item = self._file[place.path]
-        if place.path not in read:
-            if len(item.shape) == 1:
-                read[place.path] = item[start:stop]
-            else:
-                read[place.path] = item[:, start:stop].T if place.turned else item[start:stop, :]
-        data = read[place.path]
-        if place.field:
-            return np.ascontiguousarray(data[place.field])
-        column = data if data.ndim == 1 else data[:, index]
-        return np.ascontiguousarray(column).astype(column.dtype.newbyteorder("="), copy=False)
+
+def _part(place: _Place, item: Any, index: int, rows: slice, read: dict[str, Any]) -> Numbers:
+    """A column of a block of rows; `read` keeps what was read of each dataset, columns first."""
+    if place.path not in read:
+        if len(item.shape) == 1:
+            read[place.path] = item[rows]
+        elif place.turned:
+            read[place.path] = item[:, rows]
+        else:  # one pass over a narrow block takes a seventh of the time of a pass for each column
+            block = item[rows, :].T
+            read[place.path] = np.ascontiguousarray(block) if len(block) <= NARROW else block
+    data = read[place.path]
+    if place.field:
+        return np.ascontiguousarray(data[place.field])
+    column = data if data.ndim == 1 else data[index]
+    return np.ascontiguousarray(column).astype(column.dtype.newbyteorder("="), copy=False)
 
 
 def _by_descriptor(stream: BinaryIO) -> str | None:

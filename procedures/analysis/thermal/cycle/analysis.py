@@ -31,8 +31,8 @@ from procedures.core.errors import DomainError
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import AXES
+from procedures.core.temperature.thermometers import ThermometerCorrection
 from procedures.core.thermal_correction import AxisCorrection, Form, ThermalCorrection
-from procedures.core.thermometers import ThermometerCorrection
 
 CURRENT = "the unit's current correction"
 SAME_REFERENCE_C = 0.05

@@ -10,10 +10,10 @@ from procedures.analysis.thermal.cycle.runs import CycleSettings, PreparedRun
 from procedures.analysis.thermal.dependence import Series, fit_order, judge_order, unseen_p_value
 from procedures.analysis.thermal.profile_progress import SENSORS
 from procedures.core.arrays import Array
-from procedures.core.gyro_thermal import GyroPolynomial, GyroThermalCorrection
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.recording import AXES
-from procedures.core.thermometers import ThermometerCorrection
+from procedures.core.temperature.gyros import GyroPolynomial, GyroThermalCorrection
+from procedures.core.temperature.thermometers import ThermometerCorrection
 
 
 def correct_gyros(

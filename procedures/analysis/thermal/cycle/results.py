@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from procedures.analysis.thermal.following import Following
 from procedures.analysis.thermal.profile_progress import LegEvidence
-from procedures.core.gyro_thermal import GyroThermalCorrection
+from procedures.core.temperature.gyros import GyroThermalCorrection
 from procedures.core.thermal_correction import AxisCorrection, ThermalCorrection
 
 Triple = tuple[float, float, float]

@@ -11,8 +11,8 @@ from procedures.analysis.thermal.following import Following, follow
 from procedures.analysis.thermal.profile_progress import CASE, CONVERTER, SENSORS
 from procedures.core.arrays import Array
 from procedures.core.errors import DomainError
+from procedures.core.temperature.thermometers import ThermometerCorrection
 from procedures.core.thermal_correction import AxisCorrection, ThermalCorrection
-from procedures.core.thermometers import ThermometerCorrection
 
 SURE = 1e-3
 """The law of the converter's delay is not used where its p-value is below this."""

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Lock
 
-from bench_service.evidence.estimate_documents import JobEstimates
+from bench_service.evidence.so_far.documents import JobEstimates
 from bench_service.evidence.work_processes import WorkProcesses
 from bench_service.model.job import Job
 from bench_service.wall_clock import monotonic_s

@@ -10,7 +10,7 @@ import numpy as np
 
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
-from procedures.core.thermometers import ThermometerCorrection
+from procedures.core.temperature.thermometers import ThermometerCorrection
 
 
 @dataclass(frozen=True)

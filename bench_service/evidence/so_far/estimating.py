@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bench_service.evidence.cells_so_far import KeptCells
-from bench_service.evidence.estimate_documents import (
+from bench_service.evidence.recordings import RecordingSoFar
+from bench_service.evidence.so_far.cells import KeptCells
+from bench_service.evidence.so_far.documents import (
     AllanDocument,
     BiasDocument,
     CoefficientSoFar,
@@ -14,7 +15,6 @@ from bench_service.evidence.estimate_documents import (
     JobEstimates,
     TriadEstimates,
 )
-from bench_service.evidence.recordings import RecordingSoFar
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.model.context import context_of
 from bench_service.model.job import Job

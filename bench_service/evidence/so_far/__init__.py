@@ -1,0 +1,1 @@
+"""Estimates of a job under way, from the part of it that is recorded."""

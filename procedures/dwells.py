@@ -1,0 +1,76 @@
+"""Parameters of a stop rule for dwells, shared by procedures that take means at stations."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from procedures.analysis.recursive_bias.dwell import DwellsSaved, expected_s, mean_sd
+from procedures.core import units
+from procedures.core.errors import BadParameter
+from procedures.core.recording import TRIADS
+from procedures.core.report import Table
+from procedures.core.stop_rule import ChannelTarget, StopRule
+from procedures.core.unit import Unit
+from procedures.parameters import Parameters
+
+
+class StopAt(Parameters):
+    """Target of a dwell: it ends when the mean of every channel is known so well, at the latest after `dwell_s`."""
+
+    gyro_deg_h: float | None = Field(None, gt=0.0, le=1e6, description="standard uncertainty; null: not asked of gyros")
+    accelerometer_m_s2: float | None = Field(None, gt=0.0, le=100.0, description="the same of accelerometers")
+    check_s: float = Field(5.0, ge=0.1, le=3600.0, description="a dwell is a whole number of these")
+    level: float = Field(1e-3, ge=0.0, lt=0.5, description="of the test that the unit's noise is as its record has it")
+    rule: StopRule | None = Field(None, description="null: made of the unit's own noise when the job is planned")
+
+    @model_validator(mode="after")
+    def _asks_something(self) -> Self:
+        if self.gyro_deg_h is None and self.accelerometer_m_s2 is None:
+            raise ValueError("gyro_deg_h or accelerometer_m_s2 is needed: without a target nothing ends a dwell")
+        return self
+
+    def resolved(self, unit: Unit) -> "StopAt":
+        """The target with its rule, by the noise of the unit's record. Raises `BadParameter` where that is unknown."""
+        if self.rule is not None:
+            return self
+        asked = {
+            "gyro": ("gyro_deg_h", self.gyro_deg_h, units.DEG_PER_HOUR),
+            "accelerometer": ("accelerometer_m_s2", self.accelerometer_m_s2, 1.0),
+        }
+        targets: list[ChannelTarget] = []
+        for triad, (field, value, size) in asked.items():
+            if value is None:
+                continue
+            record = unit.triad(triad)
+            if record is None:
+                way_out = f"left out: the noise of the {triad} triad is not known; a static_run finds it"
+                raise BadParameter(f"stop_at.{field}", value, way_out)
+            targets += [
+                ChannelTarget(n, value * size, noise) for n, noise in zip(TRIADS[triad], record.noise, strict=True)
+            ]
+        rule = StopRule(tuple(targets), self.check_s, self.level)
+        return self.model_copy(update={"rule": rule})
+
+    def expected_s(self, longest_s: float) -> float:
+        """Duration of a dwell to plan with [s]: that of the declared noise."""
+        return longest_s if self.rule is None else expected_s(self.rule, longest_s)
+
+    def warnings(self, longest_s: float) -> tuple[str, ...]:
+        """Targets that the longest dwell does not reach by the unit's noise."""
+        beyond = [t for t in (self.rule.targets if self.rule else ()) if mean_sd(t.noise, longest_s) > t.target_sd]
+        return tuple(
+            f"stop_at: {t.channel} is known to {mean_sd(t.noise, longest_s):.3g} after the longest dwell of "
+            f"{longest_s:g} s, and {t.target_sd:.3g} is asked (rad/s or m/s²): no dwell will end before; ask for less, "
+            "or give a longer dwell_s"
+            for t in beyond
+        )
+
+
+def saved_table(saved: DwellsSaved) -> Table:
+    """Durations of the dwells under the rule, and what it saved."""
+    rows = tuple((d.label, d.duration_s, d.longest_s, "the rule" if d.by_rule else "its time") for d in saved.dwells)
+    note = (
+        f"The stop rule saved {saved.saved_s:.0f} s, {100.0 * saved.share:.0f} % of the longest dwells. It looks at "
+        "the unit's noise, not at what is measured: the means are not biased by it."
+    )
+    return Table("Dwells", ("station", "dwell, s", "longest, s", "ended by"), rows, note)
