@@ -53,12 +53,14 @@ async def record_station(bench: Bench, station: Station) -> Stream:
         await bench.turntable.move_to(station.angles)
     await bench.clock.sleep(station.settle_s)
     stream = bench.imu.record(station.record_s, station)
-    return stream if station.until is None else replace(stream, blocks=_until_enough(stream, station.until))
+    if station.until is None:
+        return stream
+    return replace(stream, blocks=_until_enough(stream, station.until, station.record_s))
 
 
-async def _until_enough(stream: Stream, rule: StopRule) -> Blocks:
+async def _until_enough(stream: Stream, rule: StopRule, longest_s: float) -> Blocks:
     """The stream's blocks up to the sample with which the rule ends the dwell."""
-    live = LiveDwell(rule, stream.channels, stream.rate_hz, stream.station.record_s)
+    live = LiveDwell(rule, stream.channels, stream.rate_hz, longest_s)
     try:
         async for block in stream.blocks:
             last = live.add(block)

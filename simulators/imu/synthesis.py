@@ -26,7 +26,7 @@ def synthesise(noise: NoiseCoefficients, rate_hz: float, count: int, seed: int) 
     truth = TriadTruth(
         (0.0, 0.0, 0.0),
         ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-        quantization=(_LEAST,) * 3,
+        quantization=(_LEAST, _LEAST, _LEAST),
         random_walk=(noise.random_walk, 0.0, 0.0),
         bias_instability=(noise.bias_instability, 0.0, 0.0),
         rate_random_walk=(noise.rate_random_walk, 0.0, 0.0),

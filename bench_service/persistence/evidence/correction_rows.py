@@ -31,7 +31,9 @@ def correction_of_row(row: CorrectionRow, decisions: Sequence[CorrectionDecision
     )
 
 
-def corrections_where(session: Session, *conditions: ColumnElement[bool]) -> list[StoredCorrection]:
+def corrections_where(
+    session: Session, *conditions: ColumnElement[bool] | InstrumentedAttribute[bool]
+) -> list[StoredCorrection]:
     """Corrections under some conditions with their decisions, oldest first."""
     rows = session.scalars(select(CorrectionRow).where(*conditions).order_by(CorrectionRow.id)).all()
     decisions: dict[str, list[CorrectionDecisionRow]] = defaultdict(list)

@@ -69,7 +69,7 @@ def modelled(case_c: Array, sample_s: float, delay_s: float, case_lag_s: float, 
 
 def _cells(values: Array, size: int) -> Array:
     count = len(values) // size
-    return values[: count * size].reshape(count, size).mean(axis=1)
+    return np.asarray(values[: count * size].reshape(count, size).mean(axis=1), dtype=np.float64)
 
 
 class _Runs:
@@ -87,7 +87,7 @@ class _Runs:
     def free(self, run: int, delay_s: float) -> Array:
         """Columns of heating and first state of a run, (n, 2)."""
         at = (np.arange(len(self.board[run])) + 0.5) * self.cell_s
-        return np.column_stack([np.ones_like(at), np.exp(-at / delay_s)])
+        return np.column_stack([np.ones_like(at), np.exp(-at / delay_s)]).astype(np.float64)
 
     def left(self, logs: Array) -> Array:
         """Departures of all runs, heating and first state fitted, for logarithms of Δ and τ_b."""
