@@ -8,7 +8,7 @@ import pytest
 from procedures.analysis.turns import summary
 from procedures.core import units
 from procedures.core.recording import RecordingInfo, Station
-from tests.domain.test_whole_turns import (
+from tests.kit.turn_outputs import (
     B_GYRO,
     K_GYRO,
     PROCEDURE,
