@@ -1,12 +1,21 @@
 """Pages of a service with accounts: log-in, changes under a name that is proved, and a stop that needs none."""
 
 import re
+from collections.abc import Generator
 
+import pytest
 from playwright.sync_api import expect
 
 from bench_service.wall_clock import pause
+from tests.browser.accounts import PASSWORD, with_account
 from tests.browser.conftest import Watched
-from tests.kit.service_with_accounts import PASSWORD
+from tests.end_to_end.bench_process import BenchProcess
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Generator[BenchProcess]:
+    with with_account(tmp_path_factory.mktemp("accounts")) as made:
+        yield made
 
 
 def test_a_person_logs_in_starts_a_job_under_her_name_and_logs_out(window: Watched) -> None:
