@@ -97,6 +97,7 @@ class _Rows:
         of_recording = f"(SELECT n, k FROM {series}, ({self._small(PER_JOB)}) small) s"
         jobs = {
             "id": job,
+            "number": "n + 1000",
             "unit": unit,
             "created_at": moment,
             "queued_at": moment,
