@@ -30,7 +30,7 @@ AT_ONCE = 2
 """Number of processes."""
 MANY_VALUES = 5_000_000
 """Number of samples of all channels from which an analysis takes longer than handing its parts over."""
-IDLE_S = 60.0
+IDLE_S = 10.0
 """Time without work after which the processes end [s, real time]."""
 MODULES = (
     "procedures.launches",
@@ -53,6 +53,7 @@ class SpreadProcesses:
         self._pool: ProcessPoolExecutor | None = None
         self._users = 0
         self._timer: Timer | None = None
+        self._expected = False
         self._closed = False
 
     def over(self, values: int) -> Spread | None:
@@ -64,19 +65,25 @@ class SpreadProcesses:
         return spread_over(self.over(sum(r.info.count * len(r.info.channels) for r in recordings)))
 
     def begin_for(self, stations: Sequence[Station], imu: Imu) -> None:
-        """Begin the processes where the recordings of these stations will need them."""
+        """Begin the processes where the recordings of these stations will need them; they wait until `done`."""
         seconds = sum(station.record_s for station in stations)
         rate_hz = next((s.sample_rate_hz for s in stations if s.sample_rate_hz is not None), imu.rate_hz)
         self.begin(round(seconds * rate_hz) * len(imu.channels))
 
     def begin(self, values: int) -> None:
-        """Begin the processes for an analysis of so many values, which will come; it does not wait for them."""
-        if self.over(values) is not None:
+        """Begin the processes for an analysis of so many values; it does not wait for them, they wait until `done`."""
+        if self.over(values) is not None and not self._expected:
+            self._expected = True
             pool = self._taken()
             if pool is not None:
                 for _ in range(AT_ONCE):
                     pool.submit(_nothing)
-                self._given_back()
+
+    def done(self) -> None:
+        """Let the processes end when they are idle: the analysis that was expected is done, or will not come."""
+        if self._expected:
+            self._expected = False
+            self._given_back()
 
     def each(self, work: Callable[[A], R], items: Sequence[A]) -> list[R]:
         """See `Spread.each`."""

@@ -203,6 +203,7 @@ class JobRunner:
             self._remember(procedure, result.outcome, stored)
         except (DomainError, ServiceError) as error:
             return StepOutcome(Failure(type(error).__name__, str(error)))
+        self._analysis_over()
         self._stores.jobs.transition(job_id, JobState.SUCCEEDED, at=now(), verdict=stored.verdict, result_id=stored.id)
         return StepOutcome()
 
@@ -212,6 +213,7 @@ class JobRunner:
         if job.state is not JobState.RUNNING:  # its end was stored, though the acknowledgement was lost
             return job
         self._stores.recordings.interrupt_open(job_id)
+        self._analysis_over()
         if outcome.paused:
             return self._stores.jobs.put_aside(job_id, now())
         again = try_again(self._stores.queue, job, outcome.failure, self._retry_scale)
@@ -227,6 +229,10 @@ class JobRunner:
         session = self._session
         if session is not None:
             session.shut_down()
+
+    def _analysis_over(self) -> None:
+        if self._spread is not None:
+            self._spread.done()
 
     def running_job(self) -> Job | None:
         """The job that drives the bench now."""

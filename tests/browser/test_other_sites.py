@@ -14,8 +14,8 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, Response
 
 from tests.browser.conftest import address
-from tests.browser.test_log_in import PASSWORD, service
 from tests.end_to_end.bench_process import BenchProcess
+from tests.kit.service_with_accounts import PASSWORD, service
 
 __all__ = ["service"]  # a service with one account
 FRAMED = ("/", "/log-in", "/benches/sim/stops", "/recordings", "/docs")

@@ -1,5 +1,7 @@
 """Estimates so far: the filter against closed forms, coefficients against generalised least squares and simulation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -112,9 +114,9 @@ def test_the_uncertainties_hold_at_every_station() -> None:
 def test_counts_and_stations_without_angles_have_no_coefficients_so_far() -> None:
     means, _ = accelerometer(np.random.default_rng(6), 1e-3, ANGLES)
     with pytest.raises(UnfitRecording, match="in count"):
-        coefficients_so_far(StationMeans(**{**vars(means), "output_unit": "count"}), SITE, None, IDEAL)
+        coefficients_so_far(replace(means, output_unit="count"), SITE, None, IDEAL)
     with pytest.raises(UnfitRecording, match="no angles"):
-        coefficients_so_far(StationMeans(**{**vars(means), "angles": (None, *means.angles[1:])}), SITE, None, IDEAL)
+        coefficients_so_far(replace(means, angles=(None, *means.angles[1:])), SITE, None, IDEAL)
 
 
 def test_with_a_coarse_table_the_uncertainties_still_hold() -> None:

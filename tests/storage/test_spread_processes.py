@@ -112,7 +112,11 @@ def test_idle_processes_end_and_short_recordings_begin_none() -> None:
     assert shared.processes() == []
     try:
         with spread_over(shared.over(MANY_VALUES)):
+            shared.begin(MANY_VALUES)
             numbers = set(each(_own_number, list(range(4))))
+        pause(0.5)
+        assert numbers <= set(shared.processes()), "they wait for the analysis that was announced"
+        shared.done()
         deadline_s = monotonic_s() + 30.0
         while any(psutil.pid_exists(number) for number in numbers):
             assert monotonic_s() < deadline_s
