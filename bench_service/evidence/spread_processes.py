@@ -39,7 +39,7 @@ MODULES = (
     "scipy.signal",
     "bench_service.persistence.evidence.recording_store",
 )
-"""What a process imports beforehand: it has the time while a job records."""
+"""Modules that a process imports beforehand: it has the time while a job records."""
 
 
 class SpreadProcesses:
