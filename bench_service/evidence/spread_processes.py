@@ -39,7 +39,7 @@ MODULES = (
     "scipy.signal",
     "bench_service.persistence.evidence.recording_store",
 )
-"""What a process imports beforehand: it has the time while a job records."""
+"""Modules that a process imports beforehand: it has the time while a job records."""
 
 
 class SpreadProcesses:
@@ -86,7 +86,7 @@ class SpreadProcesses:
             self._given_back()
 
     def each(self, work: Callable[[A], R], items: Sequence[A]) -> list[R]:
-        """See `Spread.each`."""
+        """Work out the parts in these processes; see `Spread.each`."""
         pool = self._taken()
         try:
             if pool is None:

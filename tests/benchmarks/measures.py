@@ -1,4 +1,4 @@
-"""What is measured of a revision, through its service or in its own interpreter; all that any two revisions both have.
+"""Measures of a revision, through its service or in its own interpreter; all that any two revisions both have.
 
 A measure returns figures of one round by their labels; a unit is the end of its label.
 """

@@ -49,7 +49,7 @@ class Revision:
                 yield running
 
     def script(self, text: str) -> str:
-        """What a script prints in its environment, with BLAS in one thread as the service has it."""
+        """Return the output of a script in its environment, with BLAS in one thread as the service has it."""
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
         return _said([str(self.python), "-c", text], self.folder, environment)
 

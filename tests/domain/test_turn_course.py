@@ -6,19 +6,16 @@ import numpy as np
 import pytest
 
 from procedures.analysis.turns import summary
+from procedures.bench.description import AxisLimits
+from procedures.catalog.scale_factor_whole_turns import PROCEDURE
 from procedures.core import units
-from procedures.core.recording import RecordingInfo, Station
-from tests.domain.test_whole_turns import (
-    B_GYRO,
-    K_GYRO,
-    PROCEDURE,
-    SITE,
-    Context,
-    MemoryRecording,
-    turn,
-    turnable,  # noqa: F401  a fixture
-)
+from procedures.core.noise import NoiseCoefficients
+from procedures.core.recording import MemoryRecording, RecordingInfo, Station
+from procedures.core.unit import TriadRecord
+from procedures.procedure import Context
+from tests.kit.forward_model import B_GYRO, K_GYRO, SITE, turn
 
+WHITE = NoiseCoefficients(quantization=0.39 * units.ARCSEC, random_walk=0.0014 * units.DEG_PER_SQRT_HOUR)
 RATE_HZ, FINE = 100.0, 20
 """Samples a second, and steps of the motion in a sample."""
 
@@ -63,13 +60,15 @@ def _recorded(station: Station, unit, start_s: float, late_s: float, over_deg: f
 @pytest.mark.parametrize("planned", [False, True])
 def test_a_table_that_is_braked_late_still_gives_the_matrix(
     planned: bool,
-    turnable: Context,  # noqa: F811
+    context: Context,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     if planned:  # as analyses took the course before: by the plan alone
         monkeypatch.setattr(summary, "as_turned", lambda motion, *_: motion)
     params = PROCEDURE.params(rates_deg_s=(20.0, 50.0), turning_s=20.0, rest_s=8.0)
-    context = replace(turnable, unit=replace(turnable.unit, sample_rate_hz=RATE_HZ))
+    unit = replace(context.unit, gyro=TriadRecord((WHITE,) * 3), sample_rate_hz=RATE_HZ)
+    outer = AxisLimits(-360.0, 360.0, 60.0, 100.0, continuous=True)
+    context = Context(unit, replace(context.bench, outer=outer))
     rng = np.random.Generator(np.random.Philox(4))
     made, start_s = [], 10.0
     for station in PROCEDURE.schedule(PROCEDURE.resolve(params, context)):

@@ -89,7 +89,7 @@ class Watched:
         return self._recording
 
     def seen(self) -> "Seen":
-        """What the first pass has found, to be carried to this recording's original by `learn`."""
+        """Return the findings of the first pass, to be carried to this recording's original by `learn`."""
         return self.fitness(), self._outliers
 
     def learn(self, seen: "Seen") -> None:

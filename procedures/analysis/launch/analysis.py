@@ -84,7 +84,7 @@ def _groups(names: tuple[str, ...], count: int, parts: int) -> list[tuple[str, .
 
 @dataclass(frozen=True)
 class _First:
-    """What the first pass gives: cell means, and the context of each channel."""
+    """Cell means of the first pass, and the context of each channel."""
 
     cells: Cells
     known: dict[str, ChannelContext]
