@@ -26,6 +26,7 @@ from bench_service.api import (
     results,
     samples,
     storage,
+    synthetic,
     trends,
 )
 from bench_service.api.access import guard, identify
@@ -51,7 +52,7 @@ from bench_service.bench.stop.elsewhere import StopAddresses
 from bench_service.bench.stop.road import StopRoads
 from bench_service.bench_files import BenchFiles
 from bench_service.drivers.composition import devices_of, driver_of, own_devices
-from bench_service.drivers.simulated import drawn_unit
+from bench_service.drivers.simulated import drawn_unit, synthetic_rates
 from bench_service.driving import driving
 from bench_service.evidence.catalogue import Catalogue
 from bench_service.evidence.reports.printing_process import open_printing
@@ -93,6 +94,7 @@ ROUTERS = (
     procedures,
     jobs,
     recordings,
+    synthetic,
     samples,
     batches,
     results,
@@ -176,6 +178,7 @@ def open_service(settings: Settings, closing: ExitStack, drive: bool = True, apa
         database=DatabaseContents(opened),
         settings=settings,
         runner=runner_maker(opened, settings.database_url, code, closing, apart),
+        synthetic=synthetic_rates,
     )
     if settings.audit_days is not None:
         begin_retention(stores.audit, timedelta(days=settings.audit_days), closing)

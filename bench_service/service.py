@@ -17,7 +17,7 @@ from bench_service.campaigns.stores import Stores
 from bench_service.evidence.analyses import AnalysisService
 from bench_service.evidence.batches.runner import RunnerMaker
 from bench_service.evidence.batches.service import BatchService
-from bench_service.evidence.imports import ImportService
+from bench_service.evidence.imports import ImportService, SyntheticRates
 from bench_service.evidence.raw_data.nightly import NightlyStorage
 from bench_service.evidence.raw_data.service import RawDataService, StorageSettings
 from bench_service.evidence.recomputation import RecomputationService
@@ -65,6 +65,7 @@ class BenchService:
         database: DatabasePort | None = None,
         settings: Settings | None = None,
         runner: RunnerMaker | None = None,
+        synthetic: SyntheticRates | None = None,
     ) -> None:
         """Set up with `driver` of this process's own bench; None: it plans and queues for benches that workers drive.
 
@@ -73,6 +74,7 @@ class BenchService:
         analyses are computed and reports typeset; None: in the caller's thread. `database`: the database as a whole;
         None: not known. `settings`: the time of the nightly work, and the rules for raw data; None: no such work, and
         no rules. `runner`: builds the runner of batches of analyses; None: other processes run their tasks.
+        `synthetic`: the source of synthetic recordings; None: they are refused.
         """
         self.access = AccessService(stores.access, AccessBook(stores.access))
         self.safety = safety
@@ -83,7 +85,7 @@ class BenchService:
         self.catalogue = planner.catalogue
         self.code_version = code_version
         self.benches = planner.benches
-        self.imports = ImportService(stores)
+        self.imports = ImportService(stores, synthetic)
         self.analyses = AnalysisService(
             stores, planner.catalogue, stores.jobs.get, code_version, processes and processes.analyses
         )

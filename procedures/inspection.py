@@ -10,9 +10,8 @@ from dataclasses import replace
 from procedures.analysis.fitness.findings import Kind
 from procedures.analysis.fitness.watched import Inspection, Watch
 from procedures.analysis.measured_stations import at_measured_angles
-from procedures.core.decision import OutcomeName
 from procedures.core.errors import BadParameter, DomainError, MissingChannel
-from procedures.core.limits import Check, Verdict, decided
+from procedures.core.limits import Check, OutcomeName, Verdict, decided
 from procedures.core.recording import Recording, cut
 from procedures.core.unit import Unit
 from procedures.parameters import DecisionRules

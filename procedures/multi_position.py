@@ -14,12 +14,13 @@ from pydantic import Field
 from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.extra_terms import ExtraFit, Kind, TermEstimate, fit_terms, require_terms, terms_of
 from procedures.analysis.calibration.misfit import MISFIT_MAX
-from procedures.analysis.calibration.plan import IN_RUN_SOURCE, TriadPlan, predicted_parts
+from procedures.analysis.calibration.plan import TriadPlan, predicted_parts
 from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
 from procedures.analysis.calibration.station_means import StationMeans, launch_warnings, station_means
 from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
 from procedures.analysis.calibration.triad_analysis import analyse_inputs, noise_of_means
+from procedures.analysis.orientation_plan.requirements import IN_RUN_SOURCE
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.coefficient_name import CoefficientName

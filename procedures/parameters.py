@@ -5,8 +5,8 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from procedures.core.decision import COVERAGE, Rule, RuleName
 from procedures.core.errors import BadParameter
+from procedures.core.limits import COVERAGE, Rule, RuleName
 
 
 class Parameters(BaseModel):

@@ -10,10 +10,9 @@ from procedures.analysis.fitness.findings import FitnessSettings
 from procedures.analysis.fitness.watched import Inspection
 from procedures.bench import Bench, BenchDescription
 from procedures.bench.imu import Stream
-from procedures.core.decision import OutcomeName
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.limits import Check, PlannedCheck, Verdict
+from procedures.core.limits import Check, OutcomeName, PlannedCheck, Verdict
 from procedures.core.mounting import Mounting
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report

@@ -26,6 +26,7 @@ from procedures.bench import Bench
 from procedures.bench.chamber import Chamber, ChamberReading
 from procedures.bench.errors import DeviceFault, SoakNotReached
 from procedures.bench.imu import Stream
+from procedures.bench.turntable import require_turns_over
 from procedures.core.errors import MissingChannel
 from procedures.core.recording import Channel, Quantity, Station
 from procedures.core.stop_rule import StopRule
@@ -85,13 +86,14 @@ async def record_turn(bench: Bench, station: Station) -> Stream:
     stream = await record_station(bench, station)
     if station.turn is None:
         return stream
-    return replace(stream, blocks=_turning(bench, station.turn, stream.blocks))
+    return replace(stream, blocks=_turning(bench, station, station.turn, stream.blocks))
 
 
-async def _turning(bench: Bench, turn: Turn, blocks: Blocks) -> Blocks:
+async def _turning(bench: Bench, station: Station, turn: Turn, blocks: Blocks) -> Blocks:
     await bench.turntable.command_turn(turn)
     async for block in blocks:
         yield block
+    require_turns_over(station.angles, turn, await bench.turntable.read())
     await bench.turntable.settle()
 
 

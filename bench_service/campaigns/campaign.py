@@ -9,8 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from procedures.core.decision import RuleName
-from procedures.core.limits import bounds
+from procedures.core.limits import RuleName, bounds
 from procedures.core.units import converted
 
 NAME = r"^[a-z0-9][a-z0-9_-]{0,63}$"

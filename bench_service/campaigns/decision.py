@@ -1,4 +1,4 @@
-"""Decisions on a campaign's own limits, by the rules of `procedures.core.decision`.
+"""Decisions on a campaign's own limits, by the rules of `procedures.core.limits`.
 
 The words are those of ILAC-G8 (4.2.3): a pass or a fail is conditional where the value lies within U of the limit.
 """
@@ -7,8 +7,7 @@ from dataclasses import replace
 
 from bench_service.campaigns.campaign import DecisionRule, StepLimit
 from procedures.core import limits
-from procedures.core.decision import Rule, RuleName, coverage_factor
-from procedures.core.limits import Check
+from procedures.core.limits import Check, Rule, RuleName, coverage_factor
 from procedures.parameters import DecisionRules
 
 

@@ -60,6 +60,7 @@ PANELS = {
     "Evidence": (
         evidence.recordings,
         evidence.export,
+        importing.synthesise,
         plans.methods,
         evidence.analyse,
         evidence.results,

@@ -1,7 +1,7 @@
 """Driver of the simulated bench: the only file that imports the simulators."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -16,6 +16,8 @@ from bench_service.model.errors import Misconfigured, NotMounted
 from bench_service.wall_clock import pause_async
 from procedures.bench import Bench, BenchDescription, BenchNeeds, Clock
 from procedures.bench.errors import BenchError
+from procedures.core.arrays import Array
+from procedures.core.noise import NoiseCoefficients
 from procedures.core.unit import Unit
 from simulators.truth import (
     BenchTruth,
@@ -213,3 +215,10 @@ def drawn_unit(serial: str) -> Unit | None:
 def _drawn_truth(serial: str) -> UnitTruth | None:
     found = RANDOM_UNIT.match(serial)
     return None if found is None else replace(random_unit_truth(int(found.group(1))), serial=serial)
+
+
+def synthetic_rates(noise: NoiseCoefficients, rate_hz: float, count: int, seed: int) -> Iterator[Array]:
+    """Blocks of rates of a chosen noise, for synthetic recordings."""
+    from simulators.imu.synthesis import synthesise
+
+    return synthesise(noise, rate_hz, count, seed)

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from bench_service.evidence.batches.content import content_of
 from bench_service.evidence.catalogue import Catalogue
-from bench_service.evidence.content import content_of
 from bench_service.evidence.documents import document_of, require_storable
 from bench_service.evidence.job_analysis import analysed, recordings_of
 from bench_service.evidence.stores import EvidenceStores

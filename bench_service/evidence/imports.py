@@ -1,8 +1,11 @@
 """Import of recorded files as recordings of a unit."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict, dataclass
 from datetime import timedelta
+
+import numpy as np
 
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.evidence.units import register
@@ -14,18 +17,52 @@ from bench_service.model.errors import NotReady, StorageFull
 from bench_service.model.records import Idempotency, NewRecording
 from bench_service.model.request import fingerprint
 from bench_service.wall_clock import now
-from procedures.core.recording import RecordingInfo
+from procedures.core.arrays import Array
+from procedures.core.errors import BadParameter
+from procedures.core.noise import NoiseCoefficients
+from procedures.core.recording import Channel, RecordingInfo
 from procedures.core.unit import Unit
 
 CRASHED_IMPORT = timedelta(hours=1)
 """Age at which an unsealed import counts as orphaned: its process is gone."""
 
 
-class ImportService:
-    """Stores recorded files as recordings."""
+SYNTHETIC = "SYNTHETIC"
+"""Serial of the unit that all synthetic recordings are of: their results join no other unit's history or trend."""
+MOST_SAMPLES = 50_000_000
+"""Most samples of a synthetic recording: 14 h at 1000 a second."""
+SyntheticRates = Callable[[NoiseCoefficients, float, int, int], Iterator[Array]]
+"""Source of noise: coefficients, rate [Hz], number of samples and seed to blocks of rates."""
 
-    def __init__(self, stores: EvidenceStores) -> None:
+
+@dataclass(frozen=True)
+class Synthesis:
+    """Request for a synthetic recording: one channel of chosen noise."""
+
+    channel: Channel
+    noise: NoiseCoefficients
+    rate_hz: float
+    duration_s: float
+    seed: int
+
+    @property
+    def count(self) -> int:
+        return round(self.duration_s * self.rate_hz)
+
+
+def require_real(serial: str) -> None:
+    """Refuse the serial of synthetic recordings for anything else. Raises `BadParameter`."""
+    if serial.upper() == SYNTHETIC:
+        raise BadParameter("unit", serial, "the serial of a unit: this one is that of synthetic recordings")
+
+
+class ImportService:
+    """Stores recorded files as recordings, and synthetic ones."""
+
+    def __init__(self, stores: EvidenceStores, synthetic: SyntheticRates | None = None) -> None:
+        """Set up with the source of synthetic noise; None: there is none here."""
         self._stores = stores
+        self._synthetic = synthetic
         self._reader = FileReader()
 
     def close(self) -> None:
@@ -43,8 +80,45 @@ class ImportService:
 
         Raises `DomainError` naming file and row, `StorageFull`; then nothing of the recording remains.
         """
+        require_real(description.unit)
         with self._reading(files, description) as imported:
             return self._store(imported, key)
+
+    def synthesise(self, asked: Synthesis, key: str | None = None) -> RecordingInfo:
+        """Store a record of chosen noise. It is marked as synthetic for ever, and of the unit `SYNTHETIC` alone.
+
+        Raises `BadParameter`, `NotReady` where this process has no source of noise, `StorageFull`.
+        """
+        if not 2 <= asked.count <= MOST_SAMPLES:
+            raise BadParameter("duration_s", asked.duration_s, f"2 … {MOST_SAMPLES} samples, not {asked.count}")
+        if self._synthetic is None:
+            raise NotReady(["synthetic recordings are made by the service of a simulated bench"])
+        settings = {"noise": asdict(asked.noise), "seed": asked.seed, "channel": asked.channel.name}
+        idempotency = None if key is None else Idempotency(f"synthetic:{key}", fingerprint(asked))
+        recordings = self._stores.recordings
+        known = self._stores.keys.made(idempotency, "recording")
+        if known is not None:
+            return recordings.get(known).info
+        register(self._stores.units, Unit(SYNTHETIC, asked.rate_hz, (asked.channel,)))
+        writer = recordings.open(
+            NewRecording(
+                unit=SYNTHETIC,
+                channels=(asked.channel,),
+                rate_hz=asked.rate_hz,
+                start_s=0.0,
+                simulated=True,
+                dtype=np.float64,
+                source={"origin": "synthetic", "synthetic": settings},
+                idempotency=idempotency,
+            )
+        )
+        try:
+            for block in self._synthetic(asked.noise, asked.rate_hz, asked.count, asked.seed):
+                writer.write(block[:, None])
+            return writer.seal()
+        except BaseException:
+            writer.abandon()
+            raise
 
     def describe(self, file: ImportFile, unit: str | None, form: str | None, table: str | None) -> Proposal:
         """Propose a description of a file, for a person to confirm; nothing is stored. Raises `DomainError`."""

@@ -4,10 +4,14 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from procedures.bench.device import Device, Status
+from procedures.bench.errors import DeviceFault
 from procedures.core.constant_rate import ConstantRate
 from procedures.core.sinusoid import Sinusoid
 from procedures.core.table_angles import TableAngles
 from procedures.core.turn import Turn
+
+OVER_DEG_S, OVER_DEG = 0.01, 0.1
+"""Largest rate, and largest distance from the angle of their beginning, at which whole turns are over."""
 
 
 @dataclass(frozen=True)
@@ -76,3 +80,19 @@ class Turntable(Device, Protocol):
         A table at rest gets no command. Raises `DeviceFault`, `Disconnected`.
         """
         ...
+
+
+def require_turns_over(begin: TableAngles | None, turn: Turn, reading: TableReading) -> None:
+    """Check that a recording that ends now holds its turns as a whole. Raises `DeviceFault` with what is left of them.
+
+    `begin`: angles where they began; None: not known, and only the rate is looked at.
+    """
+    rates = dict(zip(("outer", "middle", "inner"), reading.rates_deg_s or (0.0, 0.0, 0.0), strict=True))
+    began, shown = (getattr(angles, f"{turn.axis}_deg") for angles in (begin or reading.angles, reading.angles))
+    left_deg = shown - began - 360.0 * round((shown - began) / 360.0)
+    if abs(rates[turn.axis]) > OVER_DEG_S or abs(left_deg) > OVER_DEG:
+        raise DeviceFault(
+            f"the recording ends before the turns do: the {turn.axis} axis is {left_deg:.4g} deg from their end, at "
+            f"{rates[turn.axis]:.4g} deg/s, because it was braked late; give a longer rest_s, or served simulators a "
+            "smaller time_factor"
+        )

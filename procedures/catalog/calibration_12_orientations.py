@@ -14,15 +14,7 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis.calibration.estimator import Weighting
-from procedures.analysis.calibration.plan import (
-    TriadPlan,
-    basis,
-    in_run_check,
-    in_run_unresolved,
-    run_to_run_requirements,
-    triad_plan,
-    unresolved,
-)
+from procedures.analysis.calibration.plan import TriadPlan, basis, triad_plan
 from procedures.analysis.calibration.reference import TRIAD_NAMES
 from procedures.analysis.calibration.reference_temperature import ThermalShare, require_correctable
 from procedures.analysis.calibration.scalar import require_scalar_determined
@@ -30,6 +22,12 @@ from procedures.analysis.calibration.station_means import launch_warnings
 from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS, windows
 from procedures.analysis.calibration.summary import TriadSummary
 from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers, analyse_gyros
+from procedures.analysis.orientation_plan.requirements import (
+    in_run_check,
+    in_run_unresolved,
+    run_to_run_requirements,
+    unresolved,
+)
 from procedures.analysis.recursive_bias.dwell import DwellsSaved, dwells_saved
 from procedures.bench import Bench
 from procedures.bench.imu import Stream

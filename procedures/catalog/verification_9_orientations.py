@@ -20,14 +20,7 @@ from pydantic import Field
 
 from procedures import steps
 from procedures.analysis.calibration.diagnosis import LIKELY_P_VALUE
-from procedures.analysis.calibration.plan import (
-    IN_RUN_LEVEL,
-    TriadPlan,
-    basis,
-    in_run_check,
-    in_run_unresolved,
-    triad_plan,
-)
+from procedures.analysis.calibration.plan import TriadPlan, basis, triad_plan
 from procedures.analysis.calibration.reference import TRIAD_NAMES
 from procedures.analysis.calibration.reference_temperature import require_correctable
 from procedures.analysis.calibration.station_means import launch_warnings
@@ -43,6 +36,7 @@ from procedures.analysis.calibration.triad_verification import (
     verify_triad,
 )
 from procedures.analysis.calibration.verification import predicted_sd
+from procedures.analysis.orientation_plan.requirements import IN_RUN_LEVEL, in_run_check, in_run_unresolved
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core import units

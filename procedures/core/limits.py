@@ -1,11 +1,115 @@
-"""Measured values against requirements, and the verdict over all checks."""
+"""Measured values against requirements, the decision rule between them, and the verdict over all checks.
+
+``U = k·u`` is the expanded uncertainty, k Student's factor of the value's degrees of freedom. Simple acceptance passes
+a value at its limit; guarded acceptance wants it inside by the guard band ``w = r·U``. A pass or a fail is conditional
+where the value lies within U of the limit (ISO/IEC 17025, 7.8.6; ILAC-G8).
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from math import isfinite
+from math import inf, isfinite
+from typing import Literal
 
-from procedures.core.decision import Decision, Rule, decide, inside
+RuleName = Literal["simple", "guarded"]
+OutcomeName = Literal["pass", "conditional pass", "conditional fail", "fail"]
+COVERAGE = 0.9545
+"""Coverage probability without another wish: k = 2 of a normal distribution."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Decision rule of one limit."""
+
+    name: RuleName = "simple"
+    guard: float = 1.0
+    """Factor r of the guard band r·U; of the guarded rule alone."""
+    coverage_probability: float = COVERAGE
+    coverage_factor: float | None = None
+    """Factor k where it is given; None: of the coverage probability and the degrees of freedom."""
+
+    def __str__(self) -> str:
+        return "simple acceptance" if self.name == "simple" else f"guard band of {self.guard:g}·U"
+
+
+@dataclass(frozen=True)
+class Decision:
+    """How one value was decided."""
+
+    rule: str
+    """Rule in words; a test of significance is held at its level, without a guard band."""
+    outcome: OutcomeName
+    expanded_uncertainty: float | None = None
+    """Expanded uncertainty U in the limit's unit; None: the value has no stated uncertainty."""
+    coverage_factor: float | None = None
+    coverage_probability: float | None = None
+    degrees_of_freedom: float | None = None
+    """Degrees of freedom of u; None: so many that they do not count, or no uncertainty."""
+    guard_band: float = 0.0
+    """Guard band w in the limit's unit."""
+
+    @property
+    def conditional(self) -> bool:
+        """True where the value lies within its expanded uncertainty of the limit."""
+        return self.outcome.startswith("conditional")
+
+    @property
+    def sentence(self) -> str:
+        """The decision for a reader: rule, U with its factor and degrees of freedom, outcome."""
+        if self.expanded_uncertainty is None:
+            return f"{self.rule}: {self.outcome}"
+        freedom = "" if self.degrees_of_freedom is None else f", ν = {self.degrees_of_freedom:.3g}"
+        band = "" if self.guard_band == 0.0 else f", w = {self.guard_band:.3g}"
+        factor = "" if self.coverage_factor is None else f" (k = {self.coverage_factor:.3g}{freedom})"
+        return f"{self.rule}{band}, U = {self.expanded_uncertainty:.3g}{factor}: {self.outcome}"
+
+
+def coverage_factor(probability: float, degrees_of_freedom: float | None) -> float:
+    """Student's factor k of a two-sided interval (JCGM 100, G.3); normal where no degrees of freedom are given."""
+    from scipy.special import ndtri, stdtrit  # a start does without it
+
+    tail = 0.5 * (1.0 + probability)
+    if degrees_of_freedom is None or not isfinite(degrees_of_freedom):
+        return float(ndtri(tail))
+    return float(stdtrit(max(1.0, degrees_of_freedom), tail))
+
+
+def combined_freedom(parts: list[tuple[float, float | None]]) -> float | None:
+    """Effective degrees of freedom of a root of a sum of squares, ``ν = u⁴/Σ(u_i⁴/ν_i)`` (JCGM 100, G.4.1).
+
+    `parts`: contribution u_i and its degrees of freedom, None for infinite. None where all are infinite.
+    """
+    total = sum(part**2 for part, _ in parts) ** 2
+    below = sum(part**4 / freedom for part, freedom in parts if freedom is not None and isfinite(freedom))
+    return None if below == 0.0 else total / below
+
+
+def inside(value: float, minimum: float | None, maximum: float | None) -> float:
+    """Distance of a value from the nearer limit; negative outside, and for no finite value."""
+    below = inf if maximum is None else maximum - value
+    above = inf if minimum is None else value - minimum
+    found = min(below, above)
+    return -inf if found != found or not isfinite(value) else found
+
+
+def decide(distance: float, passed: bool, u: float | None, degrees_of_freedom: float | None, rule: Rule) -> Decision:
+    """Decide on a value `distance` inside its limit, `passed` by simple acceptance, of standard uncertainty u.
+
+    A value without a known uncertainty is accepted simply under either rule, and the decision says so.
+    """
+    if u is None:
+        told = "simple acceptance" if rule.name == "simple" else f"{rule}, without effect"
+        return Decision(f"{told} (the value has no stated uncertainty)", "pass" if passed else "fail")
+    k = coverage_factor(rule.coverage_probability, degrees_of_freedom)
+    k = k if rule.coverage_factor is None else rule.coverage_factor
+    expanded = k * u
+    band = rule.guard * expanded if rule.name == "guarded" else 0.0
+    accepted = passed and distance >= band
+    near = abs(distance) < expanded
+    outcome: OutcomeName = "pass" if accepted else "fail"
+    if near:
+        outcome = "conditional pass" if accepted else "conditional fail"
+    return Decision(str(rule), outcome, expanded, k, rule.coverage_probability, degrees_of_freedom, band)
 
 
 class Verdict(StrEnum):

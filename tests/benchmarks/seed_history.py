@@ -87,13 +87,17 @@ class _Rows:
         job, at = self._id("n", 0), self._at()
         unit = f"CASE WHEN n % 10 = 0 THEN 'U-0' ELSE 'U-' || (n % {UNITS}) END"
         verdict = "CASE WHEN n % 7 = 0 THEN 'fail' ELSE 'pass' END"
-        labels = self._dialect.json.format(
-            x='\'{"lot": "\' || (n % {LOTS}) || \'", "customer": "customer \' || (n % {CUSTOMERS}) || \'"}\''
+        pairs = (
+            ('\'{"lot": "\' || (n % LOTS) || \'", "customer": "customer \' || (n % CUSTOMERS) || \'"}\'')
+            .replace("LOTS", str(LOTS))
+            .replace("CUSTOMERS", str(CUSTOMERS))
         )
+        labels = self._dialect.json.format(x=pairs)
         moment, series = self._dialect.moment.format(x=at), self._dialect.series
         of_recording = f"(SELECT n, k FROM {series}, ({self._small(PER_JOB)}) small) s"
         jobs = {
             "id": job,
+            "number": "n + 1000",
             "unit": unit,
             "created_at": moment,
             "queued_at": moment,

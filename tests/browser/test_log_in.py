@@ -1,40 +1,21 @@
 """Pages of a service with accounts: log-in, changes under a name that is proved, and a stop that needs none."""
 
-import os
 import re
-import subprocess
-import sys
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 
 import pytest
 from playwright.sync_api import expect
 
-from bench_service.wall_clock import monotonic_s, pause
-from tests.browser.conftest import Watched, process
+from bench_service.wall_clock import pause
+from tests.browser.accounts import PASSWORD, with_account
+from tests.browser.conftest import Watched
 from tests.end_to_end.bench_process import BenchProcess
-
-PASSWORD = "a long and quiet password 7"
 
 
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Generator[BenchProcess]:
-    """A service with one account, made on its host."""
-    made = process(tmp_path_factory.mktemp("accounts"))
-    made.start()
-    command = [sys.executable, "-m", "bench_service", "user", "add", "ada", "--role", "admin", "--password-file", "-"]
-    subprocess.run(
-        command, input=f"{PASSWORD}\n", text=True, check=True, env={**os.environ, **made.environment}, timeout=60
-    )
-    until(lambda: made.client.get("/start").status_code == 303)  # the service looks for new accounts once a second
-    yield made
-    made.end()
-
-
-def until(true: Callable[[], bool]) -> None:
-    deadline = monotonic_s() + 20.0
-    while not true():
-        assert monotonic_s() < deadline
-        pause(0.05)
+    with with_account(tmp_path_factory.mktemp("accounts")) as made:
+        yield made
 
 
 def test_a_person_logs_in_starts_a_job_under_her_name_and_logs_out(window: Watched) -> None:

@@ -13,14 +13,19 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, Response
 
+from tests.browser.accounts import PASSWORD, with_account
 from tests.browser.conftest import address
-from tests.browser.test_log_in import PASSWORD, service
 from tests.end_to_end.bench_process import BenchProcess
 
-__all__ = ["service"]  # a service with one account
 FRAMED = ("/", "/log-in", "/benches/sim/stops", "/recordings", "/docs")
 IMPORT = '{"unit": "EVIL-1", "time_column": "t", "channels": [{"name": "gyro_x", "column": "x", '
 IMPORT += '"quantity": "angular_rate", "unit": "deg/s"}]}'
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Generator[BenchProcess]:
+    with with_account(tmp_path_factory.mktemp("accounts")) as made:
+        yield made
 
 
 class Evil:

@@ -88,6 +88,8 @@ def test_a_picture_of_every_page_is_made(chromium: Browser, service: BenchProces
             expect(page.locator("#preview")).to_contain_text("12 stations")
         if name == "campaigns":
             expect(page.get_by_role("button", name="New campaign")).to_be_visible()
+        if name == "accounts":
+            expect(page.locator("[data-approval]").first).to_be_visible()
         taken(page, folder, name)
     narrow = chromium.new_context(viewport={"width": 400, "height": 760}, color_scheme="dark").new_page()
     narrow.goto(address(service))

@@ -5,9 +5,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from procedures.core.decision import Rule, combined_freedom, coverage_factor
 from procedures.core.errors import BadParameter
-from procedures.core.limits import Check, Limit, Verdict, check, decided, significance, verdict
+from procedures.core.limits import (
+    Check,
+    Limit,
+    Rule,
+    Verdict,
+    check,
+    combined_freedom,
+    coverage_factor,
+    decided,
+    significance,
+    verdict,
+)
 from procedures.inspection import judged
 from procedures.procedure import JudgedParameters, Outcome
 

@@ -17,9 +17,9 @@ from procedures.core.recording import MemoryRecording, Station
 from procedures.inspection import analyse_procedure
 from procedures.methods import discover as methods
 from procedures.procedure import Evidence
-from tests.domain.test_whole_turns import Flaws, outputs
 from tests.kit.forward_model import B_GYRO, GYRO_NOISE, K_GYRO, SITE, turn
 from tests.kit.procedures import acquired, require_form, simulated_context
+from tests.kit.turn_outputs import Flaws, outputs
 
 STATIONS = face_stations(60.0, 1, 30.0, 1.0, 2.0)
 SECONDS = np.array([s.record_s for s in STATIONS])

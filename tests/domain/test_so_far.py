@@ -1,5 +1,7 @@
 """Estimates so far: the filter against closed forms, coefficients against generalised least squares and simulation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -25,7 +27,8 @@ def accelerometer(rng: np.random.Generator, sd: float, angles: list[TableAngles]
     vectors = reference_vectors("accelerometer", angles, SITE)
     n = len(angles)
     outputs = bias + vectors @ matrix.T + rng.normal(0.0, sd, (n, 3))
-    windows = np.column_stack([100.0 * np.arange(n), 100.0 * np.arange(n) + 70.0])
+    begun = np.linspace(0.0, 100.0 * (n - 1), n)
+    windows = np.column_stack([begun, begun + 70.0])
     each = np.full((n, 3), sd)
     given = (each, each, np.zeros((n, 3)), windows, (28_000,) * n, ("",) * n, tuple(angles))
     return StationMeans("accelerometer", "m/s^2", outputs, *given), np.column_stack([bias, matrix]).ravel()
@@ -112,9 +115,9 @@ def test_the_uncertainties_hold_at_every_station() -> None:
 def test_counts_and_stations_without_angles_have_no_coefficients_so_far() -> None:
     means, _ = accelerometer(np.random.default_rng(6), 1e-3, ANGLES)
     with pytest.raises(UnfitRecording, match="in count"):
-        coefficients_so_far(StationMeans(**{**vars(means), "output_unit": "count"}), SITE, None, IDEAL)
+        coefficients_so_far(replace(means, output_unit="count"), SITE, None, IDEAL)
     with pytest.raises(UnfitRecording, match="no angles"):
-        coefficients_so_far(StationMeans(**{**vars(means), "angles": (None, *means.angles[1:])}), SITE, None, IDEAL)
+        coefficients_so_far(replace(means, angles=(None, *means.angles[1:])), SITE, None, IDEAL)
 
 
 def test_with_a_coarse_table_the_uncertainties_still_hold() -> None:

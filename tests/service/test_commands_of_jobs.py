@@ -56,6 +56,9 @@ def test_jobs_are_queued_ordered_paused_and_cancelled(bench: Bench) -> None:
     shown = bench("job", "show", first["id"]).out
     assert "Olena" in shown
     assert '{"duration_s": 36000}' in shown
+    for name in (first["number"], f"#{first['number']}"):
+        assert bench("job", "show", name, "--json").json()["id"] == first["id"]
+    assert f"#{first['number']} " in bench("jobs").out
     assert f"job {second['id']} is paused" in bench("job", "pause", second["id"]).out
     assert f"job {second['id']} is queued" in bench("job", "resume", second["id"], "--no-wait").out
     one_line(bench("job", "answer", third["id"], "--done"), "asks nothing")

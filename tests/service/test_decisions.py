@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from bench_service.cli.printing.tables import budget_table, check_table
-from procedures.core.decision import coverage_factor
+from procedures.core.limits import coverage_factor
 from tests.service.client import FAST, Client
 
 GUARDED = {"rule": "guarded", "by_check": {"gyro condition number": "simple"}}

@@ -328,10 +328,22 @@ def test_the_devices_own_limits_narrow_the_description(east: East) -> None:
     assert east.driver().description.outer.rate_deg_s == 30.0
 
 
-def test_thermal_jobs_are_refused_where_unit_and_chamber_do_not_share_their_air(east: East) -> None:
-    with pytest.raises(DeviceFault, match="does not feel the real chamber's air"):
-        east.driver().open("SIM-0001", 3, None, BenchNeeds(temperatures=True), "job-2")
-    assert east.register().read() is None or not east.register().read().linked  # pyright: ignore[reportOptionalMemberAccess]
+def test_a_simulated_unit_stands_in_the_real_chambers_air(east: East) -> None:
+    bench = east.driver().open("SIM-0001", 3, None, BenchNeeds(temperatures=True), "job-2")
+
+    async def scene() -> None:
+        before = east.chamber.asked.count("read")
+        await bench.clock.sleep(1.2)
+        assert east.chamber.asked.count("read") - before >= 2
+        east.chamber.silent = True
+        with pytest.raises(Disconnected):  # the unit's temperature is not known any more
+            await bench.clock.sleep(1.2)
+
+    try:
+        asyncio.run(scene())
+    finally:
+        east.chamber.silent = False
+        bench.close()
 
 
 def test_a_wrong_address_is_told_and_commands_nothing(east: East) -> None:

@@ -4,6 +4,7 @@
 """
 
 import argparse
+import json
 import os
 import subprocess
 import sys
@@ -115,8 +116,8 @@ def judge(samples: Samples, minutes: float) -> list[str]:
     return wrong
 
 
-def soak(minutes: float, pause_s: float, seed: int) -> int:
-    """Run the soak; return the exit code."""
+def soak(minutes: float, pause_s: float, seed: int, save: Path | None = None) -> int:
+    """Run the soak; return the exit code. `save`: a file for all samples, as JSON."""
     with tempfile.TemporaryDirectory(prefix="bench-soak-") as name:
         folder, port = Path(name), free_port()
         address = f"http://127.0.0.1:{port}"
@@ -145,6 +146,8 @@ def soak(minutes: float, pause_s: float, seed: int) -> int:
             process.wait(60)
         print(f"{minutes:g} min, seed {seed}: {', '.join(f'{n} × {k}' for k, n in sorted(load.answers.items()))}")
         print(f"database: {database_mb:.1f} MB")
+        if save is not None:
+            save.write_text(json.dumps(vars(samples)))
         wrong = judge(samples, minutes)
     wrong += [f"no {kind} has succeeded" for kind in load.never]
     wrong += [f"{count} × {fault}" for fault, count in load.faults.items()]
@@ -170,5 +173,6 @@ if __name__ == "__main__":
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--pause", type=float, default=0.2, help="seconds between two requests of a client")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--save", type=Path, help="a file for all samples, as JSON: a list a quantity")
     given = parser.parse_args()
-    sys.exit(soak(given.minutes, given.pause, given.seed))
+    sys.exit(soak(given.minutes, given.pause, given.seed, given.save))

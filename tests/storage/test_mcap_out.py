@@ -16,7 +16,7 @@ from bench_service.formats.samples_out.ros_imu import DEFINITION
 from bench_service.formats.samples_out.sheet import physical_sheet, raw_sheet
 from bench_service.formats.samples_out.sheet_files import SheetFormat, written
 from procedures.core.errors import BadParameter
-from tests.storage.test_sheet_files import RATE, blocks, part_of, sheet, values
+from tests.kit.sample_sheets import RATE, blocks, part_of, sheet, values
 
 START = "2026-11-30T08:00:00.250000+00:00"
 TYPES = get_typestore(Stores.ROS2_HUMBLE)

@@ -1,7 +1,7 @@
 """Samples as people's tools read them: pandas, h5py, scipy, pyarrow and numpy, without a word of explanation."""
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -11,50 +11,21 @@ import pytest
 from pyarrow import feather
 from scipy.io import loadmat
 
-from bench_service.formats.export import Extract, extract
 from bench_service.formats.samples_out.sheet import Sheet, Treatment, physical_sheet, raw_sheet
 from bench_service.formats.samples_out.sheet_files import SheetFormat, written
 from procedures.core.errors import BadParameter
 from procedures.core.imu_model import TriadCalibration, correct, triad_calibration
-from procedures.core.recording import ACCELEROMETER, GYRO, Channel, Quantity, RawArray, RecordingInfo
+from tests.kit.sample_sheets import RATE, RAW, blocks, part_of, sheet, values
 
-RATE = 400.0
-CHANNELS = (
-    *(Channel(name, Quantity.ANGLE_INCREMENT, "rad", 1e-8) for name in GYRO),
-    *(Channel(name, Quantity.VELOCITY_INCREMENT, "m/s", 1e-6, 3.0) for name in ACCELEROMETER),
-    Channel("temperature_case", Quantity.TEMPERATURE, "degC", 0.01),
-)
 NAMES = [
     "time_s", "gyro_x_rad_per_s", "gyro_y_rad_per_s", "gyro_z_rad_per_s", "accelerometer_x_m_per_s2",
     "accelerometer_y_m_per_s2", "accelerometer_z_m_per_s2", "temperature_case_degC",
 ]  # fmt: skip
-INFO = RecordingInfo("r-1", "U-1", CHANNELS, RATE, 1000, 12.5, None, "f00d", True)
-RAW: RawArray = np.random.Generator(np.random.PCG64(3)).integers(-5000, 5000, (1000, 7)).astype(np.int32)
-
-
-def values() -> np.ndarray:
-    """The physical values by hand: (raw − offset)·scale, times the rate for increments."""
-    return np.column_stack([RAW[:, :3] * 1e-8 * RATE, (RAW[:, 3:6] - 3.0) * 1e-6 * RATE, RAW[:, 6:] * 0.01])
 
 
 def a_calibration(triad: str = "gyro", unit: str = "rad/s") -> TriadCalibration:
     k = np.eye(3) + np.random.Generator(np.random.PCG64(5)).uniform(-0.02, 0.02, (3, 3))
     return triad_calibration(triad, unit, unit, np.column_stack([[1e-3, 2e-3, -3e-3], k]).ravel(), np.zeros((12, 12)))
-
-
-def part_of(start: int = 0, stop: int = 1000, channels: list[str] | None = None) -> Extract:
-    return extract(INFO, "int32", channels, start / RATE, stop / RATE)
-
-
-def blocks(part: Extract) -> Iterator[RawArray]:
-    columns = [INFO.column(c.name) for c in part.info.channels]
-    for start in range(part.start, part.stop, 137):
-        yield RAW[start : min(start + 137, part.stop), columns]
-
-
-def sheet(treatment: Treatment | None = None, **part: int) -> Sheet:
-    chosen = part_of(**part)
-    return physical_sheet(chosen, blocks(chosen), treatment)
 
 
 def read(form: SheetFormat, data: bytes, folder: Path) -> pd.DataFrame:

@@ -51,6 +51,7 @@ RIGHTS: dict[str, Right] = {
     "cancel_batch": Right.ENGINEER,
     "retry_batch": Right.ENGINEER,
     "import_recording": Right.ENGINEER,
+    "synthesise_recording": Right.ENGINEER,
     "describe_file": Right.ENGINEER,
     "declare_unit": Right.ENGINEER,
     "choose_correction": Right.ENGINEER,

@@ -15,6 +15,7 @@ from bench_service.api.units.schemas import (
     UnitDeclaration,
     UnitView,
 )
+from bench_service.evidence.imports import require_real
 from bench_service.model.records import Idempotency
 from bench_service.model.request import fingerprint
 from procedures.core.unit import SERIAL, Unit
@@ -45,6 +46,7 @@ async def read_printed_unit(serial: Serial, service: Service) -> Response:
 @router.put("/{serial}", responses=problems(413, 507))
 def declare_unit(serial: Serial, body: UnitDeclaration, service: Service) -> UnitView:
     """Declare a unit or change its declaration. Its recordings, results and calibrations stay."""
+    require_real(serial)
     service.stores.units.put_unit(
         Unit(
             serial,

@@ -110,3 +110,33 @@ def _confirm(proposal: Any, yes: bool) -> None:
         raise Refused("the description is a proposal: confirm it with --yes, or give it as --description")
     if not typer.confirm("Is this what the file holds?", default=False, err=True):
         raise typer.Abort
+
+
+def synthesise(
+    context: typer.Context,
+    kind: Annotated[str, typer.Option(help="gyro, or accelerometer")] = "gyro",
+    quantization: Annotated[float, typer.Option(help="Q in arcsec, or µg·s")] = 0.0,
+    random_walk: Annotated[float, typer.Option(help="N in deg/√h, or µg·√s")] = 0.0,
+    bias_instability: Annotated[float, typer.Option(help="B in deg/h, or µg")] = 0.0,
+    rate_random_walk: Annotated[float, typer.Option(help="K in deg/h/√h, or µg/√s")] = 0.0,
+    rate_ramp: Annotated[float, typer.Option(help="R in deg/h/h, or µg/s")] = 0.0,
+    rate: Annotated[float, typer.Option(help="Samples per second")] = 100.0,
+    hours: Annotated[float, typer.Option(help="Length of the record")] = 1.0,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same record")] = 1,
+    server: Server = None,
+) -> None:
+    """Make a recording of chosen noise, to try a method on: synthetic for ever, and of no unit's history."""
+    body = {
+        "kind": kind,
+        "quantization": quantization,
+        "random_walk": random_walk,
+        "bias_instability": bias_instability,
+        "rate_random_walk": rate_random_walk,
+        "rate_ramp": rate_ramp,
+        "rate_hz": rate,
+        "duration_s": 3600.0 * hours,
+        "seed": seed,
+    }
+    with connect(context.obj, server, drive=False) as client:
+        made = call(client, "POST", "/api/v1/recordings/synthetic", ("id", "source"), json=body)
+    console.print_json(json.dumps(made))

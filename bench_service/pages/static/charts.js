@@ -96,13 +96,13 @@ function download(name, type, content) {
 
 const cell = (value) => value === null || value === undefined ? "" : typeof value === "string" ? `"${value.replaceAll('"', '""')}"` : String(value);
 
-/** Curves that are replaced as a whole: on logarithmic axes where asked, none of them kept. */
+/** Curves that are replaced as a whole, on logarithmic axes where asked; with `dashed` each has its lower and upper end next to it. */
 export class Curves {
   constructor(title, names, { xLabel = "", height = 200, logX = false, logY = false, dashed = [] } = {}) {
     this.element = h("section", { class: "chart", "aria-label": title }, h("h3", {}, title));
     this.plot = null;
     this.options = { width: 420, height, cursor: { drag: { x: true, y: false } }, legend: { live: true }, scales: { x: { time: false, distr: logX ? 3 : 1 }, y: { distr: logY ? 3 : 1 } }, axes: [axis(xLabel), axis()],
-      series: [{ label: xLabel }, ...names.map((name, k) => ({ label: name, stroke: COLOURS[k % COLOURS.length], width: dashed.includes(name) ? 0.8 : 1.4, dash: dashed.includes(name) ? [4, 4] : [], points: { show: false }, spanGaps: true, value: (_, v) => number(v === null ? null : Number(v.toPrecision(4))) }))] };
+      series: [{ label: xLabel }, ...names.map((name, k) => ({ label: name, stroke: COLOURS[(dashed.length ? Math.floor(k / 3) : k) % COLOURS.length], width: dashed.includes(name) ? 0.8 : 1.4, dash: dashed.includes(name) ? [4, 4] : [], points: { show: false }, spanGaps: true, value: (_, v) => number(v === null ? null : Number(v.toPrecision(4))) }))] };
   }
 
   show(data) {

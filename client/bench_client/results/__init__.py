@@ -5,6 +5,7 @@ from typing import Any
 from bench_client.results.allan_deviation import AllanDeviationResult
 from bench_client.results.calibration_12_orientations import Calibration12OrientationsResult
 from bench_client.results.converter_bench import ConverterBenchResult
+from bench_client.results.entered_thermal_correction import EnteredThermalCorrectionResult
 from bench_client.results.error_growth import ErrorGrowthResult
 from bench_client.results.ferraris_calibration import FerrarisCalibrationResult
 from bench_client.results.ferraris_calibration_of_recordings import FerrarisCalibrationOfRecordingsResult
@@ -47,6 +48,7 @@ Result = (
     | ThermometerCalibrationResult
     | Verification9OrientationsResult
     | AllanDeviationResult
+    | EnteredThermalCorrectionResult
     | ErrorGrowthResult
     | FerrarisCalibrationOfRecordingsResult
     | FieldCalibrationResult
@@ -79,6 +81,7 @@ CLASSES: dict[str, type[ResultHead]] = {
     "thermometer_calibration": ThermometerCalibrationResult,
     "verification_9_orientations": Verification9OrientationsResult,
     "allan_deviation": AllanDeviationResult,
+    "entered_thermal_correction": EnteredThermalCorrectionResult,
     "error_growth": ErrorGrowthResult,
     "ferraris_calibration_of_recordings": FerrarisCalibrationOfRecordingsResult,
     "field_calibration": FieldCalibrationResult,

@@ -3,8 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Statement, TriadSummary, Verdict
-from bench_client.results.shared_by_two import Form
+from bench_client.results.shared import Check, Form, Statement, TriadSummary, Verdict
 
 
 class ThermalShare(Part):

@@ -3,8 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Statement, Verdict
-from bench_client.results.shared_by_two import ConverterModel
+from bench_client.results.shared import Check, ConverterModel, Statement, Verdict
 
 
 class ChannelResult(Part):

@@ -172,6 +172,29 @@ class TriadSummary(Part):
     budgets: tuple[Budget, ...] = ()
 
 
+Form = Literal["both", "switched", "single"]
+
+
+class Normalised(Part):
+    """Normalised function: ``value_0·F(t)`` with F(t_0) = 1 if `relative`, else ``value_0 + F(t)`` with F(t_0) =
+    0.
+    """
+
+    relative: bool
+    reference_c: float
+    at_reference: float
+    coefficients: tuple[float, ...]
+    covariance: tuple[tuple[float, ...], ...]
+    residual_sd: float
+
+
+class ConverterModel(Part):
+    """``N(I, t) = K0·Fc(t)·I + N0 + Fs(t)`` of one channel, t its own sensor's reading."""
+
+    scale: Normalised
+    zero: Normalised
+
+
 class RatePoint(Part):
     """Scale factor of one axis at one rate and direction, as a departure from the fitted K."""
 

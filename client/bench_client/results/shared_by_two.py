@@ -6,7 +6,9 @@ from bench_client.results.part import Part
 from bench_client.results.shared import (
     BandCurve,
     Check,
+    ConverterModel,
     Density,
+    Form,
     Statement,
     ThermometerCorrection,
     TriadCalibration,
@@ -14,28 +16,6 @@ from bench_client.results.shared import (
     Verdict,
     WholeTurns,
 )
-
-Form = Literal["both", "switched", "single"]
-
-
-class Normalised(Part):
-    """Normalised function: ``value_0·F(t)`` with F(t_0) = 1 if `relative`, else ``value_0 + F(t)`` with F(t_0) =
-    0.
-    """
-
-    relative: bool
-    reference_c: float
-    at_reference: float
-    coefficients: tuple[float, ...]
-    covariance: tuple[tuple[float, ...], ...]
-    residual_sd: float
-
-
-class ConverterModel(Part):
-    """``N(I, t) = K0·Fc(t)·I + N0 + Fs(t)`` of one channel, t its own sensor's reading."""
-
-    scale: Normalised
-    zero: Normalised
 
 
 class FerrarisCalibrationDocument(Part):
@@ -292,6 +272,38 @@ class ChannelSummary(Part):
     means: tuple[MeanCoefficient, ...]
     averaging_time_s: float | None
     mean_change_sd: float | None
+
+
+class AxisCorrection(Part):
+    """Thesis 4.1 of one accelerometer. α in 1/°C (α2, α4) and 1/°C², β in m/s² a °C (β1, β3) and a °C²."""
+
+    scale: float
+    bias_m_s2: float
+    alpha: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    beta: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    case_reference_c: float = 20.0
+    converter_reference_c: float = 20.0
+    form: Form = "both"
+    dynamic_offset: tuple[float, ...] = (0.0, 0.0)
+    covariance: tuple[tuple[float, ...], ...] = ()
+
+
+class TemperatureRange(Part):
+    """Between which readings of its two sensors a correction was fitted [°C]. Raises `BadParameter`."""
+
+    case_c: tuple[float, ...]
+    converter_c: tuple[float, ...]
+
+
+class ThermalCorrection(Part):
+    """Thesis 4.1 of a triad, x, y, z."""
+
+    triad: str
+    axes: tuple[AxisCorrection, ...]
+    first_stage: tuple[ConverterModel, ...] | None = None
+    fitted_range: TemperatureRange | None = None
+    thermometers: ThermometerCorrection | None = None
+    static_sensors: Literal["case", "gyros"] = "case"
 
 
 class GyroPolynomial(Part):

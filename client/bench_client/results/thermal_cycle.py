@@ -3,8 +3,8 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Statement, ThermometerCorrection, Verdict
-from bench_client.results.shared_by_two import ConverterModel, Form, GyroThermalCorrection
+from bench_client.results.shared import Check, Statement, Verdict
+from bench_client.results.shared_by_two import AxisCorrection, GyroThermalCorrection, ThermalCorrection
 
 
 class LegEvidence(Part):
@@ -63,20 +63,6 @@ class RunFound(Part):
     trace: Trace
 
 
-class AxisCorrection(Part):
-    """Thesis 4.1 of one accelerometer. α in 1/°C (α2, α4) and 1/°C², β in m/s² a °C (β1, β3) and a °C²."""
-
-    scale: float
-    bias_m_s2: float
-    alpha: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
-    beta: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
-    case_reference_c: float = 20.0
-    converter_reference_c: float = 20.0
-    form: Form = "both"
-    dynamic_offset: tuple[float, ...] = (0.0, 0.0)
-    covariance: tuple[tuple[float, ...], ...] = ()
-
-
 class AxisFound(Part):
     """Fit of one accelerometer's correction."""
 
@@ -89,24 +75,6 @@ class AxisFound(Part):
     p_values: tuple[float, ...]
     preferred_order: int
     order_reason: str = ""
-
-
-class TemperatureRange(Part):
-    """Between which readings of its two sensors a correction was fitted [°C]. Raises `BadParameter`."""
-
-    case_c: tuple[float, ...]
-    converter_c: tuple[float, ...]
-
-
-class ThermalCorrection(Part):
-    """Thesis 4.1 of a triad, x, y, z."""
-
-    triad: str
-    axes: tuple[AxisCorrection, ...]
-    first_stage: tuple[ConverterModel, ...] | None = None
-    fitted_range: TemperatureRange | None = None
-    thermometers: ThermometerCorrection | None = None
-    static_sensors: Literal["case", "gyros"] = "case"
 
 
 class SoakFound(Part):

@@ -17,8 +17,8 @@ from procedures.analysis.calibration.table_errors import TableErrors
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.coefficient_name import CoefficientName
-from procedures.core.decision import COVERAGE, combined_freedom, coverage_factor
 from procedures.core.imu_model import COEFFICIENT_NAMES, coefficient_unit
+from procedures.core.limits import COVERAGE, combined_freedom, coverage_factor
 from procedures.core.noise import NoiseCoefficients
 from procedures.core.unit import TriadRecord
 

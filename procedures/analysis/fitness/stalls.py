@@ -43,9 +43,9 @@ class Around:
     """Shares of samples that repeat beside a run."""
 
     parts: Array
-    """Of each channel, (channels,)."""
+    """Share of each channel, (channels,)."""
     together: float
-    """Of all channels of the group at once."""
+    """Share of all channels of the group at once."""
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""Innovations of a recursive estimate as a test of its channel: does the filter see what it expects (S 5.4.3)?
+"""Innovations of a recursive estimate as a test of its channel: does the filter see what it expects (textbook S 5.4.3)?
 
 A normalised innovation is unit normal where the channel is as its noise record says, and independent of the others; so
 the sum of n squares (normalised innovation squared) is chi-square of n degrees of freedom. A channel that is noisier,

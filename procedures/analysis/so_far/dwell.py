@@ -56,7 +56,7 @@ def bias_so_far(means: Array, cell_s: float, noise: NoiseCoefficients | None) ->
     windows, length_s = _windows(means, cell_s)
     known = noise is not None and noise.random_walk + noise.quantization + noise.bias_instability > 0.0
     if known and noise is not None:
-        edges = length_s * np.arange(len(windows) + 1)
+        edges = np.linspace(0.0, length_s * len(windows), len(windows) + 1)
         covariance = contiguous_covariance(noise, np.column_stack([edges[:-1], edges[1:]]))
     else:
         covariance = observed_covariance(windows)

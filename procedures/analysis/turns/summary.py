@@ -10,6 +10,7 @@ from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.summary import Coefficient
 from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.turns.fit import Term, TurnFit, Turning, fit_turns, turning
+from procedures.analysis.turns.path import as_turned
 from procedures.analysis.turns.plan import coefficient_names
 from procedures.core import units
 from procedures.core.arrays import Array
@@ -84,6 +85,7 @@ def analyse_turns(
     motion = turning(stations, seconds, site)
     outputs = means.outputs * seconds[:, None]
     require_turns(motion, outputs, means.labels)
+    motion = as_turned(motion, recordings, site)
     noise = triad_covariance(record, means.windows)
     reference = reference_rate_deg_s * units.DEG
     fit = fit_turns(motion, outputs, terms, reference, noise, uncertainty)
