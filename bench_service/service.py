@@ -110,7 +110,7 @@ class BenchService:
         self.upkeep = UpkeepService(stores, database or NoDatabase(), f"the service, {ProcessIdentity.own()}")
         self._missing = ""
         """The sentence on a history that the devices remember and the database does not; empty: there is none."""
-        rules = settings or Settings(scrub_at="")
+        rules = settings or Settings.model_validate({"scrub_at": ""})
         kept = StorageSettings(rules.raw_days, rules.archive_days, rules.archive)
         self.raw_data = RawDataService(stores, database or NoDatabase(), kept, stores.raw_data.archive_at)
         nightly = NightlyStorage(self.raw_data, stores, f"the service, {ProcessIdentity.own()}")

@@ -58,7 +58,7 @@ def judged(outcome: R, params: object) -> R:
     result does not have is a warning: where names are known beforehand it was refused.
     """
     given = params.decision if isinstance(params, JudgedParameters) else None
-    rules = DecisionRules() if given is None else given
+    rules = DecisionRules.model_validate({}) if given is None else given
     checks = tuple(decided(c, rules.of(c.name)) for c in outcome.checks)
     if not checks:
         return outcome

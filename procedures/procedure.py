@@ -35,6 +35,11 @@ class Statement:
     """Checks whose values lie within their expanded uncertainty of the limit."""
 
 
+_SHOWN_WHERE_MADE = Field(
+    exclude_if=lambda found: found is None, description="None without checks and in results of older versions"
+)
+
+
 class Outcome(BaseModel):
     """Base of every result model: JSON-ready numbers, the checks with their verdict, and warnings to the reader."""
 
@@ -43,9 +48,7 @@ class Outcome(BaseModel):
     checks: tuple[Check, ...] = ()
     verdict: Verdict
     warnings: tuple[str, ...] = ()
-    statement: Statement | None = Field(
-        None, exclude_if=lambda found: found is None, description="None without checks and in results of older versions"
-    )
+    statement: Annotated[Statement | None, _SHOWN_WHERE_MADE] = None
 
 
 @dataclass(frozen=True)

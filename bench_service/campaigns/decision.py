@@ -32,7 +32,7 @@ def rule_of_check(rules: DecisionRules | None, check: str) -> DecisionRule:
         return DecisionRule.model_validate({})
     of = rules.of(check)
     k = coverage_factor(of.coverage_probability, None)
-    return DecisionRule(rule=of.name, guard=of.guard, coverage_factor=max(1.0, k))
+    return DecisionRule.model_validate({"rule": of.name, "guard": of.guard, "coverage_factor": max(1.0, k)})
 
 
 def in_words(rule: DecisionRule) -> str:

@@ -14,6 +14,7 @@ from bench_service.evidence.job_analysis import analysed
 from bench_service.evidence.recordings import RecordingStore
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.evidence.work_processes import WorkProcesses
+from bench_service.formats.chunk import sample_type
 from bench_service.formats.content_hash import ContentHash
 from bench_service.model.context import context_of
 from bench_service.model.job import Job
@@ -152,8 +153,7 @@ def digest_of(recordings: RecordingStore, recording_id: str) -> str:
     """Compute the content hash of a recording from its stored samples, a chunk at a time. Raises `NotFound`."""
     stored = recordings.get(recording_id)
     info = stored.info
-    sample_type = np.float64 if stored.dtype == "float64" else np.int32
-    digest = ContentHash(info.channels, info.rate_hz, sample_type)
+    digest = ContentHash(info.channels, info.rate_hz, sample_type(stored.dtype))
     for block in recordings.read(recording_id, [c.name for c in info.channels], 0, info.count):
         digest.update(block)
     return digest.hexdigest()

@@ -7,6 +7,7 @@ Mahalanobis distance ``d² = eᵀP⁻¹e`` of the last position judges it: chi-s
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -152,7 +153,7 @@ def _result(
     covariance = place.metres @ growth.total[-1] @ place.metres.T
     statistic = chi_square(np.array([track.north_m[-1], track.east_m[-1]]), covariance)
     p_value, known = tail_probability(statistic, 2), all(e.noise for e in errors)
-    at = {name: _at(growth.time_s, track, getattr(track, name)) for name in CURVES}
+    at: dict[str, Any] = {name: _at(growth.time_s, track, getattr(track, name)) for name in CURVES}
     radius = tuple(told.radius_95(place, p) for p in growth.total)
     heading, pitch, roll = (angles / units.DEG).tolist()
     checks = _checks(params, track, p_value if known else None, float(np.sqrt(statistic)))

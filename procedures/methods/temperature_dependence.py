@@ -213,7 +213,7 @@ def _series(recording: Recording, channel: str, sensor: str, params: Params, uni
     dynamic = None
     if params.soaks:
         trace = regimes(temperature, cells.cell_s, RegimeSettings(**params.regime.model_dump()))
-        dynamic = np.asarray(trace.dynamic[: count * size].reshape(count, size).any(axis=1))
+        dynamic = np.any(trace.dynamic[: count * size].reshape(count, size), axis=1, keepdims=True)[:, 0]
     return Series(rows[0].mean(axis=1), rows[1].mean(axis=1), dynamic)
 
 

@@ -44,7 +44,10 @@ log = logging.getLogger(__name__)
 class WorkerName(Protocol):
     """A worker's name with its lease."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """The name that is held."""
+        ...
 
     def held(self) -> bool:
         """Return whether this process still holds the lease of its name."""

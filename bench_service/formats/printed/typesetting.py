@@ -5,7 +5,7 @@ Nothing is fetched: typst gets a folder of its own with the layout, the data, th
 
 import json
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
@@ -83,7 +83,7 @@ def _silent(character: str) -> bool:
 
 
 @contextmanager
-def _folder(document: PrintedDocument) -> Iterator[Path]:
+def _folder(document: PrintedDocument) -> Generator[Path]:
     """A folder with everything that the layout reads."""
     with TemporaryDirectory(prefix="bench-report-") as name:
         folder = Path(name)

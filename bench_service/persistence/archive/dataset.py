@@ -8,7 +8,7 @@ import hashlib
 import io
 import json
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -27,9 +27,6 @@ from bench_service.persistence.tables.evidence import (
     UnitRow,
 )
 from bench_service.persistence.tables.jobs import JobRow
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 PART = 20_000
 """Results in one part of a table."""
@@ -133,7 +130,8 @@ class ParquetArchive:
         place_at(self.place).write(f"tables/{name}.parquet", sink.getvalue())
 
 
-def _type(kind: str) -> "pa.DataType":
+def _type(kind: str) -> Any:
+    """The type of pyarrow by its name."""
     import pyarrow as pa
 
     return pa.timestamp("us", tz="UTC") if kind == MOMENT else getattr(pa, "bool_" if kind == TRUTH else kind)()

@@ -9,12 +9,9 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING
+from typing import Any
 
 from bench_service.model.errors import ArchiveAway
-
-if TYPE_CHECKING:
-    from pyarrow.fs import FileSystem
 
 
 class Place:
@@ -67,7 +64,8 @@ def place_at(address: str) -> Place:
     return Place(address)
 
 
-def _opened(address: str) -> "tuple[FileSystem, str]":
+def _opened(address: str) -> tuple[Any, str]:
+    """The file system of an address, and the path in it."""
     from pyarrow.fs import FileSystem
 
     return FileSystem.from_uri(address if "://" in address else Path(address).absolute().as_uri())

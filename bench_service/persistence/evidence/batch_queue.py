@@ -64,7 +64,12 @@ class SqlBatchQueue:
         result: str | None = None,
         failure: Failure | None = None,
     ) -> bool:
-        values = {"state": state.value, "ended_at": at, "result_id": result, "failure": failure_document(failure)}
+        values: dict[str, object] = {
+            "state": state.value,
+            "ended_at": at,
+            "result_id": result,
+            "failure": failure_document(failure),
+        }
         with self._database.write() as session:
             held = _change(session, task, worker, values)
         if held:
@@ -78,7 +83,12 @@ class SqlBatchQueue:
             batch = session.get_one(BatchRow, task.batch)
             to = WAITING if batch.cancelled_at is None else TaskState.CANCELLED.value
             attempt = task.attempt if spent else task.attempt - 1
-            values = {"state": to, "not_before": not_before, "failure": failure_document(why), "attempt": attempt}
+            values: dict[str, object] = {
+                "state": to,
+                "not_before": not_before,
+                "failure": failure_document(why),
+                "attempt": attempt,
+            }
             held = _change(session, task, worker, values)
         if held and to != WAITING:
             self.settle(task.batch, batch.cancelled_at)

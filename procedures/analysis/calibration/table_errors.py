@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from procedures.core import units
@@ -51,7 +52,7 @@ class TableErrors:
         """Change of the outputs per standard deviation of each flaw, ``K·∂v/∂p·σ_p``, shape (n, 3, P)."""
         return np.einsum("cj,njp->ncp", matrix, self.sensitivity * self.sd)
 
-    def columns(self, source: str) -> Array:
+    def columns(self, source: str) -> NDArray[np.bool_]:
         """Mask of the columns that belong to a source, boolean of shape (P,)."""
         return np.array([s == source for s in self.source], dtype=bool)
 

@@ -62,9 +62,9 @@ def analyse_gyros(
     correction: GyroThermalCorrection | None = None,
 ) -> TriadSummary:
     """Calibrate the gyros, by a correction for temperature first where there is one. Raises as `analyse_triad`."""
-    means, more = station_means(recordings, "gyro"), None
+    means, more = station_means(recordings, "gyro"), dict[str, Array]()
     if correction is not None:
-        means, more = gyros_at_reference(recordings, means, correction)
+        means, more["thermal correction"] = gyros_at_reference(recordings, means, correction)
     return analyse_means(means, site, uncertainty, record, False, weighting, more)[0]
 
 

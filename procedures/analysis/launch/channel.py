@@ -12,7 +12,6 @@ from procedures.analysis.allan.statistic import ALLAN, OVERLAPPING_ALLAN, Sizes,
 from procedures.analysis.averaging_time import averaging_time
 from procedures.analysis.cells import Cells
 from procedures.analysis.launch.context import ChannelContext
-from procedures.analysis.launch.lines import SpectralLine
 from procedures.analysis.launch.model import found_noise
 from procedures.analysis.launch.results import (
     PROCESSES,
@@ -64,6 +63,7 @@ def channel_noise(
     likelihood, warnings = found.fit, found.warnings(rate_unit)
     last = Stage(signal.steps[-1].name, _curve(whole), _values(graphical), signal.steps[-1].note)
     stages = [*_stages(signal.steps[:-1], cell_s, settings), last, *_split(series, cell_s, rate_unit, settings)]
+    lines = tuple(SpectralLine(line.frequency_hz, line.amplitude) for line in likelihood.lines)
     return ChannelNoise(
         channel=name,
         rate_unit=rate_unit,
@@ -86,7 +86,7 @@ def channel_noise(
         averaging=_averaging(likelihood),
         bandwidth_hz=0.5 * whole.rate_hz,
         band_hz=likelihood.band_hz,
-        lines=tuple(SpectralLine(line.frequency_hz, line.amplitude) for line in likelihood.lines),
+        lines=lines,
         correlated=found.correlated,
         flicker_corner_s=likelihood.flicker_corner_s,
         temperature=found.temperature,
@@ -97,7 +97,7 @@ def channel_noise(
             {n: t[signal.first_cell :] for n, t in context.temperatures.items()},
             cell_s,
         ),
-        vibration=vibration(found.density, likelihood.lines, likelihood.coefficients(), 0.5 * whole.rate_hz),
+        vibration=vibration(found.density, lines, likelihood.coefficients(), 0.5 * whole.rate_hz),
     )
 
 

@@ -42,7 +42,8 @@ class ChannelSummary:
     @property
     def noise(self) -> NoiseCoefficients:
         """The noise coefficients to plan with and to weigh with: `effective` of each process."""
-        return NoiseCoefficients(*(effective(m.values) for m in self.means))
+        q, n, b, k, r = (effective(m.values) for m in self.means)
+        return NoiseCoefficients(q, n, b, k, r)
 
     @property
     def not_observed(self) -> tuple[str, ...]:

@@ -62,7 +62,7 @@ class LiveDwell:
         self._size = max(1, round(every * rate_hz))
         self._rule, self._every = rule, self._size / rate_hz
         edges = self._every * np.arange(count + 1, dtype=np.float64)
-        spans = np.column_stack([edges[:-1], edges[1:]]).astype(np.float64)
+        spans = np.stack([edges[:-1], edges[1:]], axis=1)
         self._estimates = [RecursiveBias(contiguous_covariance(t.noise, spans)) for t in rule.targets]
         self._enough = round(expected_s(rule, longest_s) / every)
         self._reachable = all(mean_sd(t.noise, self._enough * every) <= t.target_sd for t in rule.targets)

@@ -87,7 +87,9 @@ class _Runs:
     def free(self, run: int, delay_s: float) -> Array:
         """Columns of heating and first state of a run, (n, 2)."""
         at = (np.arange(len(self.board[run])) + 0.5) * self.cell_s
-        return np.column_stack([np.ones_like(at), np.exp(-at / delay_s)]).astype(np.float64)
+        columns = np.empty((len(at), 2))
+        columns[:, 0], columns[:, 1] = 1.0, np.exp(-at / delay_s)
+        return columns
 
     def left(self, logs: Array) -> Array:
         """Departures of all runs, heating and first state fitted, for logarithms of Δ and τ_b."""

@@ -101,7 +101,7 @@ def analyse_ferraris(
     first = ferraris_estimator(motion, None, uncertainty, np.eye(3))
     matrix = (first.gain @ outputs.T.ravel()).reshape(3, 4)[:, 1:]
     fit = fitted(ferraris_estimator(motion, noise, uncertainty, matrix), outputs, noise is not None)
-    return whole_turns(fit, (), motion, outputs, np.flatnonzero(turns), noise is not None)
+    return whole_turns(fit, (), motion, outputs, np.flatnonzero(turns).tolist(), noise is not None)
 
 
 def faces_of(recordings: Sequence[Recording]) -> list[Station]:
@@ -131,7 +131,7 @@ def only(motion: Turning, which: Array) -> Turning:
     """The motion of some of the stations."""
     angles = tuple(a for a, taken in zip(motion.angles, which, strict=True) if taken)
     fields = ("seconds", "axis_b", "angle_rad", "rate_rad_s", "earth_rad", "moments")
-    return Turning(*(getattr(motion, name)[which] for name in fields), angles)
+    return replace(motion, **{name: getattr(motion, name)[which] for name in fields}, angles=angles)
 
 
 def _turning(stations: Sequence[Station]) -> int:

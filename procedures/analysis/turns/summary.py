@@ -89,12 +89,17 @@ def analyse_turns(
     noise = triad_covariance(record, means.windows)
     reference = reference_rate_deg_s * units.DEG
     fit = fit_turns(motion, outputs, terms, reference, noise, uncertainty)
-    made = whole_turns(fit, terms, motion, outputs, np.arange(len(outputs)), noise is not None)
+    made = whole_turns(fit, terms, motion, outputs, range(len(outputs)), noise is not None)
     return replace(made, reference_rate_deg_s=reference_rate_deg_s)
 
 
 def whole_turns(
-    fit: TurnFit, terms: Sequence[Term], motion: Turning, outputs: Array, turning_stations: Array, noise_known: bool
+    fit: TurnFit,
+    terms: Sequence[Term],
+    motion: Turning,
+    outputs: Array,
+    turning_stations: Sequence[int],
+    noise_known: bool,
 ) -> WholeTurns:
     """Numbers of a fit, ready to be stored; the rate points are those of the stations that turn."""
     return WholeTurns(
@@ -160,12 +165,12 @@ def _calibration(fit: TurnFit) -> TriadCalibration:
     return triad_calibration("gyro", "rad/s", "rad/s", fit.parameters[:, :LINEAR], covariance)
 
 
-def _points(motion: Turning, outputs: Array, fit: TurnFit, stations: Array) -> tuple[RatePoint, ...]:
+def _points(motion: Turning, outputs: Array, fit: TurnFit, stations: Sequence[int]) -> tuple[RatePoint, ...]:
     bias, matrix = fit.parameters[:, 0], fit.parameters[:, 1:LINEAR]
     known = motion.seconds[:, None] * bias + motion.earth_rad @ matrix.T
     turned = motion.turned_b @ matrix.T
     points: list[RatePoint] = []
-    for i in stations.tolist():
+    for i in stations:
         c = motion.channels[i]
         departure = (outputs[i, c] - known[i, c]) / turned[i, c] - 1.0
         direction = float(np.sign(motion.axis_b[i, c]))
