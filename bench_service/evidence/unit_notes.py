@@ -7,7 +7,7 @@ from bench_service.model.records import Idempotency, Page
 
 
 class UnitNoteStore(Protocol):
-    """Remarks about units."""
+    """PORT: remarks of people about units."""
 
     def add(self, note: UnitNote, idempotency: Idempotency | None = None) -> UnitNote:
         """Store a remark; with a key that is known, return the one that it made."""

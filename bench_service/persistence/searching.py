@@ -17,7 +17,7 @@ from bench_service.model.search import LabelSought, Search
 from bench_service.persistence.tables.evidence import RecordingRow, ResultRow
 from bench_service.persistence.tables.jobs import JobLabelRow, JobRow
 
-S = TypeVar("S", bound=Select[Any])
+S = TypeVar("S", bound=Select[*tuple[Any, ...]])
 CLOCK_DIFFERS = timedelta(hours=1)
 """Longest time by which the moment in an id may differ from the moment that is stored with it."""
 

@@ -28,7 +28,7 @@ class UnitRemark(Request):
 
 
 class UnitNoteView(BaseModel):
-    """A stored remark."""
+    """A stored remark about a unit."""
 
     id: str
     unit: str

@@ -77,7 +77,7 @@ def hold(
 
 @storage.command()
 def release(context: typer.Context, hold: str, server: Server = None) -> None:
-    """Release a hold."""
+    """Release a hold on raw data."""
     with connect(context.obj, server, drive=False) as client:
         found = call(client, "POST", f"/api/v1/storage/holds/{segment(hold)}/release", ("recording",))
     console.print(f"recording {found['recording']} is not held by {hold} any more", soft_wrap=True)

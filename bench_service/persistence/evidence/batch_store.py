@@ -2,9 +2,8 @@
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Any
 
-from sqlalchemy import Select, exists, insert, select, update
+from sqlalchemy import exists, insert, select, update
 
 from bench_service.model.batches import AnalysisBatch, AnalysisTask, Selection, TaskState
 from bench_service.model.errors import IllegalTransition
@@ -34,7 +33,7 @@ class SqlBatchStore(SqlBatchQueue):
     """SQL implementation of `bench_service.evidence.batches.store.BatchStore`."""
 
     def select(self, selection: Selection, limit: int) -> tuple[tuple[str, str | None, str], ...]:
-        query: Select[Any] = select(RecordingRow.id, RecordingRow.job_id, RecordingRow.unit)
+        query = select(RecordingRow.id, RecordingRow.job_id, RecordingRow.unit)
         complete = RecordingRow.state == RecordingState.COMPLETE.value
         query = find_recordings(query.where(complete, RecordingRow.raw.not_in(_GONE)), selection.search)
         if selection.unit is not None:

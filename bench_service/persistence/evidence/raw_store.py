@@ -172,8 +172,7 @@ class SqlRawDataStore:
         with self._database.read() as session:
             total, first = session.execute(made).one()
             of_passes = session.execute(passes).one()[0]
-        oldest: datetime | None = first
-        days = 1.0 if oldest is None else max(1.0, (at - oldest).total_seconds() / 86400.0)
+        days = max(1.0, (at - (first or at)).total_seconds() / 86400.0)
         return Growth(days, int(total or 0), int(of_passes or 0))
 
     def passes_bytes_before(self, moments: Sequence[datetime]) -> tuple[int, ...]:

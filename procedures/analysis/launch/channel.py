@@ -12,6 +12,7 @@ from procedures.analysis.allan.statistic import ALLAN, OVERLAPPING_ALLAN, Sizes,
 from procedures.analysis.averaging_time import averaging_time
 from procedures.analysis.cells import Cells
 from procedures.analysis.launch.context import ChannelContext
+from procedures.analysis.launch.lines import SpectralLine
 from procedures.analysis.launch.model import found_noise
 from procedures.analysis.launch.results import (
     PROCESSES,
