@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import butter, lfilter
 
 from procedures.analysis.allan.deviation import deviation
-from procedures.analysis.allan.read_off import Line, ReadOff
+from procedures.analysis.allan.read_off import Line, ReadOff, read_off
 from procedures.analysis.allan.statistic import MODIFIED_ALLAN, log_sizes
 from procedures.analysis.noise_fit.comparison import compare
 from procedures.analysis.noise_fit.estimate import PROCESSES, NoiseFit
@@ -187,3 +187,14 @@ def test_what_cannot_be_fitted_is_refused() -> None:
     fast.add(y.repeat(10))
     with pytest.raises(UnfitRecording, match="fit the slow powers alone"):
         fit_noise(slow_powers(y[:12], 1.0), fast.finish())
+
+
+def test_counts_that_repeat_exactly_over_an_averaging_time_are_no_fault() -> None:
+    """Seen once in 500 counters: a variance of exactly zero, by which the fit divided (500 to the user)."""
+    found = deviation(np.random.default_rng(2).standard_normal(2000), 1.0)
+    exact = replace(found, deviation=np.where(found.tau_s == found.tau_s[3], 0.0, found.deviation))
+    fitted = fit_allan(exact)
+    n = fitted.of("random_walk").value
+    assert n is not None
+    assert abs(n - 1.0) < 0.2, "the other averaging times still show the noise"
+    assert read_off(exact).random_walk is not None

@@ -62,7 +62,8 @@ def read_off(deviation: Deviation) -> ReadOff:
     """Reads an Allan deviation of a rate (overlapping or not). Raises `BadParameter` for another statistic."""
     if deviation.statistic.order != 2 or deviation.statistic.modified:
         raise BadParameter("statistic", deviation.statistic.name, "allan or overlapping_allan")
-    tau, sigma, edf = deviation.tau_s, deviation.deviation, deviation.edf
+    shown = deviation.deviation > 0.0  # a counter that turns evenly can repeat its counts exactly: no logarithm
+    tau, sigma, edf = deviation.tau_s[shown], deviation.deviation[shown], deviation.edf[shown]
     first, last, slope, sd = _local_slopes(tau, sigma, edf)
     lines = {name: _line(tau, sigma, edf, first, last, slope, sd, *law) for name, law in LINES.items()}
     return ReadOff(**lines)

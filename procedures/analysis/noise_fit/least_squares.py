@@ -78,7 +78,9 @@ class _Fit:
 
     def solve(self, present: tuple[int, ...]) -> Array:
         """Solve for the squares v, (5,), zero for absent processes."""
-        model, v = self._variance, np.zeros(len(PROCESSES))
+        # A counter that turns evenly can repeat its counts exactly over an averaging time: its σ² there is zero.
+        least = np.min(self._variance, where=self._variance > 0.0, initial=np.inf)
+        model, v = np.maximum(self._variance, least if np.isfinite(least) else 1.0), np.zeros(len(PROCESSES))
         for _ in range(_ITERATIONS):
             weight = np.sqrt(0.5 * self._edf) / model
             columns = self._columns[:, present] * weight[:, None]
