@@ -90,7 +90,7 @@ def read_storage(service: Service) -> StorageView:
     return StorageView.of(service.raw_data.report())
 
 
-@router.post("/storage/retention", responses=problems(507))
+@router.post("/storage/retention", responses=problems(413, 507))
 def remove_raw_data(body: RuleRequest, service: Service) -> PlanView:
     """Remove the raw data of routine passes that are old enough, or say what would go (`dry_run`, the default).
 
@@ -100,7 +100,7 @@ def remove_raw_data(body: RuleRequest, service: Service) -> PlanView:
     return PlanView.of(service.raw_data.remove(body.days, body.dry_run))
 
 
-@router.post("/storage/archive", responses=problems(507))
+@router.post("/storage/archive", responses=problems(413, 507))
 def archive_raw_data(body: RuleRequest, service: Service) -> PlanView:
     """Move raw data that are old enough to the archive, or say what would go (`dry_run`, the default).
 

@@ -19,7 +19,7 @@ from bench_service.evidence.raw_data.service import RawDataService, StorageSetti
 from bench_service.evidence.upkeep import UpkeepService
 from bench_service.formats.content_hash import ContentHash
 from bench_service.model.batches import BatchRequest, Selection
-from bench_service.model.errors import ArchiveAway, DamagedRecording, IllegalTransition, Misconfigured, RawDataRemoved
+from bench_service.model.errors import ArchiveAway, DamagedRecording, IllegalTransition, RawDataRemoved
 from bench_service.model.job import Job, JobState
 from bench_service.model.raw_data import Keeping, RawState
 from bench_service.model.records import NewRecording, StoredResult
@@ -28,6 +28,7 @@ from bench_service.persistence import Database, open_stores
 from bench_service.persistence.upkeep.contents import DatabaseContents, check_copy
 from bench_service.persistence.upkeep.copies import copy_database
 from bench_service.wall_clock import monotonic_s, pause
+from procedures.core.errors import BadParameter
 from procedures.core.limits import Verdict
 from procedures.core.recording import RawArray
 from tests.kit.calibrations import triad
@@ -115,7 +116,7 @@ def test_a_rule_removes_routine_passes_and_keeps_what_something_rests_on(
     with pytest.raises(IllegalTransition):
         raw.release(hold.id, "Ada")
     assert raw.remove(OLD, dry_run=False).done == 1, "what was held goes once it is released"
-    with pytest.raises(Misconfigured, match="BENCH_RAW_DAYS"):
+    with pytest.raises(BadParameter, match="BENCH_RAW_DAYS"):
         raw.remove(None, dry_run=True)
 
 

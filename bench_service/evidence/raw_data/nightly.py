@@ -13,6 +13,7 @@ from bench_service.model.raw_data import RawPlan
 from bench_service.telemetry.audit import record
 from bench_service.telemetry.upkeep import UpkeepKind, UpkeepReport
 from bench_service.wall_clock import new_id, now
+from procedures.core.errors import DomainError
 
 BY = "retention"
 """Name under which the night removes and archives in the audit trail."""
@@ -43,7 +44,7 @@ class NightlyStorage:
             return
         try:
             plan = work(lambda: not ending.is_set())
-        except ServiceError as error:
+        except (ServiceError, DomainError) as error:
             log.error("%s tonight: %s", kind.value, error)
             ended = replace(report, ended_at=now(), good=False, document={"faults": [str(error)]})
             self._stores.upkeep.end(ended)

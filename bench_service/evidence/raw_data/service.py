@@ -7,7 +7,7 @@ from datetime import datetime, timedelta
 
 from bench_service.evidence.raw_data.store import Archive
 from bench_service.evidence.stores import EvidenceStores
-from bench_service.model.errors import DamagedRecording, Misconfigured
+from bench_service.model.errors import DamagedRecording
 from bench_service.model.raw_data import (
     Candidate,
     Growth,
@@ -23,6 +23,7 @@ from bench_service.model.raw_data import (
 from bench_service.model.records import StoredRecording
 from bench_service.telemetry.upkeep import DatabasePort
 from bench_service.wall_clock import new_id, now
+from procedures.core.errors import BadParameter
 
 LISTED = 200
 """Recordings and faults that a plan lists."""
@@ -63,11 +64,11 @@ class RawDataService:
     def remove(self, days: float | None, dry_run: bool, go_on: Callable[[], bool] = lambda: True) -> RawPlan:
         """Remove the raw data of routine passes after `days` (None: as the settings say), or only plan it.
 
-        Raises `Misconfigured` where neither says how many days.
+        Raises `BadParameter` where neither says how many days.
         """
         days = self.settings.remove_days if days is None else days
         if days is None:
-            raise Misconfigured("no rule says when raw data are removed: give days, or set BENCH_RAW_DAYS")
+            raise BadParameter("days", None, "a number of days, or the rule BENCH_RAW_DAYS of the service")
         plan = self._plan(RawRule(days, only_passes=True), dry_run, self._stores.raw_data.remove, go_on)
         if not dry_run:
             self._go_on(RawState.REMOVING)
@@ -76,11 +77,11 @@ class RawDataService:
     def archive(self, days: float | None, dry_run: bool, go_on: Callable[[], bool] = lambda: True) -> RawPlan:
         """Move the raw data of complete recordings to the archive after `days`, or only plan it.
 
-        Raises `Misconfigured` without an archive or days, `ArchiveAway` where it cannot be written at all.
+        Raises `BadParameter` without an archive or days, `ArchiveAway` where it cannot be written at all.
         """
         days = self.settings.archive_days if days is None else days
         if days is None:
-            raise Misconfigured("no rule says when raw data are archived: give days, or set BENCH_ARCHIVE_DAYS")
+            raise BadParameter("days", None, "a number of days, or the rule BENCH_ARCHIVE_DAYS of the service")
         rule = RawRule(days, only_passes=False)
         if dry_run:
             return self._plan(rule, dry_run, lambda recording, at: True, go_on)
@@ -206,7 +207,9 @@ class RawDataService:
 
     def _archive(self) -> Archive:
         if self.settings.archive is None or self._open_archive is None:
-            raise Misconfigured("there is no archive: set BENCH_ARCHIVE to a folder or s3://bucket/prefix")
+            raise BadParameter(
+                "archive", None, "an archive: set BENCH_ARCHIVE of the service to a folder or s3://bucket/prefix"
+            )
         return self._open_archive(self.settings.archive)
 
 
