@@ -59,7 +59,7 @@ class Params(RecordedParameters):
         "every whole number of samples; or a list [s], each taken as the nearest whole number of samples",
     )
     confidence: float = Field(0.6827, gt=0.0, lt=1.0, description="of the intervals")
-    density: bool = Field(True, description="the power spectral density beside each curve")
+    density: bool = Field(True, description="the power spectral density beside each curve; none of a record too short")
     band: Literal["none", "all_starts", "sampled_intervals"] = Field(
         "none",
         description="all_starts: least, mean and greatest deviation over every start; sampled_intervals: `intervals` "
@@ -209,8 +209,7 @@ def beside(
         if params.density and params.gaps == "leave_out":
             told.append("no spectral density where gaps are left out")
         elif params.density:
-            spectra, why = densities(recording, names, params.confidence)
-            told += why
+            spectra = densities(recording, names, params.confidence)
         own_bands: list[BandCurve | None] = [None] * len(own)
         if params.band != "none":
             with _naming(recording.info.id):

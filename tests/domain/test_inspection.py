@@ -185,8 +185,7 @@ def test_a_stretch_of_a_recording_is_analysed_alone() -> None:
     assert (part.info.count, part.info.start_s, part.info.since_launch_s) == (10_000, 100.0, 90.0)
     assert np.array_equal(np.concatenate(list(part.blocks())), whole[3000:13_000])
     stretched = allan(launched, start_s=30.0, stop_s=130.0)
-    # 10 000 samples are less than one segment of the density.
-    assert all("no spectral density" in w for w in stretched.warnings)
+    assert not stretched.warnings
     assert stretched.curves == allan(recording(whole[3000:13_000])).curves
     two = allan(recording(whole, "a"), recording(whole, "b"), start_s=(30.0, 40.0))
     assert [c.terms[0] for c in two.curves[::3]] == [16_999, 15_999]

@@ -87,7 +87,7 @@ def test_campaigns_are_added_listed_and_shown(bench: Command, added: dict[str, D
     assert (table.code, table.err) == (0, "")
     assert "Nothing [much]" in table.out
     shown = bench("campaign", "show", "bad")
-    assert shown.json()["steps"][0]["limits"][0] == {**OUT_OF_REACH, "maximum": None}
+    assert shown.json()["steps"][0]["limits"][0] == {**OUT_OF_REACH, "maximum": None, "rule": None}
     changed = {**shown.json(), "name": "bad-again"}
     assert changed["name"] != "bad", "what is shown is fit to be added under another name"
 

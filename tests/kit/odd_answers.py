@@ -30,6 +30,7 @@ RUN = {
 ENDED = {**RUN, "state": "succeeded", "verdict": "fail", "steps": [STEP], "waiting": EVIL, "reason": EVIL}
 JOB = {
     "id": "j1",
+    "number": 1,
     "procedure": EVIL,
     "unit": EVIL,
     "state": "running",

@@ -14,18 +14,15 @@ FEWEST_A_CELL = 8
 CROSSOVER_HZ = 0.03
 
 
-def densities(recording: Recording, names: Sequence[str], confidence: float) -> tuple[list[Density | None], list[str]]:
-    """Densities of channels in one pass, None with a sentence where a channel has none.
+def densities(recording: Recording, names: Sequence[str], confidence: float) -> list[Density | None]:
+    """Densities of channels in one pass, None of a recording that is too short for one.
 
     Raises `MissingChannel`, `UnfitRecording` for samples that are no numbers.
     """
     info = recording.info
     samples = cell_samples(info.rate_hz, max(CELL_S, 1.0 / info.rate_hz))
     if info.count // samples < FEWEST_SAMPLES:
-        short = (
-            f"recording {info.id} is too short for a spectral density: it takes {FEWEST_SAMPLES} means over a second"
-        )
-        return [None] * len(names), [short]
+        return [None] * len(names)
     stream = CellStream(info, names, samples / info.rate_hz)
     fast = [FastPowers(info.rate_hz, CROSSOVER_HZ) for _ in names] if samples >= FEWEST_A_CELL else []
     for rows in channel_rows(info, names, recording.blocks()):
@@ -35,12 +32,10 @@ def densities(recording: Recording, names: Sequence[str], confidence: float) -> 
             powers.add(row)
     cells = stream.finish()
     found: list[Density | None] = []
-    why: list[str] = []
-    for index, (name, row) in enumerate(zip(names, cells.rates, strict=True)):
+    for index, row in enumerate(cells.rates):
         try:
             slow = slow_powers(row, cells.cell_s)
             found.append(density_of(slow, fast[index].finish() if fast else None, confidence))
-        except UnfitRecording as refusal:
+        except UnfitRecording:
             found.append(None)
-            why.append(f"recording {info.id}, {name}: no spectral density: {refusal}")
-    return found, why
+    return found
