@@ -144,7 +144,7 @@ def check(
     except OSError as error:
         raise Refused(f"{error.filename} cannot be read: {error.strerror}") from error
     wanted = _here(context.obj, server) if recompute is None else recompute
-    repeated = _repeated(context.obj, server, document) if wanted else None
+    repeated = _repeated(context.obj, server, document, recompute is None) if wanted else None
     same = None if repeated is None else all(one.same for one in repeated)
     facts = {
         "valid": True,
@@ -186,11 +186,16 @@ def _here(settings: Settings, server: str | None) -> bool:
     return server is not None or not separator or bool(kind) or Path(path).is_file()
 
 
-def _repeated(settings: Settings, server: str | None, document: dict[str, Any]) -> "list[Repeated]":
-    """Have the service analyse the raw data again. Raises `Refused`."""
+def _repeated(
+    settings: Settings, server: str | None, document: dict[str, Any], unasked: bool
+) -> "list[Repeated] | None":
+    """Have the service analyse the raw data again; `unasked`: None where it has not got them. Raises `Refused`."""
     from bench_service.formats.certificate.recomputed import compared, results_of
 
     with connect(settings, server, drive=False) as client:
+        known = (client.get(f"/api/v1/results/{segment(r)}").status_code for r in results_of(document))
+        if unasked and 404 in known:
+            return None
         answers = {
             result: call(client, "POST", f"/api/v1/results/{segment(result)}/recomputation", ("recordings",))
             for result in results_of(document)
