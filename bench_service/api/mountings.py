@@ -14,7 +14,6 @@ from bench_service.bench.mountings import MountingEntry, new_mounting
 from bench_service.mapping import copied
 from bench_service.model.mountings import StoredMounting
 from bench_service.model.records import Idempotency
-from bench_service.model.request import fingerprint
 from bench_service.wall_clock import now
 
 router = APIRouter(prefix="/api/v1/mountings", tags=["mountings"])
@@ -97,7 +96,7 @@ def enter_mounting(
         require_team(me, service.queues.team_of_bench(bench), f"bench {bench}")
     by = proven or body.by or client
     entered = new_mounting(copied(MountingEntry, body, bench=bench, by=by, proven=proven is not None))
-    asked = None if key is None else Idempotency(f"mountings:{key}", fingerprint(body))
+    asked = Idempotency.of("mountings", key, body)
     stored = service.stores.mountings.add(entered, asked)
     response.headers["Location"] = f"/api/v1/mountings/{stored.id}"
     return MountingView.of(stored)

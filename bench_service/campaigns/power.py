@@ -32,7 +32,7 @@ class LimitPreview:
     power_at_twice: float | None
     """Probability that a unit at twice the limit fails."""
     level: float | None = None
-    """Of a test of significance its level; None for a requirement on the unit."""
+    """Level of a test of significance; None for a requirement on the unit."""
 
     def __str__(self) -> str:
         parts = [f"{self.check}: {_bounds(self)} ({self.source or 'source not said'})"]

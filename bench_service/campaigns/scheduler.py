@@ -22,7 +22,6 @@ from bench_service.campaigns.stores import Stores
 from bench_service.mapping import copied
 from bench_service.model.errors import IdempotencyConflict, NotFound, ServiceError, StorageFailure, StorageFull
 from bench_service.model.records import Idempotency, Page
-from bench_service.model.request import fingerprint
 from bench_service.wall_clock import monotonic_s, new_id, now
 from procedures.core.errors import DomainError
 
@@ -67,7 +66,7 @@ class Scheduler:
         Raises `BadParameter` for a time that never comes, and its run's refusals. A key of a schedule that was removed
         since is used up: `IdempotencyConflict`.
         """
-        idempotency = None if key is None else Idempotency(f"schedules:{key}", fingerprint(request))
+        idempotency = Idempotency.of("schedules", key, request)
         known = self._stores.keys.made(idempotency, "schedule")
         if known is not None:
             return self._kept(known)

@@ -21,7 +21,6 @@ from bench_service.model.errors import IllegalTransition, NameTaken, NotFound
 from bench_service.model.job import Job, JobState
 from bench_service.model.quantities import quantity
 from bench_service.model.records import Idempotency, Page
-from bench_service.model.request import fingerprint
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter
 
@@ -63,7 +62,7 @@ class CampaignService:
 
     def add(self, campaign: Campaign, key: str | None = None, team: str = "") -> Campaign:
         """Store a campaign of a team once it was examined. Raises `NameTaken`, and the errors of `examine`."""
-        idempotency = None if key is None else Idempotency(f"campaigns:{key}", fingerprint(campaign.model_dump()))
+        idempotency = Idempotency.of("campaigns", key, campaign.model_dump())
         if self._stores.keys.made(idempotency, "campaign") is not None:
             return self._stores.campaigns.get(campaign.name)
         if campaign.name in shipped():
@@ -96,7 +95,7 @@ class CampaignService:
 
     def start(self, request: RunRequest, key: str | None = None, team: str = "") -> CampaignRun:
         """Queue a campaign run of a team. Raises `NotFound`, `NotMounted`, `BadParameter`, `IdempotencyConflict`."""
-        idempotency = None if key is None else Idempotency(f"campaign_runs:{key}", fingerprint(request))
+        idempotency = Idempotency.of("campaign_runs", key, request)
         known = self._stores.keys.made(idempotency, "campaign_run")
         if known is not None:
             return self._stores.campaigns.run(known)

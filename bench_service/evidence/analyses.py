@@ -17,7 +17,6 @@ from bench_service.model.calibrations import StoredCalibration
 from bench_service.model.context import context_of
 from bench_service.model.job import Job
 from bench_service.model.records import Idempotency, RecordingState, StoredResult
-from bench_service.model.request import fingerprint
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.imu_model import TriadCalibration
@@ -76,7 +75,7 @@ class AnalysisService:
 
     def analyse_again(self, job_id: str, parameters: dict[str, Any], key: str | None = None) -> StoredResult:
         """Analyse a job's recordings with other parameters; the first result stays as it is."""
-        idempotency = None if key is None else Idempotency(f"again:{key}", fingerprint([job_id, parameters]))
+        idempotency = Idempotency.of("again", key, [job_id, parameters])
         known = self._stores.keys.made(idempotency, "result")
         if known is not None:
             return self._stores.results.get(known)
@@ -93,7 +92,7 @@ class AnalysisService:
 
     def run_method(self, request: AnalysisRequest, key: str | None = None) -> StoredResult:
         """Run a method on stored recordings or calibrations. Raises `NotFound`, `DomainError`, `ValidationError`."""
-        idempotency = None if key is None else Idempotency(f"analyses:{key}", fingerprint(request))
+        idempotency = Idempotency.of("analyses", key, request)
         known = self._stores.keys.made(idempotency, "result")
         if known is not None:
             return self._stores.results.get(known)

@@ -15,7 +15,6 @@ from bench_service.formats.proposal.model import Proposal
 from bench_service.formats.reader.client import FileReader, NoReader, NoRoom
 from bench_service.model.errors import NotReady, StorageFull
 from bench_service.model.records import Idempotency, NewRecording
-from bench_service.model.request import fingerprint
 from bench_service.wall_clock import now
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter
@@ -94,7 +93,7 @@ class ImportService:
         if self._synthetic is None:
             raise NotReady(["synthetic recordings are made by the service of a simulated bench"])
         settings = {"noise": asdict(asked.noise), "seed": asked.seed, "channel": asked.channel.name}
-        idempotency = None if key is None else Idempotency(f"synthetic:{key}", fingerprint(asked))
+        idempotency = Idempotency.of("synthetic", key, asked)
         recordings = self._stores.recordings
         known = self._stores.keys.made(idempotency, "recording")
         if known is not None:
@@ -133,7 +132,7 @@ class ImportService:
 
     def _store(self, imported: Imported, key: str | None) -> RecordingInfo:
         description = imported.description
-        idempotency = None if key is None else Idempotency(f"recordings:{key}", fingerprint(imported.source))
+        idempotency = Idempotency.of("recordings", key, imported.source)
         recordings = self._stores.recordings
         known = self._stores.keys.made(idempotency, "recording")
         if known is not None:

@@ -12,7 +12,6 @@ from bench_service.mapping import copied
 from bench_service.model.errors import NotFound
 from bench_service.model.job import Job, JobState
 from bench_service.model.records import Idempotency
-from bench_service.model.request import fingerprint
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter
 
@@ -74,7 +73,7 @@ class QueueService:
         else:
             self._stores.units.unit(request.name)
         made = copied(Reservation, request, id=new_id(), created_at=at, until=until)
-        key = None if idempotency_key is None else Idempotency(f"reservations:{idempotency_key}", fingerprint(request))
+        key = Idempotency.of("reservations", idempotency_key, request)
         return self._stores.reservations.add(made, key)
 
     def give_back(self, reservation_id: str) -> Reservation:

@@ -17,7 +17,7 @@ from bench_service.model.context import context_document
 from bench_service.model.errors import NotFound
 from bench_service.model.job import Job, JobState
 from bench_service.model.records import Idempotency, StoredResult
-from bench_service.model.request import JobRequest, fingerprint
+from bench_service.model.request import JobRequest
 from bench_service.telemetry.log_context import about
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter
@@ -53,7 +53,7 @@ class JobService:
 
         Raises the errors of `Planner.plan`, and `BadParameter` for an axis limit.
         """
-        idempotency = None if key is None else Idempotency(f"jobs:{key}", fingerprint(request))
+        idempotency = Idempotency.of("jobs", key, request)
         known = self._stores.keys.made(idempotency, "job")
         if known is not None:
             return self._stores.jobs.get(known)

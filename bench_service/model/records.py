@@ -10,6 +10,7 @@ import numpy as np
 
 from bench_service.model.quantities import Quantity
 from bench_service.model.raw_data import RawState
+from bench_service.model.request import fingerprint
 from bench_service.wall_clock import new_id
 from procedures.core.limits import Verdict
 from procedures.core.recording import Channel, RecordingInfo, Station
@@ -31,6 +32,11 @@ class Idempotency:
 
     key: str
     fingerprint: str
+
+    @classmethod
+    def of(cls, scope: str, key: str | None, request: object) -> "Idempotency | None":
+        """The key of a request within its scope, as "jobs"; None for a client that sent no key."""
+        return None if key is None else cls(f"{scope}:{key}", fingerprint(request))
 
 
 class RecordingState(StrEnum):

@@ -173,7 +173,7 @@ class PlannedCheck:
     expected: float | None = None
     """Value to expect of this unit by its record, without the measurement's part; None: not known."""
     level: float | None = None
-    """Of a test of significance: chance that a sound unit fails it."""
+    """Level of a test of significance: the chance that a sound unit fails it."""
 
 
 def check(

@@ -85,7 +85,7 @@ class ChannelFound:
     after_sd: float
     """Spread of the cells about each recording's mean, before and after correction."""
     p_unseen: float | None
-    """What is left in each recording by a fit to the others; None with a single recording."""
+    """p-value of "no dependence is left" in each recording after a fit to the others; None with a single recording."""
     soaks: tuple[SoakFit, ...]
     repeatability: tuple[Repeatability, ...]
 

@@ -42,7 +42,7 @@ class ServedDevice:
     datagrams: bool = False
     """True for a unit that sends datagrams to the place instead of listening there."""
     options: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    """Of a table: numbers, prefix_bytes, ending. Of a chamber: type."""
+    """Settings of a table (numbers, prefix_bytes, ending) or of a chamber (type)."""
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,6 @@ from bench_service.formats.calibration_exports.forms import MEDIA_TYPES, Calibra
 from bench_service.model.calibrations import Decider
 from bench_service.model.errors import NotFound
 from bench_service.model.records import Idempotency
-from bench_service.model.request import fingerprint
 from procedures.core.unit import SERIAL
 
 router = APIRouter(prefix="/api/v1/units/{serial}/calibrations", tags=["units"])
@@ -74,7 +73,9 @@ def enter_calibration(
     service.stores.units.unit(serial)
     calibration = stored_calibration(serial, body.entry())
     by = decider(body.by, body.remark)
-    stored = service.stores.calibrations.add(calibration, by, body.choose, _key("enter", key, serial, body))
+    stored = service.stores.calibrations.add(
+        calibration, by, body.choose, Idempotency.of("calibrations-enter", key, [serial, body])
+    )
     response.headers["Location"] = f"/api/v1/units/{serial}/calibrations/{stored.id}"
     return CalibrationView.of(stored)
 
@@ -150,7 +151,7 @@ def choose_calibration(
 ) -> CalibrationView:
     """Make a calibration the one of its triad that new jobs use; jobs that began before keep theirs."""
     by = decider(body.by, body.remark)
-    asked = _key("choose", key, serial, calibration_id, body)
+    asked = Idempotency.of("calibrations-choose", key, [serial, calibration_id, body])
     return CalibrationView.of(service.stores.calibrations.choose(serial, calibration_id, by, asked))
 
 
@@ -165,7 +166,7 @@ def approve_calibration(
 ) -> CalibrationView:
     """Approve a calibration, and say until when it is valid."""
     by = decider(body.by, body.remark)
-    asked = _key("approve", key, serial, calibration_id, body)
+    asked = Idempotency.of("calibrations-approve", key, [serial, calibration_id, body])
     return CalibrationView.of(service.stores.calibrations.approve(serial, calibration_id, by, body.valid_until, asked))
 
 
@@ -180,9 +181,5 @@ def reject_calibration(
 ) -> CalibrationView:
     """Reject a calibration: no new job uses it, also where it is current."""
     by = decider(body.by, body.remark)
-    asked = _key("reject", key, serial, calibration_id, body)
+    asked = Idempotency.of("calibrations-reject", key, [serial, calibration_id, body])
     return CalibrationView.of(service.stores.calibrations.reject(serial, calibration_id, by, asked))
-
-
-def _key(act: str, key: str | None, *about: object) -> Idempotency | None:
-    return None if key is None else Idempotency(f"calibrations-{act}:{key}", fingerprint(list(about)))

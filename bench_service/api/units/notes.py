@@ -12,7 +12,6 @@ from bench_service.api.http.fields import NAME, Request
 from bench_service.mapping import copied
 from bench_service.model.notes import UnitNote
 from bench_service.model.records import Idempotency
-from bench_service.model.request import fingerprint
 from bench_service.wall_clock import new_id, now
 from procedures.core.unit import SERIAL
 
@@ -65,5 +64,5 @@ def add_unit_note(
     """Add a remark to a unit: it stays with the unit, with its author, and is never changed."""
     service.stores.units.unit(serial)
     note = UnitNote(new_id(), serial, now(), proven or body.by or client, proven is not None, body.text.strip())
-    asked = None if key is None else Idempotency(f"unit-notes:{key}", fingerprint([serial, body]))
+    asked = Idempotency.of("unit-notes", key, [serial, body])
     return copied(UnitNoteView, service.stores.unit_notes.add(note, asked))

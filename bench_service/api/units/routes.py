@@ -17,7 +17,6 @@ from bench_service.api.units.schemas import (
 )
 from bench_service.evidence.imports import require_real
 from bench_service.model.records import Idempotency
-from bench_service.model.request import fingerprint
 from procedures.core.unit import SERIAL, Unit
 from procedures.core.unit_correction import CorrectionKind
 
@@ -80,7 +79,7 @@ def read_correction(serial: str, correction_id: str, service: Service) -> Correc
 @router.post("/{serial}/corrections/{correction_id}/current", responses=problems(404, 409, 507))
 def choose_correction(serial: str, correction_id: str, service: Service, key: IdempotencyKey = None) -> CorrectionView:
     """Make a correction set the one that new jobs use; jobs that began before keep theirs."""
-    asked = None if key is None else Idempotency(f"corrections:{key}", fingerprint([serial, correction_id]))
+    asked = Idempotency.of("corrections", key, [serial, correction_id])
     return CorrectionView.of(service.stores.corrections.make_current(serial, correction_id, asked))
 
 
@@ -95,7 +94,7 @@ def approve_correction(
 ) -> CorrectionView:
     """Approve a correction set, and say until when it is valid."""
     by = decider(body.by, body.remark)
-    asked = None if key is None else _asked("approve", key, serial, correction_id, body)
+    asked = Idempotency.of("corrections-approve", key, [serial, correction_id, body])
     return CorrectionView.of(service.stores.corrections.approve(serial, correction_id, by, body.valid_until, asked))
 
 
@@ -110,9 +109,5 @@ def reject_correction(
 ) -> CorrectionView:
     """Reject a correction set: no new job uses it, also where it is current."""
     by = decider(body.by, body.remark)
-    asked = None if key is None else _asked("reject", key, serial, correction_id, body)
+    asked = Idempotency.of("corrections-reject", key, [serial, correction_id, body])
     return CorrectionView.of(service.stores.corrections.reject(serial, correction_id, by, asked))
-
-
-def _asked(act: str, key: str, *about: object) -> Idempotency:
-    return Idempotency(f"corrections-{act}:{key}", fingerprint(list(about)))

@@ -19,7 +19,7 @@ STEPS = (
     "3. Bring the table to its first orientation: all angles zero.",
     "4. Read the azimuth of the unit's prism by theodolite, in several rounds.",
 )
-"""What a person does before a mounting is entered (thesis 5.1)."""
+"""Steps of a person before a mounting is entered (thesis 5.1)."""
 
 
 @mounting.command("enter")

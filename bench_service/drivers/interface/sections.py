@@ -77,10 +77,12 @@ class Accuracy(Section):
 
     orthogonality_sd_arcsec: NonNegative = 0.0
     pointing_sd_arcsec: NonNegative = 0.0
-    """Of the commanded angles."""
+    """Standard deviation of the commanded angles."""
     level_sd_arcsec: NonNegative = 0.0
     encoder_sd_arcsec: Positive | None = None
-    """Of the measured angles; analyses use these where it is below `pointing_sd_arcsec`. None: not declared."""
+    """Standard deviation of the measured angles, which analyses use where it is below `pointing_sd_arcsec`; None: not
+    declared.
+    """
 
 
 class TurntableSection(DeviceSection):
@@ -136,7 +138,7 @@ class ChamberSection(DeviceSection):
     limiter_c: Finite | None = None
     """Setting of the independent over-temperature limiter, for the record."""
     on_safe: Literal["ambient", "hold", "off"] = "ambient"
-    """What a running chamber is told when the bench is made safe; one that stands still is told nothing."""
+    """Demand on a running chamber when the bench is made safe; one that stands still gets none."""
 
 
 class WireChamber(ChamberSection, Wire):

@@ -52,7 +52,7 @@ class FramedDecoder:
         return Decoded(counts, counters, status, spoiled)
 
     def invalid(self, status: Integers) -> NDArray[np.bool_]:
-        """Which frames say that their data are not valid, see `StreamDecoder`."""
+        """Mask of the frames that say that their data are not valid, see `StreamDecoder`."""
         found = np.zeros(len(status), dtype=np.bool_)
         for column, part in enumerate(self.form.status):
             failed = status[:, column] if part.failed_when == 1 else ~status[:, column]

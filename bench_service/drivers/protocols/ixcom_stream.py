@@ -61,7 +61,7 @@ class IxcomDecoder:
         return Decoded(counts.astype(np.int32), counters, status, spoiled)
 
     def invalid(self, status: Integers) -> NDArray[np.bool_]:
-        """Which frames say that their data are not valid, see `StreamDecoder`."""
+        """Mask of the frames that say that their data are not valid, see `StreamDecoder`."""
         return (status[:, 0] & ixcom.INVALID) != 0
 
     def words(self, status: Integers) -> tuple[tuple[str, str, tuple[str, ...]], ...]:

@@ -41,7 +41,7 @@ class StreamDecoder(Protocol):
         ...
 
     def invalid(self, status: Integers) -> NDArray[np.bool_]:
-        """Which frames say that their data are not valid, (n,), from status words (n, words)."""
+        """Mask of the frames that say that their data are not valid, (n,), from status words (n, words)."""
         ...
 
     def words(self, status: Integers) -> tuple[tuple[str, str, tuple[str, ...]], ...]:

@@ -10,7 +10,6 @@ from bench_service.evidence.stores import EvidenceStores
 from bench_service.model.batches import AnalysisBatch, BatchRequest, Grouping
 from bench_service.model.errors import Overloaded
 from bench_service.model.records import Idempotency
-from bench_service.model.request import fingerprint
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter
 
@@ -35,7 +34,7 @@ class BatchService:
         Raises `NotFound` for the method and the calibrations, `ValidationError` for the parameters, `BadParameter`
         for a selection that is empty, too large or names what is no complete recording, and `Overloaded`.
         """
-        idempotency = None if key is None else Idempotency(f"batches:{key}", fingerprint(_document(request)))
+        idempotency = Idempotency.of("batches", key, _document(request))
         known = self._stores.keys.made(idempotency, "batch")
         if known is not None:
             return self._stores.batches.get(known)

@@ -13,7 +13,6 @@ from bench_service.mapping import copied
 from bench_service.model.errors import NotAllowed, NotDriving, NotFound, NotMounted
 from bench_service.model.manual import DemandKind, ManualDemand, ManualLease
 from bench_service.model.records import Idempotency, Page
-from bench_service.model.request import fingerprint
 from bench_service.wall_clock import new_id, now
 from procedures.core.errors import BadParameter
 
@@ -62,7 +61,7 @@ class ManualService:
         at = now()
         until = at + timedelta(minutes=_minutes(request.minutes))
         lease = copied(ManualLease, request, id=new_id(), unit=unit, created_at=at, until=until)
-        key = None if idempotency_key is None else Idempotency(f"manual:{idempotency_key}", fingerprint(request))
+        key = Idempotency.of("manual", idempotency_key, request)
         begun = self._stores.manual.begin(lease, key)
         self._wake(request.bench)
         return begun

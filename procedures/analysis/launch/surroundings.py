@@ -72,7 +72,7 @@ class Vibration:
     total: float
     """With the channel's noise [rate]."""
     own_noise: float
-    """Of the fitted quantization, random walk and flicker in that band [rate]."""
+    """Root mean square of the fitted quantization, random walk and flicker in that band [rate]."""
     vibration: float
     """``√(total² − own_noise²)``; zero where the noise explains all [rate]."""
     lines: float

@@ -34,7 +34,7 @@ class CoefficientsSoFar:
     values: Array
     """Shape (n, 12), in the order of `COEFFICIENT_NAMES`."""
     standard_uncertainties: Array
-    """Of noise, the table's declared flaws and the prior; shape (n, 12)."""
+    """Standard deviations by noise, the table's declared flaws and the prior; shape (n, 12)."""
     determined: tuple[tuple[bool, ...], ...]
     """True where the uncertainty is less than `DETERMINED` of the prior's; shape (n, 12)."""
     noise_known: bool

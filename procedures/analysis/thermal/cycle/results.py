@@ -202,7 +202,7 @@ class GyroCorrected:
     reason: str
     p_before: float
     p_after: float | None
-    """What is left, each run corrected by a fit to the others; None with a single run."""
+    """p-value of "no dependence is left" in each run, corrected by a fit to the others; None with a single run."""
 
 
 @dataclass(frozen=True)
