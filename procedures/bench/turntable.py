@@ -93,6 +93,6 @@ def require_turns_over(begin: TableAngles | None, turn: Turn, reading: TableRead
     if abs(rates[turn.axis]) > OVER_DEG_S or abs(left_deg) > OVER_DEG:
         raise DeviceFault(
             f"the recording ends before the turns do: the {turn.axis} axis is {left_deg:.4g} deg from their end, at "
-            f"{rates[turn.axis]:.4g} deg/s, because it was braked late; give a longer rest_s, or served simulators a "
-            "smaller time_factor"
+            f"{rates[turn.axis]:.4g} deg/s, because it was braked late; give a longer rest after the turns (rest_s "
+            "of scale_factor_whole_turns and polarity_check) or ramp_s, or served simulators a smaller time_factor"
         )

@@ -11,7 +11,6 @@ from procedures.core.recording import Recording, require_finite
 CELL_S = 1.0
 FEWEST_A_CELL = 8
 """Fewest samples a cell for which faster frequencies are taken from every sample."""
-CROSSOVER_HZ = 0.03
 
 
 def densities(recording: Recording, names: Sequence[str], confidence: float) -> list[Density | None]:
@@ -24,7 +23,7 @@ def densities(recording: Recording, names: Sequence[str], confidence: float) -> 
     if info.count // samples < FEWEST_SAMPLES:
         return [None] * len(names)
     stream = CellStream(info, names, samples / info.rate_hz)
-    fast = [FastPowers(info.rate_hz, CROSSOVER_HZ) for _ in names] if samples >= FEWEST_A_CELL else []
+    fast = [FastPowers(info.rate_hz) for _ in names] if samples >= FEWEST_A_CELL else []
     for rows in channel_rows(info, names, recording.blocks()):
         require_finite(info, names, rows.T)
         stream.add(rows)

@@ -99,11 +99,6 @@ class LiveDwell:
                 least = min(least, float(chdtrc(len(found), float(np.sum(found**2)))))
         return min(1.0, least * len(self._estimates))
 
-    @property
-    def estimates(self) -> tuple[float, ...]:
-        """Estimates of the channels' means so far, in the order of the rule's targets [rate]."""
-        return tuple(estimate.estimate for estimate in self._estimates)
-
 
 @dataclass(frozen=True)
 class DwellEnded:

@@ -35,17 +35,19 @@ FACES = {
     "z down": TableAngles(0.0, 0.0, 90.0),
 }
 """Attitude of the table for each face: that axis of the unit along the outer axis."""
+END_REST_S = 2.0
+"""Rest at the end of a recording of turns [s]."""
 
 
 def face_stations(rest_s: float, turns: int, rate_deg_s: float, ramp_s: float, settle_s: float) -> tuple[Station, ...]:
-    """Each face in turn: at rest, then whole turns there and back, each recording ending at rest for two seconds."""
+    """Each face in turn: at rest, then whole turns there and back, each recording ending at rest for `END_REST_S`."""
     made: list[Station] = []
     for face, angles in FACES.items():
         made.append(Station(len(made), f"{face} at rest", angles, None, settle_s, rest_s))
         for sign in (1, -1):
             turn = Turn("outer", sign * turns, rate_deg_s, ramp_s)
             label = f"{face} {sign * rate_deg_s:+g} deg/s, {turn.turns:+d} turns"
-            made.append(Station(len(made), label, angles, None, settle_s, turn.duration_s + 2.0, turn=turn))
+            made.append(Station(len(made), label, angles, None, settle_s, turn.duration_s + END_REST_S, turn=turn))
     return tuple(made)
 
 
@@ -54,14 +56,12 @@ def rests_and_turns(stations: Sequence[Station], seconds: Array, site: Site) -> 
     turns = [s.turn is not None for s in stations]
     moving = turning([s for s in stations if s.turn is not None], np.asarray(seconds)[turns], site)
     angles = tuple(s.angles or TableAngles() for s in stations)
-    rest = np.logical_not(turns)
     axis = np.array([table_rotation(a).inv().apply([0.0, 1.0, 0.0]) for a in angles])
     earth = earth_rate_b(list(angles), site) * np.asarray(seconds)[:, None]
     earth[turns] = moving.earth_rad
     n = len(stations)
     angle, rate, moments = np.zeros(n), np.zeros(n), np.zeros((n, 3))
     angle[turns], rate[turns], moments[turns] = moving.angle_rad, moving.rate_rad_s, moving.moments
-    assert np.all(angle[rest] == 0.0)
     return Turning(np.asarray(seconds, dtype=np.float64), axis, angle, rate, earth, moments, angles)
 
 

@@ -42,9 +42,10 @@ def course(recording: Recording, channel: int, along_rad_s: float, angle_rad: fl
     to be constant: ``∫cos θ dt = Δt·cos θ_m·sin(Δ/2)/(Δ/2)`` with its middle θ_m and its turn Δ.
     """
     info = recording.info
-    column = next(k for k, c in enumerate(info.channels) if c.name == TRIADS["gyro"][channel])
-    scale, dt = NominalScale.of(info.channels, info.rate_hz), 1.0 / info.rate_hz
-    steps = np.concatenate([scale.rates(block.astype(np.float64))[:, column] for block in recording.blocks()])
+    column = info.column(TRIADS["gyro"][channel])
+    scale, dt = NominalScale.of([info.channels[column]], info.rate_hz), 1.0 / info.rate_hz
+    outputs = (block[:, [column]].astype(np.float64) for block in recording.blocks())
+    steps = np.concatenate([scale.rates(output)[:, 0] for output in outputs])
     steps = direction * steps * dt - along_rad_s * dt
     steps *= angle_rad / float(np.sum(steps))
     if np.max(np.abs(steps)) > MOST_STEP_RAD:

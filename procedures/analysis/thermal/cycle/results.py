@@ -190,7 +190,7 @@ class Hysteresis:
     difference_m_s2: float
     standard_uncertainty_m_s2: float
     p_value: float
-    """Chance of as large a difference from the noise of the fit's residuals."""
+    """Chance of as large a difference by noise: the unit's where it is known, else that of the fit's residuals."""
 
 
 @dataclass(frozen=True)
