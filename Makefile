@@ -12,7 +12,7 @@ COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --gene
 .PHONY: help run test browser screenshots figures clients bench bench-against profile chaos soak format check validate rights pictures newest-form lock audit images clean foreign
 
 help:  ## this list
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
 
 $(VENV)/.ready: requirements.lock pyproject.toml
 	@$(PYTHON) .preflight.py

@@ -94,6 +94,9 @@ def test_a_mounting_is_entered_repeats_and_is_taken_off(
     expect(page.locator("#found tr[data-mounting]")).to_have_count(2)
     if pictures := request.config.getoption("--pictures"):
         page.screenshot(path=Path(pictures) / "mountings.png", full_page=True)
+    window.expected = re.compile("status of 422")
+    page.get_by_role("button", name="From the unit's calibrations").click()
+    expect(page.locator("#repeats output")).to_contain_text("calibrations")  # this unit has none yet
     page.get_by_role("button", name="Taken off").click()
     page.get_by_role("dialog").get_by_role("button", name="It was taken off").click()
     expect(page.locator("#found")).not_to_contain_text("Taken off")

@@ -22,6 +22,7 @@ def test_after_its_last_station_a_calibration_has_its_results_coefficients_withi
     sqlite_client: Client, calibrated: dict[str, Any]
 ) -> None:
     found = of(sqlite_client, calibrated["id"])
+    assert of(sqlite_client, str(calibrated["number"])) == found, "a job's number stands for its id"
     assert found["stations_done"] == 12
     assert found["not_estimated"] == {}
     result = sqlite_client.http.get("/api/v1/units/SIM-0001/calibrations?limit=2").json()["items"]

@@ -19,6 +19,7 @@ from bench_service.evidence.raw_data.service import RawDataService, StorageSetti
 from bench_service.evidence.upkeep import UpkeepService
 from bench_service.formats.content_hash import ContentHash
 from bench_service.model.batches import BatchRequest, Selection
+from bench_service.model.calibrations import Decider
 from bench_service.model.errors import ArchiveAway, DamagedRecording, IllegalTransition, RawDataRemoved
 from bench_service.model.job import Job, JobState
 from bench_service.model.raw_data import Keeping, RawState
@@ -31,6 +32,7 @@ from bench_service.wall_clock import monotonic_s, pause
 from procedures.core.errors import BadParameter
 from procedures.core.limits import Verdict
 from procedures.core.recording import RawArray
+from tests.correction_samples import thermal
 from tests.kit.calibrations import triad
 from tests.storage.campaigns import campaign, new_run
 
@@ -118,6 +120,22 @@ def test_a_rule_removes_routine_passes_and_keeps_what_something_rests_on(
     assert raw.remove(OLD, dry_run=False).done == 1, "what was held goes once it is released"
     with pytest.raises(BadParameter, match="BENCH_RAW_DAYS"):
         raw.remove(None, dry_run=True)
+
+
+def test_raw_data_behind_an_approved_correction_stay_when_another_one_is_current(
+    stores: Stores, database: Database, recorded: Callable[..., str], new_result: Callable[..., StoredResult]
+) -> None:
+    ids: list[str] = []
+    for seed in (1, 2, 3):
+        recording = recorded()
+        content = stores.recordings.get(recording).info.content_hash
+        stores.results.add(new_result(recordings=((recording, content),)), corrections=[thermal(seed)])
+        ids.append(recording)
+        if seed == 1:
+            (first,) = stores.corrections.list("U-1").items
+            stores.corrections.approve("U-1", first.id, Decider("Ada", ""), None)
+    pause(0.05)
+    assert service(stores, database).remove(OLD, dry_run=True).recordings == [ids[1]]
 
 
 def test_archived_data_are_read_back_by_everybody_and_by_duckdb(

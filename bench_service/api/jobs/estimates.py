@@ -4,9 +4,10 @@ from fastapi import APIRouter
 
 from bench_service.api.http.dependencies import Service
 from bench_service.api.http.errors import problems
+from bench_service.api.http.job_numbers import JobByNumber
 from bench_service.evidence.so_far.documents import JobEstimates
 
-router = APIRouter(prefix="/api/v1/jobs", tags=["jobs"])
+router = APIRouter(prefix="/api/v1/jobs", tags=["jobs"], dependencies=[JobByNumber])
 
 
 @router.get("/{job_id}/estimates", responses=problems(404))

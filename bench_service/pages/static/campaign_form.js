@@ -21,13 +21,13 @@ class Limits {
 
   add(one) {
     const inputs = Object.fromEntries([["quantity", "gyro.b_x"], ["unit", "deg/h"], ["minimum", ""], ["maximum", ""], ["source", ""]].map(([name, hint]) => [name, h("input", { value: one[name] ?? "", size: name === "quantity" || name === "source" ? 16 : 7, placeholder: hint, "aria-label": t({ quantity: "Quantity", unit: "Unit", minimum: "Least", maximum: "Greatest", source: "Source" }[name]) })]));
-    const row = h("tr", {}, ...Object.values(inputs).map((input) => h("td", {}, input)), h("td", {}, h("button", { type: "button", "aria-label": t("Remove this limit"), onclick: () => { row.remove(); this.rows = this.rows.filter((known) => known !== inputs); } }, "×")));
-    this.rows.push(inputs);
+    const row = h("tr", {}, ...Object.values(inputs).map((input) => h("td", {}, input)), h("td", {}, h("button", { type: "button", "aria-label": t("Remove this limit"), onclick: () => { row.remove(); this.rows = this.rows.filter((known) => known.inputs !== inputs); } }, "×")));
+    this.rows.push({ one, inputs });
     this.body.append(row);
   }
 
   values() {
-    return this.rows.filter((one) => one.quantity.value.trim()).map((one) => ({ quantity: one.quantity.value.trim(), unit: one.unit.value.trim(), minimum: number(one.minimum.value), maximum: number(one.maximum.value), source: one.source.value.trim() }));
+    return this.rows.filter(({ inputs }) => inputs.quantity.value.trim()).map(({ one, inputs }) => ({ ...one, quantity: inputs.quantity.value.trim(), unit: inputs.unit.value.trim(), minimum: number(inputs.minimum.value), maximum: number(inputs.maximum.value), source: inputs.source.value.trim() }));
   }
 }
 

@@ -1,7 +1,7 @@
 // Manual mode of a bench: the lease, demands with their limits beside them, readings as they come, and the halt by Escape.
 import { ask, iAm, me, part, read, send } from "./api.js";
 import { busy, verb } from "./act.js";
-import { badge, fill, h, moment, number, short, span } from "./dom.js";
+import { badge, fill, h, moment, number, span } from "./dom.js";
 import * as feed from "./feed.js";
 import { t } from "./words.js";
 

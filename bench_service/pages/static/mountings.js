@@ -52,7 +52,7 @@ function repeat(group) {
   const [{ unit, bench, plate }] = group, reading = Math.sqrt(group.reduce((sum, one) => sum + one.azimuth_sd_arcsec ** 2, 0) / group.length);
   return h("tr", {}, h("td", {}, unit), h("td", {}, bench), h("td", {}, plate), h("td", { class: "n" }, group.length),
     h("td", { class: "n" }, spreadArcsec(group).toFixed(2)), h("td", { class: "n" }, reading.toFixed(2)),
-    h("td", {}, verb(t("From the unit's calibrations"), { path: "/api/v1/results", body: () => ({ method: "mounting_repeatability", calibrations: chosen(unit) }), then: (made) => { location.href = `/results/${part(made.id)}`; } })));
+    h("td", {}, verb(t("From the unit's calibrations"), { path: "/api/v1/analyses", body: () => ({ method: "mounting_repeatability", calibrations: chosen(unit) }), then: (made) => { location.href = `/results/${part(made.id)}`; } })));
 }
 
 const calibrations = new Map();

@@ -23,17 +23,17 @@ _OPEN = (TaskState.WAITING.value, TaskState.RUNNING.value)
 
 
 def wanted_by_calibrations(session: Session) -> frozenset[str]:
-    """Recordings of the results behind every current or approved calibration and every current correction.
+    """Recordings of the results behind every calibration and correction that is current or approved.
 
     A result may rest on other calibrations and corrections; so theirs are wanted too.
     """
-    counts = or_(CalibrationRow.is_current, CalibrationRow.approval == Approval.APPROVED.value)
+    approved = Approval.APPROVED.value
     found: set[str] = set()
     new = {
         result
         for query in (
-            select(CalibrationRow.result_id).where(counts),
-            select(CorrectionRow.result_id).where(CorrectionRow.is_current),
+            select(CalibrationRow.result_id).where(or_(CalibrationRow.is_current, CalibrationRow.approval == approved)),
+            select(CorrectionRow.result_id).where(or_(CorrectionRow.is_current, CorrectionRow.approval == approved)),
         )
         for result in session.scalars(query)
         if result is not None
