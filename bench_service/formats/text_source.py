@@ -43,10 +43,10 @@ class TextSource:
             glance += more
         kind = foreign_kind(glance[:64])
         if kind is not None:
-            raise UnreadableFile(self._name, f"is no delimited text but {kind}")
+            raise UnreadableFile(self._name, f"is not delimited text but {kind}")
         encoding = _encoding(glance)
         if encoding is None and 20 * glance[:4096].count(0) > len(glance[:4096]):
-            raise UnreadableFile(self._name, "is no delimited text: it has bytes of nought, as binary files have")
+            raise UnreadableFile(self._name, "is not delimited text: it has zero bytes, as binary files have")
         if encoding is not None:
             self._decoder = codecs.getincrementaldecoder(encoding)(errors="replace")
         text = self._decoded(glance.removeprefix(codecs.BOM_UTF8))
@@ -118,7 +118,7 @@ class TextSource:
 
 def too_long(name: str, number: int) -> UnreadableFile:
     """Build the refusal of a line without an end."""
-    return UnreadableFile(name, f"line {number} has more than {LINE_BYTES} bytes: it is no table of text")
+    return UnreadableFile(name, f"line {number} has more than {LINE_BYTES} bytes: it is not a table of text")
 
 
 def _encoding(start: bytes) -> str | None:
