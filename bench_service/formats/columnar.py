@@ -16,10 +16,10 @@ from bench_service.formats.errors import UnreadableFile
 from procedures.core.arrays import Array
 
 _BLOCK_ROWS = 65_536
-_CUT_OFF = "it is cut off: what stands at its end, or what it announces, is missing; copy it once more"
-_DESCRIPTION = "it is damaged: its own description of columns and types cannot be read; copy it once more"
-_PACKED = "it is damaged: a column cannot be unpacked; copy it once more"
-_UNFIT = "its parts do not fit together; copy it once more, or export it anew"
+_CUT_OFF = "it is cut off: what stands at its end, or what it announces, is missing; copy it again"
+_DESCRIPTION = "it is damaged: its own description of columns and types cannot be read; copy it again"
+_PACKED = "it is damaged: a column cannot be unpacked; copy it again"
+_UNFIT = "its parts do not fit together; copy it again, or export it anew"
 _DAMAGES = (
     ("magic bytes", _CUT_OFF),
     ("file size is", _CUT_OFF),
@@ -129,7 +129,7 @@ def _clock(column: Any, name: str, asked: Column, description: ImportDescription
         return nanoseconds(column, description.clock_fraction)
     except NoClock as error:
         where = f"row {row + error.row + 1}, column {asked!r}"
-        raise UnreadableFile(name, f"{where}: {quoted(error.text)} is no text of a clock") from error
+        raise UnreadableFile(name, f"{where}: {quoted(error.text)} is not the text of a clock") from error
 
 
 def _opened(

@@ -43,12 +43,12 @@ class TextSource:
             glance += more
         kind = foreign_kind(glance[:64])
         if kind is not None:
-            raise UnreadableFile(self._name, f"is no delimited text but {kind}")
+            raise UnreadableFile(self._name, f"is not delimited text but {kind}")
         encoding = _encoding(glance)
         if encoding is None and 20 * glance[:4096].count(0) > len(glance[:4096]):
             raise UnreadableFile(
                 self._name,
-                "is no delimited text: it contains zero bytes, as a binary file does; give the format that wrote it",
+                "is not delimited text: it contains zero bytes, as a binary file does; give the format that wrote it",
             )
         if encoding is not None:
             self._decoder = codecs.getincrementaldecoder(encoding)(errors="replace")
@@ -61,7 +61,7 @@ class TextSource:
             data = self._stream.read(size)
         except (EOFError, zlib.error, gzip.BadGzipFile) as error:
             raise UnreadableFile(
-                self._name, f"is a compressed file that is cut off or damaged: copy it once more ({error})"
+                self._name, f"is a compressed file that is cut off or damaged: copy it again ({error})"
             ) from error
         self._left -= len(data)
         if self._left < 0:
@@ -123,7 +123,7 @@ class TextSource:
 
 def too_long(name: str, number: int) -> UnreadableFile:
     """Build the refusal of a line without an end."""
-    return UnreadableFile(name, f"line {number} has more than {LINE_BYTES} bytes: it is no table of text")
+    return UnreadableFile(name, f"line {number} has more than {LINE_BYTES} bytes: it is not a table of text")
 
 
 def _encoding(start: bytes) -> str | None:

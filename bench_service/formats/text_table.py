@@ -77,7 +77,7 @@ class TextTable:
             self._require_width(rows[comments : comments + 1], len(filled) - comments)
             return
         if comments == len(rows):
-            raise UnreadableFile(self.name, "has comments alone; a table was expected")
+            raise UnreadableFile(self.name, "has only comments; a table was expected")
         self.names = [_name(cell) for cell in self.cells(self.text.line(self.first_line))]
         self.first_line += 1
         data = [row for row in rows[comments + 1 :] if any(cell.strip() for cell in row)]

@@ -64,8 +64,10 @@ class Limits(Parameters):
     accelerometer_bias_in_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
     accelerometer_bias_run_to_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
     accelerometer_scale_run_to_run_ppm: float = Field(200.0, gt=0.0, le=1e6)
-    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the residuals' chi-square")
-    condition_max: float = Field(100.0, ge=1.0, le=1e9, description="of the column-scaled design")
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the residuals' chi-square")
+    condition_max: float = Field(
+        100.0, ge=1.0, le=1e9, description="largest condition number of the column-scaled design"
+    )
 
 
 class Params(TableParameters):
@@ -80,7 +82,7 @@ class Params(TableParameters):
     dwell_s: float | None = Field(None, ge=1.0, le=86_400.0, description="None: the unit's averaging time")
     settle_s: float = Field(2.0, ge=0.0, le=3600.0)
     stop_at: StopAt | None = Field(
-        None, description="end each dwell when its means are known so well; dwell_s is longest"
+        None, description="end each dwell once the uncertainty of its means is this small; dwell_s is the longest"
     )
     weighting: Weighting = Field(
         "noise_and_table",
@@ -92,7 +94,7 @@ class Params(TableParameters):
         "none", description="current: the unit's thermal correction brings the accelerometers to its reference"
     )
     case_lag_s: Lag = Field(5.0, description="time constant of the case sensor; used by thermal_correction=current")
-    converter_lag_s: Lag = Field(5.0, description="the same of the converter's sensor")
+    converter_lag_s: Lag = Field(5.0, description="time constant of the converter's sensor")
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
 
@@ -101,10 +103,12 @@ class Result(Outcome):
 
     triads: tuple[TriadSummary, ...]
     thermal: ThermalShare | None = Field(
-        None, exclude_if=lambda share: share is None, description="of the accelerometers, where they were corrected"
+        None,
+        exclude_if=lambda share: share is None,
+        description="thermal correction of the accelerometers, where it was applied",
     )
     dwells: DwellsSaved | None = Field(
-        None, exclude_if=lambda saved: saved is None, description="of a stop rule: each dwell, and the time saved"
+        None, exclude_if=lambda saved: saved is None, description="dwells ended by the stop rule, and the time saved"
     )
 
 

@@ -60,7 +60,7 @@ def test_a_message_does_not_repeat_the_file() -> None:
     [
         (b"PK\x03\x04" + bytes(100), "is a zip archive that is damaged or cut off"),
         (b"\x89HDF\r\n\x1a\n" + bytes(100), "cannot be read as HDF5"),
-        (b"ULog\x01\x12\x35" + bytes(100), "byte 16 begins no message of a ULog"),
+        (b"ULog\x01\x12\x35" + bytes(100), "byte 16 is not the start of a message of a ULog"),
         (
             gzip.compress(b"ULog\x01\x12\x35" + bytes(100), mtime=0),
             "a ULog of a flight controller: it is read as it is",

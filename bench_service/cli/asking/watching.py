@@ -27,13 +27,13 @@ CAMPAIGN_RUN = ("id", "campaign", "unit", "state", "verdict", "steps", "waiting"
 def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict[str, Any]:
     """Follow a job until it has ended; return its last state. Raises `Refused` where the service is away for long."""
     page = f"{str(client.base_url).rstrip('/')}{job['page']}"
-    goes_on = f"The service has job {job['id']} and goes on with it: {page} shows it, `bench jobs` lists it"
+    goes_on = f"The service has job {job['id']} and continues it: {page} shows it, `bench jobs` lists it"
     with _progress(console) as progress:
         bar = progress.add_task(f"{job['procedure']} {job['unit']}", total=job["progress"]["stations"] or 1, doing="")
         paused = False
         while job["state"] not in ENDED:
             if (job["state"] == "paused") > paused:
-                notice(f"job {job['id']} is paused: `bench job resume {job['id']}` goes on with it")
+                notice(f"job {job['id']} is paused: `bench job resume {job['id']}` continues it")
             paused = job["state"] == "paused"
             pause(LOOK_S)
             ask = partial(call, client, "GET", f"/api/v1/jobs/{job['id']}", JOB, timeout=LOOK_TIMEOUT_S)

@@ -18,7 +18,7 @@ def follow(batch: dict[str, Any], ask: Callable[[], dict[str, Any]], console: Co
 
     Raises `Refused` where the service is away for long.
     """
-    goes_on = f"The service has batch {batch['id']} and goes on with it: `bench batch watch {batch['id']}` shows it"
+    goes_on = f"The service has batch {batch['id']} and continues it: `bench batch watch {batch['id']}` shows it"
     words = TextColumn("{task.description}", markup=False)
     with Progress(words, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=console) as progress:
         bar = progress.add_task(f"batch {batch['id']}", total=batch["total"])
