@@ -53,7 +53,7 @@ def free_residuals(free: Array, covariance: Array, basis: Array, matrix: Array, 
 def suspect(found: FreeResiduals, labels: Sequence[str]) -> str:
     """The flaw that the residuals look like, as a sentence: one for all stations, one station, or a loose mounting.
 
-    Empty where the residuals are as declared, or there is no table whose flaws could be told.
+    Empty where the residuals are as declared, or there is no table whose flaws could be found.
     """
     weights = whitener(found.covariance)
     y, f = weights @ found.values, weights @ found.per_radian
