@@ -31,6 +31,9 @@ SHUT_DOWN_S = 20.0
 """Time that the running job may take to leave the bench safe when the service ends [s]."""
 RETRY_S = 0.5
 """Interval between two attempts to write a bad end that could not be written [s]."""
+LISTEN_S = 0.1
+"""Interval at which DBOS looks for messages on SQLite [s]. Nobody sends any, so that a look costs nothing; but the
+service's end waits for the next one."""
 MAX_RECOVERIES = 50
 """Maximum number of times that a job may take the service down before it is given up."""
 
@@ -93,7 +96,7 @@ class Engine:
             "log_level": "WARNING",
             "console_log_level": "ERROR",
             "max_executor_threads": 8,
-            "notification_listener_polling_interval_sec": 1.0,
+            "notification_listener_polling_interval_sec": LISTEN_S,
         }
         self._dbos = DBOS(config=config)
 

@@ -144,6 +144,15 @@ def announce(session: Session, subject: str) -> None:
     session.info[_NEWS].append(subject)
 
 
+def missing_file(database_url: str) -> Path | None:
+    """The file of an SQLite database that is not there, and that opening it would make; None for every other one."""
+    url = make_url(database_url)
+    if url.get_backend_name() != "sqlite" or url.database in (None, "", ":memory:"):
+        return None
+    file = Path(url.database or "")
+    return None if file.is_file() else file
+
+
 def connect(database_url: str) -> Database:
     """Open a database by its URL; file and folder of an SQLite one are created. Raises `StorageFailure`."""
     with storage_errors():

@@ -21,13 +21,19 @@ from procedures.analysis.calibration.scalar import require_scalar_determined
 from procedures.analysis.calibration.station_means import launch_warnings
 from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS, windows
 from procedures.analysis.calibration.summary import TriadSummary
-from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers, analyse_gyros
+from procedures.analysis.calibration.triad_analysis import (
+    AccelerometerSettings,
+    analyse_accelerometers,
+    analyse_gyros,
+    suspected,
+)
 from procedures.analysis.orientation_plan.requirements import (
     in_run_check,
     in_run_unresolved,
     run_to_run_requirements,
     unresolved,
 )
+from procedures.analysis.own_axes import OWN_AXES
 from procedures.analysis.recursive_bias.dwell import DwellsSaved, dwells_saved
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -177,10 +183,10 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     settings = AccelerometerSettings(
         params.scalar_check, params.weighting, correction, (params.case_lag_s, params.converter_lag_s)
     )
-    second, share, doubts = analyse_accelerometers(recordings, site, uncertainty, accelerometer, settings)
-    checks = tuple(c for t in (first, second) for c in _checks(t, params.limits))
+    second, fit, share, doubts = analyse_accelerometers(recordings, site, uncertainty, accelerometer, settings)
+    triads = suspected([first, (second, fit)])
+    checks = tuple(c for t in triads for c in _checks(t, params.limits))
     warnings = _warnings(params, plans) + launch_warnings(recordings) + doubts
-    triads = (first, second)
     return Result(
         checks=checks,
         verdict=verdict(checks),
@@ -198,7 +204,7 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
     """Checks and coefficients that a result will have."""
-    checks = (" bias in run, δ/√3", " condition number", " residuals, p-value of chi-square")
+    checks = (" bias in run, δ/√3", " condition number", OWN_AXES, " residuals, p-value of chi-square")
     return tuple(f"{triad}{n}" for triad in TRIAD_NAMES for n in (*checks, *(f".{c}" for c in COEFFICIENT_NAMES)))
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydantic import Field
 
-from procedures import steps
+from procedures import chamber_steps
 from procedures.analysis.thermal.converter_bench import FittedChannel, fit_channels, read_soaks
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -139,7 +139,7 @@ def predict(params: Params, context: Context) -> Prediction:
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
     """Current, soak, record, station after station."""
     for station in stations:
-        yield await steps.record_current(bench, station)
+        yield await chamber_steps.record_current(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:

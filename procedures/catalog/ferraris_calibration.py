@@ -15,6 +15,7 @@ from procedures import ferraris, steps
 from procedures.analysis.calibration.plan import triad_plan
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.station_plan import windows
+from procedures.analysis.own_axes import OWN_AXES
 from procedures.analysis.turns.ferraris import face_stations, ferraris_estimator, rests_and_turns
 from procedures.analysis.turns.plan import coefficient_names
 from procedures.bench import Bench
@@ -121,7 +122,7 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
     scale = tuple(f"gyro scale factor {axis}, 3σ" for axis in AXES)
     residuals = tuple(f"{triad} {ferraris.RESIDUALS}" for triad in ("gyro", "accelerometer"))
     named = tuple(f"{triad}.{name}" for triad in ("gyro", "accelerometer") for name in COEFFICIENT_NAMES)
-    return (*scale, "accelerometer condition number", *residuals, *named)
+    return (*scale, "accelerometer condition number", f"accelerometer{OWN_AXES}", *residuals, *named)
 
 
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:

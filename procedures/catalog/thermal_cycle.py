@@ -12,7 +12,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from procedures import steps
+from procedures import chamber_steps
 from procedures.analysis.calibration.reference import site_with
 from procedures.analysis.fitness.watched import each_watched
 from procedures.analysis.thermal.cycle.analysis import KnownOfUnit, analyse_cycle
@@ -157,7 +157,7 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
     for station in stations:
         axis = station.label.split()[0]
         request = f"Open the chamber, set the unit with its {axis} axis upwards and level, close the door."
-        yield await steps.record_profile(bench, station, request)
+        yield await chamber_steps.record_profile(bench, station, request)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from pydantic import Field
 
-from procedures import steps
+from procedures import chamber_steps
 from procedures.analysis.fitness.watched import Inspection
 from procedures.analysis.thermal.profile_progress import SENSORS
 from procedures.analysis.thermal.thermometers import Calibrated, Soaked, SoakSettings, calibrate, read_soaks
@@ -150,7 +150,7 @@ def predict(params: Params, context: Context) -> Prediction:
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
     """Off, soak, on, record the first moments; temperature after temperature."""
     for station in stations:
-        yield await steps.record_cold_start(bench, station)
+        yield await chamber_steps.record_cold_start(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:

@@ -67,7 +67,7 @@ def test_a_message_does_not_repeat_the_file() -> None:
         ),
         (b"\x80\x04\x95" + bytes(100), "a Python pickle, which is never opened"),
         (b'{"a": [1, 2]}', "JSON: save it as CSV"),
-        (b"\x01\x00\x02\xff" * 500, "it has bytes of nought"),
+        (b"\x01\x00\x02\xff" * 500, "it contains zero bytes"),
     ],
 )
 def test_files_of_other_kinds_are_named(start: bytes, words: str) -> None:

@@ -184,8 +184,9 @@ def _xml_of(file: Path) -> bytes:
 
 def _here(settings: Settings, server: str | None) -> bool:
     """Whether a service is named, or a database is here: a check makes none."""
-    kind, separator, path = settings.database_url.partition("sqlite:///")
-    return server is not None or not separator or bool(kind) or Path(path).is_file()
+    from bench_service.persistence.database import missing_file
+
+    return server is not None or missing_file(settings.database_url) is None
 
 
 def _repeated(

@@ -30,7 +30,7 @@ class LaunchCurvesCurve(Part):
     noise_exponent: tuple[float, ...]
     """α of the rate's spectral density f^α that the degrees of freedom were taken for."""
     density: Density | None = None
-    """Power spectral density of the nominal rate; None where it was not asked for or cannot be told."""
+    """Power spectral density of the nominal rate; None where it was not asked for or cannot be computed."""
     band: BandCurve | None = None
     """Least, mean and greatest deviation over the starts; of sampled intervals the deviation and one sigma about
     it.
