@@ -1,6 +1,6 @@
 """Calibration at any set of positions: parameters, result and analysis that the procedure and the method share.
 
-Twelve coefficients a triad as in `calibration_12_orientations`, with K₂, asymmetry and g-sensitivity beside them where
+Twelve coefficients a triad as in `calibration_12_orientations`, with K₂, asymmetry and g-sensitivity in addition where
 they are asked for and the positions determine them (`analysis.calibration.extra_terms`).
 """
 
