@@ -2,6 +2,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
+WORKERS ?= 2
 VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal thermometers dwells imports misfit access document acceptance
 FOREIGN := basil edie instro ixcom moto visa
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
@@ -25,8 +26,8 @@ $(VENV)/.ready: requirements.lock pyproject.toml
 run: $(VENV)/.ready  ## calibrate and verify the simulated unit, then keep serving (ONCE=1: end with the verdict)
 	@$(BIN)/bench demo --port $(PORT) $(if $(ONCE),--once)
 
-test: $(VENV)/.ready  ## the whole test suite
-	@$(BIN)/python -m pytest -n 2 --dist worksteal --durations=40 --durations-min=1
+test: $(VENV)/.ready  ## the whole test suite, in WORKERS (2) processes
+	@$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal --durations=40 --durations-min=1
 
 $(VENV)/.browser: .ci/browser.lock $(VENV)/.ready
 	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --require-hashes -r .ci/browser.lock
