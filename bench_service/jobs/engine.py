@@ -135,7 +135,7 @@ class Engine:
         if status.app_version != self._version:
             if status.status in ALIVE:
                 DBOS.cancel_workflow(status.workflow_id)  # or an older version that is started again would resume it
-            begun = f"begun by version {status.app_version} of the procedures, this is {self._version}"
+            begun = f"begun by version {status.app_version} of the procedures; this is {self._version}"
             return Unfinished(gone=Failure("OtherVersion", begun))
         if status.status in ALIVE:
             return Unfinished(alive=True)
@@ -189,7 +189,7 @@ class Engine:
                 self._runner.make_safe(job_id)
                 return
             except ServiceError as error:
-                log.warning("nobody knows yet what bench job %s drove: %s", job_id, error)
+                log.warning("the bench of job %s is not known yet: %s", job_id, error)
             if self._ending.wait(RETRY_S):
                 return
 
@@ -205,7 +205,7 @@ class Engine:
             except (NotUnderstood, UnfitValue):  # its end cannot be written: the dispatcher interrupts it
                 return
             except (StorageFull, StorageFailure) as error:
-                log.warning("the end of job %s cannot be noted yet: %s", job_id, error)
+                log.warning("the end of job %s cannot be stored yet: %s", job_id, error)
             if self._ending.wait(RETRY_S):
                 raise ShuttingDown
 

@@ -148,6 +148,15 @@ def announce(session: Session, subject: str) -> None:
     session.info[_NEWS].append(subject)
 
 
+def missing_file(database_url: str) -> Path | None:
+    """The file of an SQLite database that is not there, and that opening it would make; None for every other one."""
+    url = make_url(database_url)
+    if url.get_backend_name() != "sqlite" or url.database in (None, "", ":memory:"):
+        return None
+    file = Path(url.database or "")
+    return None if file.is_file() else file
+
+
 def connect(database_url: str) -> Database:
     """Open a database by its URL; file and folder of an SQLite one are created. Raises `StorageFailure`."""
     with storage_errors():
@@ -269,4 +278,6 @@ def is_damaged(error: BaseException | None) -> bool:
 
 
 def _damaged(error: BaseException | None) -> DamagedDatabase:
-    return DamagedDatabase(f"the database is damaged ({error}): `bench scrub` names what, `bench restore` takes a copy")
+    return DamagedDatabase(
+        f"the database is damaged ({error}): `bench scrub` lists the damage, `bench restore` restores a copy"
+    )
