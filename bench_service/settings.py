@@ -165,7 +165,7 @@ class Settings(BaseModel):
         """Read settings from a mapping such as ``os.environ``. Raises `BadSettings`."""
         unknown = sorted(key for key in environ if key.startswith("BENCH_") and key not in cls.variables())
         if unknown:
-            raise BadSettings(f"{unknown[0]} is no setting; there are {', '.join(cls.variables())}")
+            raise BadSettings(f"{unknown[0]} is not a setting; the settings are {', '.join(cls.variables())}")
         given = {name: environ[key] for name in cls.model_fields if (key := _variable(name)) in environ}
         collector = environ.get("OTEL_EXPORTER_OTLP_ENDPOINT")
         if collector and "traces_url" not in given:

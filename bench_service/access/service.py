@@ -88,7 +88,9 @@ class AccessService:
     def log_out(self, identity: Identity) -> None:
         """End the session of an identity. Raises `IllegalTransition` where it has none."""
         if identity.proof is not Proof.SESSION:
-            raise IllegalTransition(f"there is no session to end: this request is known by {identity.proof.value}")
+            raise IllegalTransition(
+                f"there is no session to end: this request was authenticated by {identity.proof.value}"
+            )
         self._store.end_session(identity.credential)
         self.book.read_again()
 
@@ -187,7 +189,7 @@ class AccessService:
 
 def _check_free(name: str) -> None:
     if name in RESERVED:
-        raise BadParameter("name", name, f"another name: the service itself signs as {', '.join(RESERVED)}")
+        raise BadParameter("name", name, f"another name: reserved for the service itself are {', '.join(RESERVED)}")
 
 
 def require(identity: Identity, right: Right) -> None:

@@ -47,7 +47,7 @@ class DatabaseView(BaseModel):
     revision: str | None = Field(description="Revision of its tables")
     stored_bytes: int
     log_bytes: int | None = Field(description="Length of SQLite's write-ahead log")
-    free_bytes: int | None = Field(description="Room on the disk of an SQLite file")
+    free_bytes: int | None = Field(description="Free space on the disk of an SQLite file [bytes]")
     last_scrub: UpkeepView | None
     last_backup: UpkeepView | None
 

@@ -64,7 +64,7 @@ class Snapshot(Collector):
         yield CounterMetricFamily("bench_listeners_dropped", dropped, self._hub.dropped)
         free = self._tallies.store.free_bytes()
         if free is not None:
-            yield GaugeMetricFamily("bench_free_disk_bytes", "Room on the disk of the database's file", free)
+            yield GaugeMetricFamily("bench_free_disk_bytes", "Free space on the disk of the database's file", free)
         yield GaugeMetricFamily(
             "bench_database_bytes", "Size of the database", self._service.upkeep.size().stored_bytes
         )

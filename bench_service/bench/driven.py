@@ -184,9 +184,7 @@ class DrivenBench:
             asyncio.run_coroutine_threadsafe(self._unwound(), self._loop).result(UNWIND_S)
         except TimeoutError:
             self._lost = why
-            log.error(
-                "%s, bench %s: %s, and its driver does not come back", self._name, self._bench.description.id, why
-            )
+            log.error("%s, bench %s: %s, and its driver does not return", self._name, self._bench.description.id, why)
 
     async def _unwound(self) -> None:
         """Wait for every task of the bench's loop but those that wait here: two stops would wait for each other."""

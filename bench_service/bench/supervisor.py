@@ -201,7 +201,7 @@ class Supervisor:
         again = self._watch.driving()
         try:
             if again is None or not again.alive:  # else a process took the bench this moment, and makes it safe itself
-                self._try(now_s, f"{driving.process} is gone" if driving else "nobody drives the bench", state)
+                self._try(now_s, f"{driving.process} is gone" if driving else "no process drives the bench", state)
         finally:
             if lease is not None:
                 lease.release()

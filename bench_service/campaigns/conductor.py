@@ -103,7 +103,7 @@ class Conductor:
             try:
                 self.advance(run.id)
             except ServiceError as error:
-                log.warning("campaign run %s cannot go on yet: %s", run.id, error)
+                log.warning("campaign run %s cannot continue yet: %s", run.id, error)
         return bool(runs)
 
     def advance(self, run_id: str) -> None:
@@ -132,7 +132,7 @@ class Conductor:
             try:
                 busy = self.look()
             except ServiceError as error:
-                log.warning("campaigns cannot go on yet: %s", error)
+                log.warning("campaigns cannot continue yet: %s", error)
             except Exception:  # a defect must not end all campaigns; the next look tries again
                 log.exception("conducting campaigns failed")
 
@@ -292,4 +292,4 @@ def key_of(run: CampaignRun, index: int) -> str:
 
 
 def _stopped(bench: str, stops: Sequence[BenchStop]) -> str:
-    return f"bench {bench} is stopped until somebody releases it: {reasons_of(stops)}"
+    return f"bench {bench} is stopped until a person releases it: {reasons_of(stops)}"

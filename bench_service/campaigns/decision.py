@@ -44,7 +44,7 @@ def in_words(rule: DecisionRule) -> str:
         "(Bonferroni)"
     )
     if rule.rule == "simple":
-        told = f"simple acceptance: a value passes at its limit; U = k·u is told with k = {rule.coverage_factor:g}"
+        told = f"simple acceptance: a value passes at its limit; U = k·u is stated with k = {rule.coverage_factor:g}"
         return told + stated
     band = f"{rule.guard:g}·U, U = k·u with k = {rule.coverage_factor:g}"
     return f"guarded acceptance on the campaign's own limits: a value passes within its limit by {band}{stated}"

@@ -79,7 +79,7 @@ class DeviceLink:
         """Write a demand on the devices, and the state that it leads to. Raises `Disconnected` once it is closed."""
         with self._mutex:
             if self._file is None:
-                raise Disconnected(f"{verb}: this process has given up the devices' link")
+                raise Disconnected(f"{verb}: this process has closed its link to the devices")
             self._note(self._file, verb, arguments, changes)
 
     def close(self) -> None:

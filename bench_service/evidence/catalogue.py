@@ -78,5 +78,5 @@ class Catalogue:
             sentence = f"{folder}/{name}.py is left out: {described(error)}"
             self._left_out[kind, name] = sentence
             log.error("%s", sentence)
-            log.debug("where %s/%s.py broke", folder, name, exc_info=error)
+            log.debug("traceback of %s/%s.py", folder, name, exc_info=error)
         return found.entries

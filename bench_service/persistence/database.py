@@ -274,4 +274,6 @@ def is_damaged(error: BaseException | None) -> bool:
 
 
 def _damaged(error: BaseException | None) -> DamagedDatabase:
-    return DamagedDatabase(f"the database is damaged ({error}): `bench scrub` names what, `bench restore` takes a copy")
+    return DamagedDatabase(
+        f"the database is damaged ({error}): `bench scrub` lists the damage, `bench restore` restores a copy"
+    )

@@ -45,7 +45,7 @@ def noise_report(
 def _summary(launches: Sequence[LaunchNoise], averaging_time_s: float | None) -> str:
     hours = sum(launch.duration_s for launch in launches) / HOUR
     dwell = (
-        "Quantization rules at no averaging time."
+        "Quantization dominates at no averaging time."
         if averaging_time_s is None
         else f"Quantization falls below the rest of the noise after {averaging_time_s:.0f} s at the latest."
     )

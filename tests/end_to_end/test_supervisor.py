@@ -70,7 +70,7 @@ def test_a_worker_that_hangs_is_told_to_stop_and_then_killed(bench: BenchProcess
     bench.until(lambda: bench.state().safe, 10)
     bench.start()
     said = bench.events(job)
-    assert "left a stop unanswered" in said
+    assert "did not answer a stop" in said
     assert "made safe by the supervisor" in said
     bench.until(lambda: bench.job(job)["state"] == "cancelled", 60)
     view = bench.client.get("/api/v1/benches/sim").json()

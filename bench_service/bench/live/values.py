@@ -257,5 +257,5 @@ class Heartbeat:
             self._silent = False
         except ServiceError as error:
             if not self._silent:  # once: a full disk lasts
-                log.warning("what bench %s does cannot be told to other processes: %s", live.bench, error)
+                log.warning("the state of bench %s cannot be published to other processes: %s", live.bench, error)
             self._silent = True

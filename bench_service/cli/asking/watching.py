@@ -29,13 +29,13 @@ UNENDED = ("waiting", "running")
 def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict[str, Any]:
     """Follow a job until it has ended; return its last state. Raises `Refused` where the service is away for long."""
     page = f"{str(client.base_url).rstrip('/')}{job['page']}"
-    goes_on = f"The service has job {job['id']} and goes on with it: {page} shows it, `bench jobs` lists it"
+    goes_on = f"The service has job {job['id']} and continues it: {page} shows it, `bench jobs` lists it"
     with _progress(console) as progress:
         bar = progress.add_task(f"{job['procedure']} {job['unit']}", total=job["progress"]["stations"] or 1, doing="")
         paused = False
         while job["state"] not in ENDED:
             if (job["state"] == "paused") > paused:
-                notice(f"job {job['id']} is paused: `bench job resume {job['id']}` goes on with it")
+                notice(f"job {job['id']} is paused: `bench job resume {job['id']}` continues it")
             paused = job["state"] == "paused"
             job = _looked_at(client, f"/api/v1/jobs/{job['id']}", JOB, goes_on)
             progress.update(bar, completed=job["progress"]["station"])

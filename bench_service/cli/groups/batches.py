@@ -31,7 +31,7 @@ def selection_of(where: list[str]) -> dict[str, Any]:
         if name in ("label", "id"):
             selection.setdefault("labels" if name == "label" else "ids", []).append(value)
         elif name not in CONDITIONS:
-            raise Refused(f"--where {text}: known are {', '.join((*CONDITIONS, 'label', 'id'))}")
+            raise Refused(f"--where {text}: the conditions are {', '.join((*CONDITIONS, 'label', 'id'))}")
         elif name in selection:
             raise Refused(f"--where {name}: given twice; label and id may be repeated")
         else:

@@ -48,7 +48,8 @@ class AcutrolSection(WireTurntable):
     def _has_no_sinusoid(self) -> "AcutrolSection":
         if self.sinusoidal:
             raise ValueError(
-                "sinusoidal = true: this driver demands no sinusoid, for how the controller begins one is not known"
+                "sinusoidal = true: this driver does not support sinusoids: "
+                "it is not documented how the controller starts one"
             )
         return self
 
@@ -97,7 +98,7 @@ class AcutrolLink:
         for word in status:
             if word.name.startswith("interlock") and word.raw != "closed":
                 raise DeviceFault(
-                    f"{word.name} of the turntable is {word.raw}: a person looks why, resets and closes it at the "
+                    f"{word.name} of the turntable is {word.raw}: find out why, then reset and close it at the "
                     "controller"
                 )
         if "interlock fault" in status[0].bits:

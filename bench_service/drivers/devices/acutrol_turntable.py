@@ -104,7 +104,7 @@ class AcutrolTurntable(WatchedTable):
 
     async def command_sinusoid(self, sinusoid: Sinusoid) -> None:
         """Refuse; see the port: how this controller begins a sinusoid is not known. Raises `OutOfRange`."""
-        raise OutOfRange(f"{sinusoid.axis}: the driver of this table demands no sinusoid")
+        raise OutOfRange(f"{sinusoid.axis}: the driver of this table does not support sinusoids")
 
     async def settle(self) -> None:
         """Wait for the end of the commanded turns; see the port."""
@@ -116,7 +116,7 @@ class AcutrolTurntable(WatchedTable):
                 raise Stopped(STOPPED)
             turning.result()
         elif not await self._rests():
-            raise NotSettled("the table moves, and no motion of it was commanded here")
+            raise NotSettled("the table moves although this service commanded no motion")
 
     async def make_safe(self) -> None:
         """Ramp down to rest and hold, or with the servo off as `on_safe` says; see the port."""

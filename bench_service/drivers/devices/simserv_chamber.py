@@ -134,7 +134,7 @@ class SimservChamber:
         name = "its start" if on else "its end"
         await self._set(Command.SET_DIGITAL, [RUN, str(int(on))], name)
         if bool(await self._ask(Command.GET_DIGITAL, [RUN], simserv.whole_of)) != on:
-            raise DeviceFault(f"the chamber was given {name} and does not read back so")
+            raise DeviceFault(f"the chamber was given {name} and its read-back does not confirm it")
 
     async def _status(self) -> ChamberStatus:
         return await self._ask(Command.STATUS, [], simserv.status_of)

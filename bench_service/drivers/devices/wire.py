@@ -38,7 +38,7 @@ class Greeting:
         try:
             self._status(ask)
         except Refusal as refusal:
-            raise DeviceFault(f"the {self._device} does not tell its status: {refusal}") from None
+            raise DeviceFault(f"the {self._device} does not report its status: {refusal}") from None
 
 
 def line_times(section: Wire, after_demand_s: float = 0.0) -> LineTimes:

@@ -118,13 +118,13 @@ class Exchange:
                     f"{self._named()}: {lost}; whether {question.name} was carried out is not known, and it is not "
                     "sent again"
                 ) from None
-            log.warning("%s: %s; %s is asked again over a new line", self._named(), lost, question.name)
+            log.warning("%s: %s; %s is sent again over a new connection", self._named(), lost, question.name)
         self._connect(until)
         try:
             return self._once(question, until)
         except _Lost as lost:
             self._give_up()
-            raise Disconnected(f"{self._named()} does not answer, asked twice: {lost}") from None
+            raise Disconnected(f"{self._named()} does not answer, also not to a second request: {lost}") from None
 
     def close(self) -> None:
         """Close the line; the next question opens it again."""
@@ -173,7 +173,7 @@ class Exchange:
     def _open(self, until: float) -> None:
         left = until - wall_clock.monotonic_s()
         if self._closing:
-            raise Disconnected(f"the line of {self._named()} was closed by its bench")
+            raise Disconnected(f"the line of {self._named()} was closed by the service")
         if left <= 0.0:
             raise Disconnected(f"{self._named()} does not answer in time")
         if self._transport is None:
@@ -190,13 +190,13 @@ class Exchange:
             rest = bytes(self._buffer) + self._transport.receive(0.0)
         except LineCut as cut:
             self.counts.cuts += 1
-            log.warning("%s: the line was cut between two questions: %s", self._named(), cut)
+            log.warning("%s: the connection was lost between two requests: %s", self._named(), cut)
             self.close()
             return False
         if not rest:
             return True
         self.counts.surplus += 1
-        log.warning("%s: an answer came that nobody asked for: %s; the line is given up", self._named(), shown(rest))
+        log.warning("%s: an unexpected answer came: %s; the connection is closed", self._named(), shown(rest))
         self._give_up()
         return False
 
@@ -210,7 +210,7 @@ class Exchange:
             self._stale = stale
             self._give_up()
             raise DeviceBusy(
-                f"{self._named()} takes the line and does not say who it is ({lost}): another master may have it, or "
+                f"{self._named()} connects but does not identify itself ({lost}): another master may hold it, or "
                 "it speaks another dialect"
             ) from None
         except BaseException:
@@ -238,7 +238,7 @@ class Exchange:
                         raise _Lost(f"the answer to {question.name} is none: {bad}") from None
         except LineCut as cut:
             self.counts.cuts += 1
-            raise _Lost(f"the line was cut at {question.name}: {cut}") from None
+            raise _Lost(f"the connection was lost at {question.name}: {cut}") from None
         finally:
             if question.demand and self.times.after_demand_s > 0.0:
                 self._not_before = wall_clock.monotonic_s() + self.times.after_demand_s

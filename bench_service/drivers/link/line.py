@@ -52,14 +52,14 @@ class DeviceLine:
         answer: Future[T] = Future()
         with self._begin:
             if self._closed:
-                raise Disconnected(f"the line of {self._named} was closed by its bench")
+                raise Disconnected(f"the line of {self._named} was closed by the service")
             if self._thread is None:
                 self._thread = threading.Thread(target=self._run, name=f"line {self._named}", daemon=True)
                 self._thread.start()
             try:
                 self._queue.put_nowait(_Asked(question, until, answer))
             except queue.Full:
-                raise Disconnected(f"{self._named} does not answer: {WAITING} questions wait for it") from None
+                raise Disconnected(f"{self._named} does not answer: {WAITING} requests wait for its answer") from None
         return answer
 
     def _run(self) -> None:
@@ -89,7 +89,7 @@ class DeviceLine:
                 except queue.Empty:
                     break
                 if waiting is not None and waiting.answer.set_running_or_notify_cancel():
-                    waiting.answer.set_exception(Disconnected(f"the line of {self._named} was closed by its bench"))
+                    waiting.answer.set_exception(Disconnected(f"the line of {self._named} was closed by the service"))
             self._queue.put_nowait(None)
         self._exchange.stop()
 

@@ -92,7 +92,7 @@ class NovAtel:
                     errors += int(np.count_nonzero(data["info"] & 1))
                     encrypted += int(np.count_nonzero(data["info"] & 2))
             configured |= {kind for _, frame in found if (kind := _configured(frame)) is not None}
-        require_frames(counted, name, "NovAtel logs", "the file is no NovAtel log, or its bytes were changed")
+        require_frames(counted, name, "NovAtel logs", "the file is not a NovAtel log, or its bytes were changed")
         self.warnings += counted.warnings("logs")
         if errors:
             self.warnings.append(f"{errors} raw logs report an error of the inertial unit (bit 0 of its information)")

@@ -41,4 +41,4 @@ class Presence:
             try:
                 self._store.hear()
             except ServiceError as error:
-                log.debug("no sign of life for manual mode: %s", error)
+                log.debug("no heartbeat for manual mode: %s", error)

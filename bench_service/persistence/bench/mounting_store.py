@@ -90,7 +90,7 @@ class SqlMountingStore:
 def _require_idle(session: Session, benches: set[str]) -> None:
     query = select(JobRow.id, JobRow.bench).where(JobRow.bench.in_(benches), JobRow.state == JobState.RUNNING.value)
     for job, bench in session.execute(query):
-        raise BenchBusy(f"job {job} drives bench {bench}: nobody mounts a unit there before it has ended")
+        raise BenchBusy(f"job {job} drives bench {bench}: a mounting can be entered after the job has ended")
 
 
 def _mounting(row: MountingRow) -> StoredMounting:

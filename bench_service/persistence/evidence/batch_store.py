@@ -121,7 +121,7 @@ class SqlBatchStore(SqlBatchQueue):
         with self._database.write() as session:
             row = found_batch(session, batch_id, lock=True)
             if row.ended_at is not None:
-                raise IllegalTransition(f"batch {batch_id} has ended: nothing of it is left to be cancelled")
+                raise IllegalTransition(f"batch {batch_id} has ended: there is nothing left to cancel")
             if row.cancelled_at is None:
                 row.cancelled_at, row.cancelled_by = at, by
             session.execute(update(TaskRow).where(*waiting).values(state=TaskState.CANCELLED.value, ended_at=at))
@@ -138,6 +138,6 @@ class SqlBatchStore(SqlBatchQueue):
             mine = (TaskRow.batch_id == batch_id, TaskRow.state.in_(again))
             changed = session.execute(update(TaskRow).where(*mine).values(**values).returning(TaskRow.number)).all()
             if not changed:
-                raise IllegalTransition(f"batch {batch_id} has no failed or cancelled task: nothing is to be retried")
+                raise IllegalTransition(f"batch {batch_id} has no failed or cancelled task: there is nothing to retry")
             row.ended_at, row.final_counts, row.cancelled_at, row.cancelled_by = None, None, None, ""
         return self.get(batch_id)

@@ -26,6 +26,7 @@ from bench_service.persistence.evidence.recording_writer import SqlRecordingWrit
 from bench_service.persistence.pages import page
 from bench_service.persistence.searching import find_recordings
 from bench_service.persistence.tables.evidence import ChunkRow, RecordingRow
+from bench_service.persistence.text_search import ways_to_recordings
 from procedures.core.recording import RawArray, RecordingInfo
 
 log = logging.getLogger(__name__)
@@ -78,7 +79,7 @@ class SqlRecordingStore:
         after: str | None = None,
         limit: int = 50,
     ) -> Page[StoredRecording]:
-        query = find_recordings(select(RecordingRow).where(RecordingRow.state != _OPEN), search)
+        query = find_recordings(select(RecordingRow).where(RecordingRow.state != _OPEN), search, text=False)
         if job_id is not None:
             query = query.where(RecordingRow.job_id == job_id)
         if unit is not None:
@@ -86,7 +87,8 @@ class SqlRecordingStore:
         if simulated is not None:
             query = query.where(RecordingRow.simulated == simulated)
         with self._database.read() as session:
-            return page(session, query, RecordingRow.id, after, limit, stored_of_row)
+            either = None if search.text is None else ways_to_recordings(session, search.text)
+            return page(session, query, RecordingRow.id, after, limit, stored_of_row, either)
 
     def of_job(self, job_id: str) -> tuple[StoredRecording, ...]:
         with self._database.read() as session:

@@ -118,7 +118,7 @@ class SqlRecordingWriter:
             else:
                 self._interrupt()
         except (StorageFull, StorageFailure) as error:
-            log.warning("recording %s stays open, and unlisted, until it is cleared away: %s", self.id, error)
+            log.warning("recording %s stays open and unlisted until it is removed: %s", self.id, error)
 
     def _require_open(self) -> None:
         if self._closed:

@@ -130,7 +130,7 @@ class SqlManualStore:
                     ManualDemandRow.lease == demand.lease, ManualDemandRow.state == DemandState.ACCEPTED.value
                 )
                 if (session.scalar(waiting) or 0) >= WAITING:
-                    raise ManualRefused(f"{WAITING} demands of this lease wait already: wait until one is answered")
+                    raise ManualRefused(f"{WAITING} demands of this lease are waiting already: wait until one is done")
                 session.add(_row_of_demand(demand))
                 return demand
 
@@ -183,7 +183,9 @@ def _require_free(session: Session, lease: ManualLease) -> None:
     if (job := session.scalar(running)) is not None:
         raise ManualRefused(f"job {job} drives bench {lease.bench}: cancel it, or wait for its end")
     if stops := standing_stops(session, lease.bench):
-        raise ManualRefused(f"bench {lease.bench} is stopped: {reasons_of(stops)}; a person looks and releases it")
+        raise ManualRefused(
+            f"bench {lease.bench} is stopped: {reasons_of(stops)}; a person must look at it and release it"
+        )
     active = active_reservations(session, lease.created_at)
     mine = next((r for r in active if r.id == lease.reservation), None)
     for reservation in active:

@@ -45,9 +45,9 @@ class Calibration12OrientationsDocument(Part):
     """None without checks and in results of older versions"""
     triads: tuple[TriadSummary, ...]
     thermal: ThermalShare | None = None
-    """of the accelerometers, where they were corrected"""
+    """thermal correction of the accelerometers, where it was applied"""
     dwells: DwellsSaved | None = None
-    """of a stop rule: each dwell, and the time saved"""
+    """dwells ended by the stop rule, and the time saved"""
 
 
 class Calibration12OrientationsResult(ResultHead):
