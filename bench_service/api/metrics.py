@@ -72,7 +72,11 @@ class Snapshot(Collector):
     def _jobs(self) -> Iterator[Metric]:
         tallies = self._tallies
         states = GaugeMetricFamily("bench_jobs", "Jobs by state", labels=["state"])
-        for state, count in self._service.stores.jobs.counts().items():
+        for state, count in self._service.stores.jobs.counts(
+            [state for state in JobState if state not in FINAL]
+        ).items():
+            states.add_metric([state.value], count)
+        for state, count in tallies.ended().items():
             states.add_metric([state.value], count)
         yield states
         labels = ["procedure", "state", "verdict"]
