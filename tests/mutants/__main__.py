@@ -42,8 +42,9 @@ def main() -> int:
         copy = _copy(Path(folder) / "bench")
         for subject in wanted:
             command = [sys.executable, *_pytest(Path(folder)), *subject.tests]
-            if subprocess.run(command, cwd=copy, env=_environment(), capture_output=True, check=False).returncode:
-                print(f"{subject.name}: its tests fail without any defect: {' '.join(subject.tests)}")
+            sane = subprocess.run(command, cwd=copy, env=_environment(), capture_output=True, text=True, check=False)
+            if sane.returncode:
+                print(f"{subject.name}: its tests fail without any defect: {sane.stdout[-1500:]}{sane.stderr[-500:]}")
                 sound = False
                 continue
             _run(subject, given.tools.resolve() / "cosmic-ray", copy, command, given.mutants, given.seed)
