@@ -10,7 +10,7 @@ BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
 
 .DEFAULT_GOAL := help
-.PHONY: help run test browser screenshots figures clients bench bench-against profile mutants chaos soak format check validate rights pictures newest-form lock audit images clean foreign
+.PHONY: help run test browser screenshots figures clients bench bench-against profile mutants chaos soak format check validate rights references pictures newest-form lock audit images clean foreign
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -102,6 +102,10 @@ images: $(VENV)/.ready  ## pin the images of docker-compose.yml by digest and bu
 
 clients: $(VENV)/.ready  ## lint the OpenAPI document, generate clients from it, drive a service with the generated one
 	@$(BIN)/python -m tests.clients
+
+references: $(VENV)/.ready  ## write docs/results.md, campaign-document.md and citations.md anew, from schemas and docstrings
+	@$(BIN)/python -m tests.kit.reference_pages
+	@$(BIN)/python -m tests.kit.citations_page
 
 rights: $(VENV)/.ready  ## write docs/rights.md anew, from the routes and their rights
 	@$(BIN)/python -m tests.kit.rights_page

@@ -1,7 +1,7 @@
 """The archive as a Parquet dataset: copies of chunks, and tables of units, recordings, results and quantities.
 
 `samples/recording=ID/chunk-N.parquet` has the raw counts, one column a channel; `tables/NAME/*.parquet` what they mean.
-Rows that never change are added in parts, each named by its last id; units and recordings are written anew.
+Rows that never change are added in parts, each named by its last id; units and recordings are written again.
 """
 
 import hashlib

@@ -42,7 +42,7 @@ _OF_JOB = (
 
 @dataclass(frozen=True)
 class StoredSamples:
-    """`procedures.core.recording.Recording` over the database: each pass reads the chunks anew."""
+    """`procedures.core.recording.Recording` over the database: each pass reads the chunks again."""
 
     info: RecordingInfo
     _reader: ChunkReader
