@@ -51,7 +51,8 @@ def _drawn(figure: Figure) -> str:
             _logarithmic(axes, "x", [v for s in figure.series for v in s.x])
         if figure.y_log:
             _logarithmic(axes, "y", [v for s in figure.series for v in (*s.y, *s.upper)])
-        if not figure.x_log and all(float(v).is_integer() for s in figure.series for v in s.x):
+        marked = [v for s in figure.series if s.style in ("points", "line_points") for v in s.x]
+        if marked and not figure.x_log and all(float(v).is_integer() for v in marked):  # numbers of stations, results
             axes.xaxis.get_major_locator().set_params(integer=True)
         axes.grid(visible=True, linewidth=0.4, alpha=0.7)
         if len(figure.series) > 1:
