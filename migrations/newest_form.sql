@@ -564,6 +564,8 @@ CREATE INDEX ix_jobs_procedure_id ON jobs (procedure, id);
 
 CREATE INDEX ix_jobs_requested_by_id ON jobs (requested_by, id);
 
+CREATE INDEX ix_jobs_result_id_id ON jobs (result_id, id);
+
 CREATE INDEX ix_jobs_state_id ON jobs (state, id);
 
 CREATE INDEX ix_jobs_unit_id ON jobs (unit, id);
@@ -613,6 +615,8 @@ CREATE INDEX ix_results_job_id_id ON results (job_id, id);
 CREATE INDEX ix_results_name_id ON results (name, id);
 
 CREATE INDEX ix_results_unit_id ON results (unit, id);
+
+CREATE INDEX ix_results_unit_name_simulated_id ON results (unit, name, simulated, id, job_id, created_at, code_version);
 
 CREATE INDEX ix_results_verdict_id ON results (verdict, id);
 

@@ -74,7 +74,7 @@ async def _command(chamber: Chamber, leg: ProfileLeg) -> None:
 
 
 class _SetPoint:
-    """Set point that moves along the commanded ramp, for a chamber that tells only the final one."""
+    """Set point that moves along the commanded ramp, for a chamber that reports only the final one."""
 
     def __init__(self, first: ChamberReading) -> None:
         """Begin at the first reading, where the chamber was led to the first leg's temperature already."""

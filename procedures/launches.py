@@ -147,7 +147,7 @@ def analyse_launches(
 
 
 def _matched(launch: LaunchNoise, unit: Unit | None) -> LaunchNoise:
-    """The launch beside the unit's record: origins of its lines by the declared dithers, vibration by the known noise.
+    """The launch against the unit's record: origins of its lines by the declared dithers, vibration by the known noise.
 
     The fitted noise takes a part of a vibration for its own; that of the record does not know it.
     """

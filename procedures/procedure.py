@@ -36,7 +36,8 @@ class Statement:
 
 
 _SHOWN_WHERE_MADE = Field(
-    exclude_if=lambda found: found is None, description="None without checks and in results of older versions"
+    exclude_if=lambda found: found is None,
+    description="statement of conformity; None without checks and in results of older versions",
 )
 
 
@@ -234,7 +235,7 @@ class Procedure(Generic[P, R]):
     quantities: Callable[[P, Context], tuple[str, ...]] | None = None
     """Names of the checks and of the named estimates that a result will have; None: not known before the job."""
     planned_checks: Callable[[P, Context], tuple[PlannedCheck, ...]] = _no_checks
-    """Checks that a result will have, with the uncertainty of the plan; those that a plan can tell of."""
+    """Checks that a result will have, with the uncertainty of the plan; those that a plan can predict."""
     inspection: Callable[[P], Inspection] = _stations
     """Inspection of the recordings before the analysis; see `procedures.inspection`."""
 
@@ -253,6 +254,8 @@ class Method(Generic[P, R]):
     calibrations: Callable[[R], tuple[TriadCalibration, ...]] = _no_calibrations
     corrections: Callable[[R], tuple[UnitCorrection, ...]] = _no_corrections
     """The correction sets that a result gives: at most one of a kind."""
+    uses_corrections: Callable[[P], tuple[CorrectionKind, ...]] = _uses_none
+    """Kinds of the unit's current corrections that the result rests on; those it has then belong to its lineage."""
     planned_checks: Callable[[P, Unit, Planned], tuple[PlannedCheck, ...]] = _no_checks_of_method
     """Checks that a result will have, from the plans of the calibrations that it is to work on."""
     inspection: Callable[[P, int], Inspection] = _at_rest

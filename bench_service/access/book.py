@@ -127,7 +127,7 @@ class AccessBook:
             except Exception:  # a defect here must not leave requests waiting
                 log.exception("accounts and tokens could not be read")
             for each in waiting:
-                with suppress(InvalidStateError):  # whoever waited has gone
+                with suppress(InvalidStateError):  # the process that waited has gone
                     each.set_result(None)
 
     def _look(self, at_once: bool) -> None:

@@ -138,7 +138,7 @@ class AccessService:
         return self._store.tokens()
 
     def revoke_token(self, token: str) -> AccessToken:
-        """Revoke a token by its id or name; jobs that were submitted with it go on. Raises `NotFound`."""
+        """Revoke a token by its id or name; jobs that were submitted with it continue. Raises `NotFound`."""
         revoked = self._store.revoke_token(token, now())
         self.book.read_again()
         return revoked

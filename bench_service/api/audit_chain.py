@@ -24,7 +24,7 @@ Expected = Annotated[
 
 
 class CheckpointView(BaseModel):
-    """A closed stretch of the chain: its entries are gone, and the chain goes on from its digest."""
+    """A closed stretch of the chain: its entries are gone, and the chain continues from its digest."""
 
     first: int
     last: int

@@ -24,7 +24,7 @@ class UpkeepView(BaseModel):
     by: str
     good: bool | None = Field(description="false where something is wrong; null while it has not ended")
     document: dict[str, Any] = Field(
-        description="Of a check: faults of the database, recordings checked, and each damaged chunk with its samples"
+        description="Report of a check: faults, number of recordings checked, each damaged chunk with its samples"
     )
 
     @classmethod

@@ -33,9 +33,9 @@ class Safety:
     """Explanation for a person, in whole sentences."""
     devices: DeviceState | None
     worker: ProcessIdentity | None
-    """The process of this host that drives the bench, if one lives."""
+    """The process of this host that drives the bench, if one is alive."""
     supervisor: ProcessIdentity | None
-    """The process of this host that supervises it, if one lives."""
+    """The process of this host that supervises it, if one is alive."""
 
 
 class SafetyService:

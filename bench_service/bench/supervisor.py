@@ -228,7 +228,7 @@ class Supervisor:
         self._told_not_safe, self._first_try_s = False, None
 
     def _not_safe(self, why: str, state: DeviceState) -> None:
-        """Stop the bench until a person has looked. Reported once, though the attempts go on."""
+        """Stop the bench until a person has looked. Reported once, though the attempts continue."""
         if self._told_not_safe:
             return
         self._unsaid_stop = why

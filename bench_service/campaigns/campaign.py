@@ -167,7 +167,7 @@ class Campaign(Document):
     labels: Labels = Field(default_factory=Labels, max_length=20)
     decision: DecisionRule = Field(default_factory=lambda: DecisionRule.model_validate({}))
     seeds: Seeds = Field(default_factory=lambda: Seeds.model_validate({}))
-    priority: int = Field(10, ge=1, le=1000, description="of its jobs; smaller runs first")
+    priority: int = Field(10, ge=1, le=1000, description="priority of its jobs; smaller runs first")
 
     @model_validator(mode="after")
     def _names(self) -> Self:

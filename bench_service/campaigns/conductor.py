@@ -239,7 +239,7 @@ class Conductor:
             return transitions.out_of_time(run, at)
         why = "" if job.failure is None else f"{job.failure.kind}: {job.failure.message}"
         if job.state is JobState.CANCELLED:
-            stopped = self._stores.benches.bench_stop(run.bench) is not None  # it may go on once that is released
+            stopped = self._stores.benches.bench_stop(run.bench) is not None  # it may continue once that is released
             said = f"job {job.id} was cancelled" + (" when the bench was stopped" if stopped else "")
             return transitions.failed(run, index, StepState.CANCELLED, said, at, final=not stopped)
         kind = f"job {job.id} {job.state.value}: "

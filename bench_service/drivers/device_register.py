@@ -1,6 +1,6 @@
 """Register of a simulated bench's devices: the state that real devices keep themselves, and a link for one master.
 
-A real table goes on moving when the process that commanded it dies, and can be asked afterwards. A simulated table
+A real table keeps moving when the process that commanded it dies, and can be asked afterwards. A simulated table
 dies with its process, so what was commanded last is kept in a file next to the database. The file's lock is the link:
 the kernel gives it to one process and takes it back at its death.
 """
@@ -83,7 +83,7 @@ class DeviceLink:
             self._note(self._file, verb, arguments, changes)
 
     def close(self) -> None:
-        """Release the link; a second call does nothing. A device that still moves goes on moving."""
+        """Release the link; a second call does nothing. A device that still moves keeps moving."""
         with self._mutex:
             if self._file is not None:
                 self._note(self._file, "link.closed", {}, {"linked": False})

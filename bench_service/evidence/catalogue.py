@@ -28,7 +28,7 @@ class Catalogue:
     def __init__(self) -> None:
         self._left_out: dict[tuple[str, str], str] = {}
         self._alone: dict[tuple[str, str], Any] = {}
-        """Entries that were read by their names, before or beside all the others."""
+        """Entries that were read by their names, before or apart from all the others."""
 
     @cached_property
     def procedures(self) -> Mapping[str, AnyProcedure]:

@@ -18,7 +18,7 @@ FIRST_PAUSE = timedelta(seconds=5)
 LONGEST_PAUSE = timedelta(minutes=15)
 HOUR = timedelta(hours=1)
 REMEMBERED = 2000
-"""Number of messages that are remembered, so that a service that starts anew does not repeat them."""
+"""Number of messages that are remembered, so that a service that starts again does not repeat them."""
 MOST_FILES = 1000
 """Maximum number of waiting messages; further ones are logged and left out."""
 

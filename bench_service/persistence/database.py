@@ -108,6 +108,10 @@ class Database:
             key = int.from_bytes(hashlib.sha256(what.encode()).digest()[:8], "big", signed=True)
             session.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": key})
 
+    def turn_at_bench(self, session: Session, bench_id: str) -> None:
+        """Wait for one's turn at a bench: whoever claims a job of it, reserves it or changes what is mounted there."""
+        self.one_at_a_time(session, f"claim a job of bench {bench_id}")
+
     def free_bytes(self) -> int | None:
         """Free space on the disk of an SQLite file [bytes]; None where the database is elsewhere."""
         file = self.engine.url.database

@@ -124,13 +124,13 @@ def text_held(column: Any, text: str) -> ColumnElement[bool]:
     return column.icontains(text, autoescape=True)
 
 
-def imported_name_holds(text: str) -> ColumnElement[bool]:
+def imported_name_holds(text: str, row: type[RecordingRow] = RecordingRow) -> ColumnElement[bool]:
     """Return whether the name of an imported file holds a text: a walk over those names, which jobs lack."""
-    held = text_held(RecordingRow.file_names, text)
+    held = text_held(row.file_names, text)
     if NAMES_JOIN in text:
-        files = ImportedNames(RecordingRow.source).table_valued("name")
+        files = ImportedNames(row.source).table_valued("name")
         held = and_(held, exists(select(files.c.name).where(text_held(files.c.name, text))))
-    return and_(RecordingRow.file_names.is_not(None), held)
+    return and_(row.file_names.is_not(None), held)
 
 
 @compiles(ImportedNames, "sqlite")

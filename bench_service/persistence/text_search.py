@@ -29,6 +29,7 @@ LISTED = 500
 ID_LENGTH = 36
 Ways = tuple[ColumnElement[bool], ...]
 
+_OTHER = aliased(RecordingRow)
 _PART_OF_ID = re.compile(r"[0-9a-f-]{1,36}", re.IGNORECASE)
 _Column = InstrumentedAttribute[Any]
 
@@ -48,7 +49,7 @@ def ways_to_recordings(session: Session, text: str) -> Ways:
         *_in_ids(RecordingRow.id, text),
         *of_job,
         *_in_job(session, RecordingRow.job_id, text),
-        imported_name_holds(text),
+        RecordingRow.id.in_(select(_OTHER.id).where(imported_name_holds(text, _OTHER))),
     )
 
 

@@ -1,4 +1,4 @@
-"""labels of stations and names of imported files as columns of recordings, and indexes for searches by text
+"""labels of stations and names of imported files as columns of recordings, and indexes for searches and trends
 
 Revision: 0021, after 0020
 """
@@ -12,6 +12,7 @@ branch_labels = None
 depends_on = None
 
 NOT_NULL = sa.text("file_names IS NOT NULL")
+OF_A_TREND = ["unit", "name", "simulated", "id", "job_id", "created_at", "code_version"]
 LABEL = {
     "sqlite": "json_extract(station, '$.label')",
     "postgresql": "station ->> 'label'",
@@ -45,9 +46,13 @@ def upgrade() -> None:
         postgresql_where=NOT_NULL,
     )
     op.create_index("ix_jobs_requested_by_id", "jobs", ["requested_by", "id"])
+    op.create_index("ix_jobs_result_id_id", "jobs", ["result_id", "id"])
+    op.create_index("ix_results_unit_name_simulated_id", "results", OF_A_TREND)
 
 
 def downgrade() -> None:
+    op.drop_index("ix_results_unit_name_simulated_id", "results")
+    op.drop_index("ix_jobs_result_id_id", "jobs")
     op.drop_index("ix_jobs_requested_by_id", "jobs")
     for name in ("file_names_id", "station_label_id", "bench_id"):
         op.drop_index(f"ix_recordings_{name}", "recordings")

@@ -53,7 +53,6 @@ from procedures.site_parameters import TableParameters, declared_table
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 Lag = Annotated[float, Field(ge=0.0, le=600.0)]
 
-
 _NOT_PREDICTED = (
     "the predicted uncertainties are without the thermal correction's share, which depends on the temperatures to come"
 )

@@ -199,7 +199,7 @@ def _naming(recording: str, channel: str = "") -> Generator[None]:
 def beside(
     recordings: Sequence[Recording], curves: tuple[Curve, ...], params: Params
 ) -> tuple[tuple[Curve, ...], tuple[str, ...]]:
-    """The curves with densities and bands beside them, and sentences on what could not be told."""
+    """The curves with densities and bands, and sentences on what could not be found."""
     told: list[str] = []
     found: list[Curve] = []
     for recording in recordings:

@@ -1,4 +1,4 @@
-"""Tables and figures of launches at rest: Tables 4.1 and 4.2, figures 4.1-4.7 of the thesis in our words."""
+"""Tables and figures of launches at rest: Tables 4.1 and 4.2, figures 4.1-4.7 of the thesis, laid out again."""
 
 from collections.abc import Sequence
 from math import sqrt

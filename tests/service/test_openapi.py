@@ -12,6 +12,7 @@ import pytest
 from bench_service.cli.processes.serving import serving
 from bench_service.settings import Settings
 from tests.kit.kept_document import keeps_to_document
+from tests.kit.reference_pages import CAMPAIGNS, RESULTS, campaigns_page, results_page
 
 METHODS = ("get", "put", "post", "delete", "patch")
 PROBLEM = {"$ref": "#/components/schemas/Problem"}
@@ -188,7 +189,7 @@ def test_files_and_samples_are_binary_and_the_description_of_files_is_a_schema(d
     form = document["paths"]["/api/v1/recordings"]["post"]["requestBody"]["content"]["multipart/form-data"]
     upload = document["components"]["schemas"][form["schema"]["$ref"].rpartition("/")[2]]["properties"]
     assert upload["files"]["items"] == {"type": "string", "format": "binary"}
-    assert upload["description"] == {"$ref": "#/components/schemas/ImportDescription"}
+    assert upload["description"]["$ref"] == "#/components/schemas/ImportDescription"
     assert form["encoding"]["description"]["contentType"] == "application/json"
     data = document["paths"]["/api/v1/recordings/{recording_id}/data"]["get"]["responses"]["200"]["content"]
     assert len(data) == 4
@@ -212,3 +213,23 @@ def test_each_procedure_and_method_has_a_schema_of_its_result(document: dict[str
         body = schemas[properties["document"]["$ref"].rpartition("/")[2]]
         assert set(body["properties"]) == set(entry["result"]["properties"])
         assert body["required"] == entry["result"]["required"]
+
+
+def test_every_field_has_a_description(document: dict[str, Any]) -> None:
+    schemas = document["components"]["schemas"]
+    bare = [
+        f"{name}.{field}"
+        for name, schema in schemas.items()
+        for field, inside in schema.get("properties", {}).items()
+        if not inside.get("description", "").strip()
+    ]
+    assert not bare, f"give the field a description, or write one into openapi/field_words.toml: {bare}"
+    headless = ("Of ", "Who ", "Whoever ", "Whose ", "What he ", "Those ")
+    described = [inside for one in schemas.values() for inside in one.get("properties", {}).values()]
+    assert [inside["description"] for inside in described if inside["description"].startswith(headless)] == []
+
+
+def test_the_pages_of_result_and_campaign_documents_are_those_of_the_schemas(document: dict[str, Any]) -> None:
+    schemas = document["components"]["schemas"]
+    assert RESULTS.read_text(encoding="utf-8") == results_page(schemas), "run `make references`"
+    assert CAMPAIGNS.read_text(encoding="utf-8") == campaigns_page(schemas), "run `make references`"

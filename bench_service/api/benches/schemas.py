@@ -74,7 +74,7 @@ class DevicesView(BaseModel):
     """The last state that a bench's devices reported, as the bench's own host has it."""
 
     at: datetime | None = Field(description="When the devices were last commanded; null: never")
-    by: str = Field(description="Who asked")
+    by: str = Field(description="Person who asked for it")
     job: str | None = Field(description="Job for which they were commanded")
     table: str = Field(description='"at rest", or "moving": a demand has not ended, from any process')
     angles_deg: tuple[float, float, float] | None = Field(

@@ -66,8 +66,8 @@ _Claimed = Annotated[
         max_length=WHO_LENGTH,
         pattern=NO_CONTROL_CHARACTERS.pattern,
         description=(
-            "Who asks, for the job and the audit trail, where nobody logs in; else the proved name counts. Without "
-            "both, the trail has the client's address"
+            "Name of the person who sends it, for the job and the audit trail; used only without a log-in. Without "
+            "either, the trail has the client's address"
         ),
     ),
 ]

@@ -56,7 +56,7 @@ class LiveDevices:
     status: tuple[LiveStatus, ...] = ()
     """Status words of all devices, as they were last read."""
     rates_deg_s: tuple[float, float, float] | None = None
-    """Rates of outer, middle and inner axis; None: the controller tells none."""
+    """Rates of outer, middle and inner axis; None: the controller reports none."""
     voltage_v: float | None = None
     """Measured voltage of the unit's supply."""
     current_a: float | None = None

@@ -182,7 +182,7 @@ class StopChannel:
 
     @contextmanager
     def _locked(self) -> Generator[int]:
-        """Lock the file; after `LOCK_S` go on without the lock: at worst a reason is lost, never a stop."""
+        """Lock the file; after `LOCK_S` continue without the lock: at worst a reason is lost, never a stop."""
         file, deadline = self._open(), monotonic_s() + LOCK_S
         mine = self._mutex.acquire(timeout=LOCK_S)
         try:

@@ -25,7 +25,7 @@ RESULT = ("id", "verdict", "document")
 
 @contextmanager
 def connect(settings: Settings, server: str | None, drive: bool) -> Generator["httpx.Client"]:
-    """Open a client to `server`, or to an application in this process that lives as long as the block.
+    """Open a client to `server`, or to an application in this process that is open as long as the block.
 
     `drive`: true where the embedded application is to run jobs, for which it must have the bench to itself.
     Raises `Refused` where no service answers a request made in the block.

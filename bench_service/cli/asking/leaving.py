@@ -1,6 +1,6 @@
-"""Ctrl-C while a command watches a job: what becomes of the job, and how to go on.
+"""Ctrl-C while a command watches a job: what becomes of the job, and how to continue.
 
-A job of a service goes on there. A job that the command's own process drives is asked to pause, so that no later
+A job of a service continues there. A job that the command's own process drives is asked to pause, so that no later
 process takes it up by itself: the request stays with the job if this process ends before the bench comes to it.
 """
 

@@ -72,7 +72,7 @@ def watch_batch(
 
     Raises `Refused` where the service is away for long.
     """
-    goes_on = f"The service has batch {batch['id']} and goes on with it: `bench batch watch {batch['id']}` shows it"
+    goes_on = f"The service has batch {batch['id']} and continues it: `bench batch watch {batch['id']}` shows it"
     with _progress(console) as progress:
         bar = progress.add_task(f"batch {batch['id']}", total=batch["total"], doing="")
         while True:

@@ -116,7 +116,7 @@ def list_tokens(context: typer.Context, server: Server = None, as_json: AsJson =
 
 @tokens.command("revoke")
 def revoke_token(context: typer.Context, token: str, server: Server = None) -> None:
-    """Revoke a token by its name or id. Jobs that were submitted with it go on."""
+    """Revoke a token by its name or id. Jobs that were submitted with it continue."""
     with connect(context.obj, server, drive=False) as client:
         gone = call(client, "DELETE", f"/api/v1/tokens/{segment(token)}", TOKEN)
     console.print(f"token {gone['name']} ({gone['id']}) is revoked")

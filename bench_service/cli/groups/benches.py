@@ -112,7 +112,7 @@ def release(
     bench: Annotated[str | None, typer.Option(help="Bench; default: the one in the settings, or the only one")] = None,
     server: Server = None,
 ) -> None:
-    """Release a stop of a bench, once the bench is known to be safe; its jobs go on when no stop stands."""
+    """Release a stop of a bench, once the bench is known to be safe; its jobs continue when no stop stands."""
     with connect(context.obj, server, drive=False) as client:
         name = bench_of(client, context.obj, bench)
         path = f"/api/v1/benches/{segment(name)}"

@@ -1,6 +1,6 @@
 """``bench certificate``: keys of the laboratory, certificates of calibrations, and their check.
 
-The key stays with whoever signs: it is read by this command and never sent to a service.
+The key stays with the signer: it is read by this command and never sent to a service.
 """
 
 import json
@@ -35,7 +35,7 @@ def key(
         Path, typer.Option("--output", "-o", help="Beginning of the file names: lab gives lab.key.pem, …")
     ],
 ) -> None:
-    """Make a key for signatures, and its certificate, which is given to whoever checks."""
+    """Make a key for signatures, and its certificate, which is given to those who check."""
     from bench_service.formats.certificate.signature import new_key
 
     private, public = (output.with_name(output.name + ending) for ending in (KEY_ENDING, CERTIFICATE_ENDING))

@@ -68,7 +68,7 @@ def backup(
 ) -> int:
     """Copy the whole database to one file while services use it, and check the copy.
 
-    Everything that was acknowledged before the command began is in it. A job that runs goes on, once restored, with the
+    Everything that was acknowledged before the command began is in it. A running job continues, once restored, with the
     stations that it has not recorded. Exit code: 0 made and good, 1 made, and damage was found in it, 2 not made.
     """
     from bench_service.bench.processes import ProcessIdentity

@@ -100,7 +100,7 @@ def _own(environ: Mapping[str, str]) -> str:
 
 
 def _say(line: str) -> None:
-    with suppress(OSError):  # the output is closed, or its disk is full: the stop goes on
+    with suppress(OSError):  # the output is closed, or its disk is full: the stop continues
         print(line, flush=True)
 
 

@@ -1,4 +1,4 @@
-"""Declared units of a laboratory: one file ``units/<serial>.toml`` each, beside the bench file."""
+"""Declared units of a laboratory: one file ``units/<serial>.toml`` each, next to the bench file."""
 
 from datetime import date
 from pathlib import Path

@@ -55,7 +55,7 @@ class AcutrolSection(WireTurntable):
 
 
 class AcutrolLink:
-    """Controller of three axes as typed questions; knows its language, and no motion."""
+    """Controller of three axes as typed requests; knows its language, and no motion."""
 
     def __init__(self, section: AcutrolSection, note: Note) -> None:
         self.axes = (section.outer.number, section.middle.number, section.inner.number)
@@ -77,7 +77,7 @@ class AcutrolLink:
         return await self._ask(acutrol.IDENTITY_QUERY, self._identity)
 
     async def states(self) -> tuple[AxisState, ...]:
-        """Position and rate of outer, middle and inner axis, by one question."""
+        """Position and rate of outer, middle and inner axis, by one request."""
         return await self._ask(
             acutrol.states_query(self.axes), lambda a: acutrol.states(self._dialect, a, len(self.axes))
         )

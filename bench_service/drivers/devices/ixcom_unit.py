@@ -46,7 +46,7 @@ class IxcomUnit(UnitRecordings):
         return Found(self._identity, found.status)
 
     async def identify(self) -> DeviceIdentity:
-        """Identity that the unit told when its line was opened; see the port."""
+        """Identity that the unit reported when its line was opened; see the port."""
         await self.found(self._identity)
         return self._identity
 

@@ -36,7 +36,7 @@ class SimservSection(WireChamber):
     variable: int = Field(default=1, ge=1, le=9)
     """Index of the temperature among the control variables."""
     door_input: str = Field(default="", max_length=64)
-    """Name of the digital input that is 1 while the door is open, as the controller tells it; empty: there is none."""
+    """Name of the digital input that is 1 while the door is open, as the controller names it; empty: none."""
     after_set_s: NonNegative = 1.0
     """Pause between a set and its read-back [s]."""
     readback_c: Positive = 0.051

@@ -88,7 +88,7 @@ class FrameStream:
 
     @property
     def problem(self) -> str:
-        """Reason for which no frames come, in words; empty while the line is open."""
+        """Reason for which no frames come, as a sentence; empty while the line is open."""
         return self._problem
 
     def begin(self) -> None:

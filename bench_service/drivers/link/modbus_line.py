@@ -16,7 +16,7 @@ T = TypeVar("T")
 class ModbusLine:
     """Reads may be asked twice, over a new connection; a write is never sent twice.
 
-    After a lost answer the connection is given up, for the frames of a serial line do not say which question they
+    After a lost answer the connection is given up, for the frames of a serial line do not say which request they
     answer.
     """
 

@@ -70,7 +70,7 @@ class Bit(BaseModel):
     table: Literal["holding", "input"] = "holding"
 
     def of(self, word: int) -> bool:
-        """Its state in the register's word."""
+        """State of the bit in its register's word."""
         return bool(word >> self.bit & 1)
 
     def changed(self, word: int, on: bool) -> int:

@@ -34,7 +34,7 @@ def found_and_left(
     given: Sequence[StoredCalibration],
     job: Job | None,
 ) -> Iterator[Block]:
-    """What was in use when the job began beside what the result gave, and the noise where the result changed it."""
+    """Return what was in use when the job began next to what the result gave, and noise where it changed."""
     unit = result.context.get("unit")
     if not unit:
         return

@@ -1,4 +1,4 @@
-"""Printed reports for whoever asks: of a result, of a unit, of a certificate, each as the bytes of a PDF/A-3."""
+"""Printed reports for those who ask: of a result, of a unit, of a certificate, each as the bytes of a PDF/A-3."""
 
 import base64
 from collections.abc import Callable

@@ -34,7 +34,7 @@ class LeaseReader:
         self._heard = -1
         self._thread: Thread | None = None
         self.because = ""
-        """The reason why the lease has to end; empty: it goes on."""
+        """The reason why the lease has to end; empty: it continues."""
 
     def begin(self, session: ManualSession) -> None:
         """Begin to read for a session."""

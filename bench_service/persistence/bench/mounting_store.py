@@ -29,7 +29,7 @@ class SqlMountingStore:
                 known = made_before(session, idempotency, "mounting")
                 if known is not None:
                     return _mounting(_found(session, known))
-                self._database.one_at_a_time(session, f"claim a job of bench {mounting.bench}")
+                self._database.turn_at_bench(session, mounting.bench)
                 place = (MountingRow.bench == mounting.bench) & (MountingRow.plate == mounting.plate)
                 before = session.scalars(
                     select(MountingRow).where(
@@ -81,7 +81,7 @@ class SqlMountingStore:
         with self._database.write() as session:
             row = _found(session, mounting_id)
             if row.ended_at is None:
-                self._database.one_at_a_time(session, f"claim a job of bench {row.bench}")
+                self._database.turn_at_bench(session, row.bench)
                 _require_idle(session, {row.bench})
                 row.ended_at, row.ended_by = at, by
             return _mounting(row)

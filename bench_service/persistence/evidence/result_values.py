@@ -49,11 +49,13 @@ class OfVerdicts:
         Ids come first, by an index alone: with the join in one statement Postgres expects a single row, and sorts all.
         """
         mine = (ResultRow.unit == self.unit, ResultRow.name == self.procedure, ResultRow.simulated == self.simulated)
-        ids = select(ResultRow.id).where(*mine).order_by(ResultRow.id.desc()).limit(at_once)
+        ids = select(ResultRow.id).order_by(ResultRow.id.desc()).limit(at_once)
         query = query.join(JobRow, and_(JobRow.id == ResultRow.job_id, JobRow.result_id == ResultRow.id))
-        while known := session.scalars(ids if before is None else ids.where(ResultRow.id < before)).all():
-            yield from session.execute(query.where(ResultRow.id.in_(known)).order_by(ResultRow.id.desc()))
-            before = known[-1]
+        older = mine if before is None else (*mine, ResultRow.id < before)
+        while known := session.scalars(ids.where(*older)).all():
+            oldest = known[-1]
+            yield from session.execute(query.where(*older, ResultRow.id >= oldest).order_by(ResultRow.id.desc()))
+            older = (*mine, ResultRow.id < oldest)
 
 
 def values_query(name: str) -> Select[*tuple[Any, ...]]:

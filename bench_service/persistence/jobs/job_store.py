@@ -5,7 +5,7 @@ processes that want different ends for one job, one wins and the other gets `Ill
 """
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from datetime import datetime
 from typing import Any
@@ -103,11 +103,16 @@ class SqlJobStore:
                 log.warning("left out of lists: %s", error)
             return None
 
-    def counts(self) -> dict[JobState, int]:
-        query = select(JobRow.state, func.count()).group_by(JobRow.state)
+    def counts(self, states: Collection[JobState] = tuple(JobState)) -> dict[JobState, int]:
+        counted = JobRow.state.in_([state.value for state in states])
+        query = select(JobRow.state, func.count()).where(counted).group_by(JobRow.state)
         with self._database.read() as session:
             found = {state: number for state, number in session.execute(query)}  # noqa: C416  rows are not tuples
-        return {state: found.get(state.value, 0) for state in JobState}
+        return {state: found.get(state.value, 0) for state in states}
+
+    def has_any(self) -> bool:
+        with self._database.read() as session:
+            return session.scalar(select(JobRow.id).limit(1)) is not None
 
     def transition(
         self,

@@ -38,7 +38,7 @@ class SqlManualStore:
                 known = made_before(session, idempotency, "manual lease")
                 if known is not None:
                     return lease_of_row(_found(session, known))
-                self._database.one_at_a_time(session, f"claim a job of bench {lease.bench}")
+                self._database.turn_at_bench(session, lease.bench)
                 _require_free(session, lease)
                 remember(session, idempotency, "manual lease", lease.id, lease.created_at)
                 session.add(copied(ManualLeaseRow, lease))
@@ -64,7 +64,7 @@ class SqlManualStore:
     def take(self, lease_id: str, at: datetime, process: str) -> ManualLease | None:
         with self._database.write() as session:
             row = _found(session, lease_id)
-            self._database.one_at_a_time(session, f"claim a job of bench {row.bench}")
+            self._database.turn_at_bench(session, row.bench)
             running = select(JobRow.id).where(JobRow.bench == row.bench, JobRow.state == JobState.RUNNING.value)
             if row.began_at is not None or not lease_of_row(row).live(at) or session.scalar(running) is not None:
                 return None

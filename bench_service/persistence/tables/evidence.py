@@ -9,6 +9,8 @@ from sqlalchemy.orm import Mapped, mapped_column
 from bench_service.persistence.tables.columns import Document, Id, Table
 
 NAMES_JOIN = "\n"
+OF_A_TREND = ("unit", "name", "simulated", "id", "job_id", "created_at", "code_version")
+"""Columns of results that a trend is found by, and what it shows of them: behind the document they are slow to read."""
 
 
 class UnitRow(Table):
@@ -127,6 +129,7 @@ class ResultRow(Table):
         Index("ix_results_name_id", "name", "id"),
         Index("ix_results_verdict_id", "verdict", "id"),
         Index("ix_results_id_name_unit_job_id", "id", "name", "unit", "job_id"),
+        Index("ix_results_unit_name_simulated_id", *OF_A_TREND),
     )
 
     id: Mapped[str] = mapped_column(Id, primary_key=True)
