@@ -19,14 +19,13 @@ from procedures.analysis.calibration.plan import TriadPlan, predicted_parts
 from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
 from procedures.analysis.calibration.reference_temperature import (
     ThermalShare,
-    brought_by_unit,
     thermal_share,
     thermal_warnings,
 )
 from procedures.analysis.calibration.station_means import StationMeans, launch_warnings, station_means
 from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
-from procedures.analysis.calibration.triad_analysis import analyse_inputs, noise_of_means, suspected
+from procedures.analysis.calibration.triad_analysis import analyse_inputs, brought_by_unit, noise_of_means, suspected
 from procedures.analysis.orientation_plan.requirements import IN_RUN_SOURCE
 from procedures.analysis.own_axes import OWN_AXES, own_axis_check
 from procedures.analysis.recursive_bias.dwell import DwellsSaved, dwells_saved

@@ -288,16 +288,3 @@ def _of_range(temperatures: StationTemperatures, correction: ThermalCorrection) 
         "uncertainty does not tell by how much it is wrong; calibrate within the range, or repeat the thermal cycle "
         "over the temperatures of use"
     ]
-
-
-def brought_by_unit(
-    recordings: Sequence[Recording], means: StationMeans, unit: Unit, lag_s: tuple[float, float]
-) -> tuple[StationMeans, dict[str, Array], AtReference | None]:
-    """Station means at the references of the unit's corrections, and their covariances from these, by cause."""
-    if means.triad == "accelerometer" and unit.thermal_correction is not None:
-        warm = bring_to_reference(recordings, means, unit.thermal_correction, lag_s)
-        return warm.means, {"thermal correction": warm.of_correction, "thermometers": warm.of_sensors}, warm
-    if means.triad == "gyro" and unit.gyro_correction is not None:
-        own, covariance = gyros_at_reference(recordings, means, unit.gyro_correction)
-        return own, {"thermal correction": covariance}, None
-    return means, {}, None
