@@ -1,6 +1,6 @@
 """Calibration at any set of positions: parameters, result and analysis that the procedure and the method share.
 
-Twelve coefficients a triad as in `calibration_12_orientations`, with K₂, asymmetry and g-sensitivity beside them where
+Twelve coefficients a triad as in `calibration_12_orientations`, with K₂, asymmetry and g-sensitivity in addition where
 they are asked for and the positions determine them (`analysis.calibration.extra_terms`).
 """
 
@@ -62,8 +62,10 @@ class FitParameters(JudgedParameters):
         "gyros; each must be determined by the positions",
     )
     scalar_check: bool = Field(False, description="cross-check of the accelerometers with the magnitude alone")
-    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the residuals' chi-square")
-    condition_max: float = Field(100.0, ge=1.0, le=1e9, description="of the column-scaled design")
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the residuals' chi-square")
+    condition_max: float = Field(
+        100.0, ge=1.0, le=1e9, description="largest condition number of the column-scaled design"
+    )
 
     def terms_for(self, triad: str) -> tuple[Kind, ...]:
         """The terms that are asked of a triad, each once."""

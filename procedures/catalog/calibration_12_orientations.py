@@ -53,7 +53,6 @@ from procedures.site_parameters import TableParameters, declared_table
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 Lag = Annotated[float, Field(ge=0.0, le=600.0)]
 
-
 _NOT_PREDICTED = (
     "the predicted uncertainties are without the thermal correction's share, which depends on the temperatures to come"
 )
@@ -70,8 +69,10 @@ class Limits(Parameters):
     accelerometer_bias_in_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
     accelerometer_bias_run_to_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
     accelerometer_scale_run_to_run_ppm: float = Field(200.0, gt=0.0, le=1e6)
-    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the residuals' chi-square")
-    condition_max: float = Field(100.0, ge=1.0, le=1e9, description="of the column-scaled design")
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the residuals' chi-square")
+    condition_max: float = Field(
+        100.0, ge=1.0, le=1e9, description="largest condition number of the column-scaled design"
+    )
 
 
 class Params(TableParameters, DwellParameters):
@@ -95,7 +96,7 @@ class Params(TableParameters, DwellParameters):
         "none", description="current: the unit's thermal correction brings the accelerometers to its reference"
     )
     case_lag_s: Lag = Field(5.0, description="time constant of the case sensor; used by thermal_correction=current")
-    converter_lag_s: Lag = Field(5.0, description="the same of the converter's sensor")
+    converter_lag_s: Lag = Field(5.0, description="time constant of the converter's sensor")
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
 
@@ -104,10 +105,12 @@ class Result(Outcome):
 
     triads: tuple[TriadSummary, ...]
     thermal: ThermalShare | None = Field(
-        None, exclude_if=lambda share: share is None, description="of the accelerometers, where they were corrected"
+        None,
+        exclude_if=lambda share: share is None,
+        description="thermal correction of the accelerometers, where it was applied",
     )
     dwells: DwellsSaved | None = Field(
-        None, exclude_if=lambda saved: saved is None, description="of a stop rule: each dwell, and the time saved"
+        None, exclude_if=lambda saved: saved is None, description="dwells ended by the stop rule, and the time saved"
     )
 
 

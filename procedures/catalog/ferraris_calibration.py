@@ -80,7 +80,9 @@ def predict(params: Params, context: Context) -> Prediction:
     plan = triad_plan("accelerometer", context.unit, still, context.bench.axis_motion, site, params.table(site))
     uncertainties = (*_gyro(params, context, stations), *predicted(plan))
     unknown = context.unit.gyro is None or context.unit.accelerometer is None
-    warnings = ("the noise of a triad is not known: of it nothing is predicted",) if unknown else ()
+    warnings = (
+        ("the noise of a triad is not known: its share in the uncertainties is not predicted",) if unknown else ()
+    )
     basis = "the unit's calibration" if context.unit.known_matrix("gyro") is not None else "nominal scale factors"
     return Prediction(float(spans[-1, 1]), uncertainties, warnings, basis if uncertainties else "")
 

@@ -141,7 +141,7 @@ def _channels(recordings: Sequence[Recording], params: Params) -> tuple[str, ...
         for recording in recordings:
             recording.info.column(name)
     if not names:
-        raise UnfitRecording(f"recording {info.id} has temperature channels alone")
+        raise UnfitRecording(f"recording {info.id} has only temperature channels")
     return names
 
 
@@ -204,7 +204,7 @@ def _series(recording: Recording, sensors: Mapping[str, str], params: Params, un
     count = cells.rates.shape[1] // size
     if count < FEWEST:
         raise UnfitRecording(
-            f"recording {recording.info.id}: {count} cells of {params.cell_s:g} s are too few, it takes {FEWEST}: "
+            f"recording {recording.info.id}: {count} cells of {params.cell_s:g} s are too few, the least is {FEWEST}: "
             "make cell_s shorter"
         )
     departures: dict[str, Array] = {}
