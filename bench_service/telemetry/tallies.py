@@ -21,7 +21,7 @@ from bench_service.wall_clock import monotonic_s, now
 OVERLAP = timedelta(seconds=60)
 PAGE = 5000
 RECORDINGS_S = 30.0
-"""Age at which the sum over all recordings is made anew [s]: it walks an index, beside the scrapes."""
+"""Age at which the sum over all recordings is made again [s]: it walks an index, apart from the scrapes."""
 DURATION_S = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5)
 """Upper ends of the buckets of durations and waits [s]; one more bucket has no upper end."""
 

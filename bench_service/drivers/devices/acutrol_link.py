@@ -48,13 +48,14 @@ class AcutrolSection(WireTurntable):
     def _has_no_sinusoid(self) -> "AcutrolSection":
         if self.sinusoidal:
             raise ValueError(
-                "sinusoidal = true: this driver demands no sinusoid, for how the controller begins one is not known"
+                "sinusoidal = true: this driver does not support sinusoids: "
+                "it is not documented how the controller starts one"
             )
         return self
 
 
 class AcutrolLink:
-    """Controller of three axes as typed questions; knows its language, and no motion."""
+    """Controller of three axes as typed requests; knows its language, and no motion."""
 
     def __init__(self, section: AcutrolSection, note: Note) -> None:
         self.axes = (section.outer.number, section.middle.number, section.inner.number)
@@ -76,7 +77,7 @@ class AcutrolLink:
         return await self._ask(acutrol.IDENTITY_QUERY, self._identity)
 
     async def states(self) -> tuple[AxisState, ...]:
-        """Position and rate of outer, middle and inner axis, by one question."""
+        """Position and rate of outer, middle and inner axis, by one request."""
         return await self._ask(
             acutrol.states_query(self.axes), lambda a: acutrol.states(self._dialect, a, len(self.axes))
         )
@@ -97,7 +98,7 @@ class AcutrolLink:
         for word in status:
             if word.name.startswith("interlock") and word.raw != "closed":
                 raise DeviceFault(
-                    f"{word.name} of the turntable is {word.raw}: a person looks why, resets and closes it at the "
+                    f"{word.name} of the turntable is {word.raw}: find out why, then reset and close it at the "
                     "controller"
                 )
         if "interlock fault" in status[0].bits:

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from bench_service.evidence.recordings import DamagedChunk
 from bench_service.formats.chunk import sample_type
-from bench_service.formats.content_hash import ContentHash
+from bench_service.formats.content_hash import hash_of_blocks
 from bench_service.model.errors import DamagedRecording, NotFound
 from bench_service.model.records import NewRecording, Page, RecordingState, StoredRecording
 from bench_service.model.search import EVERYTHING, Search
@@ -42,7 +42,7 @@ _OF_JOB = (
 
 @dataclass(frozen=True)
 class StoredSamples:
-    """`procedures.core.recording.Recording` over the database: each pass reads the chunks anew."""
+    """`procedures.core.recording.Recording` over the database: each pass reads the chunks again."""
 
     info: RecordingInfo
     _reader: ChunkReader
@@ -164,11 +164,9 @@ class SqlRecordingStore:
         with self._database.read() as session:
             row = _found(session, recording_id, with_open=True)
             info, reader, dtype = info_of_row(row), self._reader(row), sample_type(row.sample_type)
-        digest = ContentHash(info.channels, info.rate_hz, dtype)
+        blocks = reader.blocks([c.name for c in info.channels], 0, info.count)
         try:
-            for block in reader.blocks([c.name for c in info.channels], 0, info.count):
-                digest.update(block)
-            content_hash = digest.hexdigest()
+            content_hash = hash_of_blocks(info.channels, info.rate_hz, dtype, blocks)
         except DamagedRecording as damage:
             log.error("recording %s is closed without a hash: %s", recording_id, damage)
             content_hash = ""

@@ -191,7 +191,9 @@ class SqlJobStore:
                 return job_of_row(row)
             job = job_of_row(row)
             if job.state is JobState.RUNNING:
-                raise IllegalTransition(f"job {job_id} is running, and nobody asked it to pause: nothing is to resume")
+                raise IllegalTransition(
+                    f"job {job_id} is running and no pause was requested: there is nothing to resume"
+                )
             if job.state in FINAL and not job.resumable:
                 why = "" if job.failure is None else f" ({job.failure.kind}: {job.failure.message})"
                 raise IllegalTransition(f"job {job_id} is {row.state}{why}; it cannot be resumed")
