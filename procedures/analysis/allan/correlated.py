@@ -50,7 +50,7 @@ def snapped(sizes: Sizes, statistic: Statistic, count: int) -> tuple[Sizes, Size
 
 
 class SharedProducts:
-    """What the sums of every overlapping member are made from, accumulated once: lagged products, blocks, both ends."""
+    """Parts that the sums of every overlapping member are made from, accumulated once: products, blocks, both ends."""
 
     def __init__(self, count: int, differences: int) -> None:
         """`differences`: of the member that takes most of them."""

@@ -62,7 +62,7 @@ class Integral:
             yield rates
 
     def rates_and_sums(self, block: Array | NDArray[np.int32]) -> Iterator[tuple[Array, Piece]]:
-        """What `rates` and `add` give of a block, piece by piece; only where gaps are refused."""
+        """Yield what `rates` and `add` give of a block, piece by piece; only where gaps are refused."""
         for y in self._pieces(block):
             rates, bad = self._checked(y)
             yield rates, self._summed(rates.copy(), bad)
