@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal thermometers dwells imports misfit access acceptance
+VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns response alignment without_bench thermal thermometers dwells imports misfit access acceptance
 FOREIGN := basil edie instro ixcom moto visa
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
 

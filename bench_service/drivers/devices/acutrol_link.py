@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Literal, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from bench_service.drivers.answers import Refusal
 from bench_service.drivers.devices.wire import Greeting, Note, accepted, line_times
@@ -43,14 +43,6 @@ class AcutrolSection(WireTurntable):
     """Largest rate at rest [deg/s]."""
     settle_s: Positive = 30.0
     """Longest time between the planned end of a motion and rest [s]."""
-
-    @model_validator(mode="after")
-    def _has_no_sinusoid(self) -> "AcutrolSection":
-        if self.sinusoidal:
-            raise ValueError(
-                "sinusoidal = true: this driver demands no sinusoid, for how the controller begins one is not known"
-            )
-        return self
 
 
 class AcutrolLink:
@@ -122,15 +114,19 @@ class AcutrolLink:
             found = await self._number(acutrol.demand_query(kind, axis))
             self._same(f"{kind} demand of axis {axis}", value, found)
 
+    async def oscillator(self, index: int, amplitude_deg: float, frequency_hz: float) -> None:
+        """Load a sinusoid of an axis. No query of it was seen: its motion is what is read back."""
+        await self._set(acutrol.oscillator_demand(self.axes[index], amplitude_deg, frequency_hz, 0.0))
+
     async def mode(self, mode: Mode, indices: Sequence[int] = (0, 1, 2)) -> None:
         """Set the mode of some axes at which a loaded demand acts, and read it back; an axis in it is left alone."""
         for index in indices:
             axis = self.axes[index]
-            if await self.mode_of(index) == mode:
+            if is_mode(await self.mode_of(index), mode):
                 continue
             await self._set(acutrol.mode_statement(axis, mode))
             found = await self.mode_of(index)
-            if found != mode:
+            if not is_mode(found, mode):
                 raise DeviceFault(f"axis {axis} of the turntable was set to {mode} mode and reads back {found}")
 
     async def mode_of(self, index: int) -> str:
@@ -185,3 +181,8 @@ class AcutrolLink:
                 Bound(f"{name}.acceleration_deg_s2", own.acceleration_deg_s2),
             ]
         self.own = tuple(found)
+
+
+def is_mode(word: str, mode: Mode) -> bool:
+    """True if a controller's word names a mode; that of the synthesizer was seen in its short form alone."""
+    return word.startswith(acutrol.MODES["synthesis"]) if mode == "synthesis" else word == mode

@@ -115,3 +115,22 @@ class WatchedTable:
                 return False
             await self._clock.sleep(POLL_S)
         return True
+
+    async def _prepare_brake(self, demand: int) -> None:
+        """Set the limits of rate mode before a motion, so that a stop needs two statements an axis."""
+        if self._can_brake:
+            return
+        for index, axis in enumerate(self._axes()):
+            self._require_current(demand)
+            await self._link.limit("rate", index, axis.rate_deg_s, axis.acceleration_deg_s2)
+        self._can_brake = True
+
+    async def _stop_at_rate(self, index: int) -> None:
+        """Take the rate away from an axis: two statements."""
+        await self._link.demand("rate", index, 0.0)
+        await self._link.mode("rate", [index])
+
+    def _demanded(self, index: int, angle_deg: float) -> float:
+        """Angle as the controller takes it: of one turn where its encoder reads within one."""
+        within_one = self._counts[index].counts or getattr(self._section, AXES[index]).continuous
+        return wrapped(angle_deg) if within_one else angle_deg
