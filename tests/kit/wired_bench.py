@@ -49,9 +49,9 @@ gravity_m_s2 = 9.810553
 [turntable]
 driver = "acutrol"
 address = "tcp://127.0.0.1:{numbers["turntable"]}"
-outer = {{ number = 3, {axis}, continuous = true }}
+outer = {{ number = 1, {axis}, continuous = true }}
 middle = {{ number = 2, {axis} }}
-inner = {{ number = 1, {axis} }}
+inner = {{ number = 3, {axis} }}
 accuracy = {{ pointing_sd_arcsec = 2 }}
 sinusoidal = true
 {pause}

@@ -19,6 +19,10 @@ from procedures.bench.errors import DeviceFault
 
 T = TypeVar("T")
 ENDINGS = {"crlf": b"\r\n", "lf": b"\n", "cr": b"\r"}
+TURN_SETS, TURN_SETTLES_S = 8, 3.0
+"""Statements before and after whole turns, and bench time for rest, the way back and rest again [s]."""
+ANSWER_S, CROWDED_S = 0.04, 0.5
+"""Time of an answer, and of all readings of rest together, on a crowded machine [s, real time]."""
 SENT_BACK = 10.0**-acutrol.DECIMALS
 """Largest difference of a demand read back: one unit of its last decimal."""
 
@@ -43,6 +47,10 @@ class AcutrolSection(WireTurntable):
     """Largest rate at rest [deg/s]."""
     settle_s: Positive = 30.0
     """Longest time between the planned end of a motion and rest [s]."""
+
+    def turn_extra_s(self, factor: float) -> float:
+        """Time of the statements that begin and end whole turns, and of settling [s, bench time]."""
+        return factor * (TURN_SETS * (self.after_demand_s + ANSWER_S) + CROWDED_S) + TURN_SETTLES_S
 
 
 class AcutrolLink:
@@ -97,10 +105,12 @@ class AcutrolLink:
         return status
 
     async def limit(self, mode: Mode, index: int, rate_deg_s: float, acceleration_deg_s2: float) -> None:
-        """Set rate and acceleration of one mode of an axis, and read both back."""
+        """Set rate and acceleration of one mode of an axis, and read both back; one that reads so already is left."""
         axis = self.axes[index]
         quantities: tuple[tuple[Quantity, float], ...] = (("rate", rate_deg_s), ("acc", acceleration_deg_s2))
         for quantity, value in quantities:
+            if abs(await self._number(acutrol.limit_query(quantity, mode, axis)) - value) <= SENT_BACK:
+                continue
             await self._set(acutrol.limit_statement(quantity, mode, axis, value))
             found = await self._number(acutrol.limit_query(quantity, mode, axis))
             self._same(f"{quantity} limit of axis {axis} in {mode} mode", value, found)

@@ -51,7 +51,7 @@ class SwingingTable(WatchedTable):
             axis = self._axes()[index]
             await self._link.limit("synthesis", index, axis.rate_deg_s, axis.acceleration_deg_s2)
             self._require_current(demand)
-            await self._link.demand("position", index, self._demanded(index, start[index]))
+            await self._link.demand("position", index, self._demanded(index, start[index], start[index]))
             self._require_current(demand)
             await self._link.oscillator(index, sinusoid.amplitude_deg, sinusoid.frequency_hz)
             self._require_current(demand)
@@ -89,9 +89,8 @@ class SwingingTable(WatchedTable):
             await self._wait_for_rest(None, sinusoid.rate_deg_s / self._axes()[index].acceleration_deg_s2, demand)
             await self._lead_back(index, start, demand)
             if largest < LEAST * sinusoid.amplitude_deg:
-                raise DeviceFault(
-                    f"the {sinusoid.axis} axis swung by {largest:.4g} deg, not by the {sinusoid.amplitude_deg:g} demanded"
-                )
+                wanted = f"{sinusoid.amplitude_deg:g} deg"
+                raise DeviceFault(f"the {sinusoid.axis} axis swung by {largest:.4g} deg where {wanted} were demanded")
         except BaseException:
             if demand == self._demand:  # else whoever took over stops it
                 await self._stop_quietly(index)
@@ -123,7 +122,7 @@ class SwingingTable(WatchedTable):
         axis = self._axes()[index]
         self._require_current(demand)
         await self._link.limit("position", index, axis.rate_deg_s, axis.acceleration_deg_s2)
-        await self._link.demand("position", index, self._demanded(index, start[index]))
+        await self._link.demand("position", index, self._demanded(index, start[index], start[index]))
         await self._link.mode("position", [index])
         await self._wait_for_rest(start, 1.0, demand)
 

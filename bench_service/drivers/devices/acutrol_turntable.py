@@ -232,7 +232,7 @@ class AcutrolTurntable(SwingingTable):
             raise DeviceFault(f"the {turn.axis} axis stopped {left_deg:g} deg before the end of its turns")
         end = here + left_deg
         await self._link.limit("position", index, axis.rate_deg_s, axis.acceleration_deg_s2)
-        await self._link.demand("position", index, self._demanded(index, end))
+        await self._link.demand("position", index, self._demanded(index, end, here))
         await self._link.mode("position", [index])
         ends = [end if k == index else angle for k, angle in enumerate(start)]
         await self._wait_for_rest(ends, _duration_s(abs(left_deg), axis.rate_deg_s, axis.acceleration_deg_s2), demand)
