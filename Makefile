@@ -2,14 +2,15 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
-VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns response alignment without_bench thermal thermometers dwells imports misfit access acceptance
+WORKERS ?= 2
+VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns response alignment without_bench thermal thermometers dwells imports misfit access document acceptance wires_campaign
 FOREIGN := basil edie instro ixcom moto visa
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
 
 .DEFAULT_GOAL := help
-.PHONY: help run test browser screenshots figures clients bench bench-against profile chaos soak format check validate rights pictures newest-form lock audit images clean foreign
+.PHONY: help run test browser screenshots figures clients bench bench-against profile mutants chaos soak format check validate rights references pictures newest-form lock audit images clean foreign
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -25,8 +26,8 @@ $(VENV)/.ready: requirements.lock pyproject.toml
 run: $(VENV)/.ready  ## calibrate and verify the simulated unit, then keep serving (ONCE=1: end with the verdict)
 	@$(BIN)/bench demo --port $(PORT) $(if $(ONCE),--once)
 
-test: $(VENV)/.ready  ## the whole test suite
-	@$(BIN)/python -m pytest -n 2 --dist worksteal --durations=40 --durations-min=1
+test: $(VENV)/.ready  ## the whole test suite, in WORKERS (2) processes
+	@$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal --durations=40 --durations-min=1
 
 $(VENV)/.browser: .ci/browser.lock $(VENV)/.ready
 	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --require-hashes -r .ci/browser.lock
@@ -72,12 +73,21 @@ bench-against: $(VENV)/.ready  ## this checkout beside revision REV (e36ea0a), b
 profile: .venv-profile/.ready  ## the three heaviest lines of each benchmark, by time and by memory; ONLY=static,allan
 	@$(BIN)/python -m tests.benchmarks.heaviest --tools .venv-profile/bin $(if $(ONLY),--only $(ONLY))
 
+.venv-mutants/.ready: .ci/mutants.lock $(VENV)/.ready
+	@test -x .venv-mutants/bin/python || $(PYTHON) -m venv .venv-mutants
+	@VIRTUAL_ENV=$(CURDIR)/.venv-mutants $(BIN)/uv pip install --quiet --require-hashes -r .ci/mutants.lock
+	@touch $@
+
+mutants: .venv-mutants/.ready  ## put small defects into supervisor, safety, queue, lease, retries and numerics: do the tests see them? ONLY=lease MUTANTS=15
+	@nice -n 19 $(BIN)/python -m tests.mutants --tools .venv-mutants/bin --mutants $(or $(MUTANTS),15) $(if $(ONLY),--only $(ONLY))
+
 lock: $(VENV)/.ready  ## compile requirements.lock anew, with its part for run time and the tools of the audit
 	@$(COMPILE) --extra dev --extra formats pyproject.toml -o requirements.lock
 	@$(COMPILE) --extra formats -c requirements.lock pyproject.toml -o .ci/runtime.lock
 	@$(COMPILE) --extra dev --extra formats --extra browser -c requirements.lock pyproject.toml -o .ci/browser.lock
 	@$(COMPILE) .ci/audit.in -o .ci/audit.lock
 	@$(COMPILE) -c requirements.lock .ci/profile.in -o .ci/profile.lock
+	@$(COMPILE) -c requirements.lock .ci/mutants.in -o .ci/mutants.lock
 
 .venv-audit/.ready: .ci/audit.lock $(VENV)/.ready
 	@test -x .venv-audit/bin/python || $(PYTHON) -m venv .venv-audit
@@ -92,6 +102,10 @@ images: $(VENV)/.ready  ## pin the images of docker-compose.yml by digest and bu
 
 clients: $(VENV)/.ready  ## lint the OpenAPI document, generate clients from it, drive a service with the generated one
 	@$(BIN)/python -m tests.clients
+
+references: $(VENV)/.ready  ## write docs/results.md, campaign-document.md and citations.md anew, from schemas and docstrings
+	@$(BIN)/python -m tests.kit.reference_pages
+	@$(BIN)/python -m tests.kit.citations_page
 
 rights: $(VENV)/.ready  ## write docs/rights.md anew, from the routes and their rights
 	@$(BIN)/python -m tests.kit.rights_page
@@ -112,4 +126,4 @@ foreign: $(addprefix .foreign/,$(addsuffix /.ready,$(FOREIGN)))  ## environments
 	@touch $@
 
 clean:  ## remove the environment and the demo's data
-	rm -rf $(VENV) .venv-audit .venv-profile .foreign .bench
+	rm -rf $(VENV) .venv-audit .venv-profile .venv-mutants .foreign .bench

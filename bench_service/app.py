@@ -15,7 +15,7 @@ from bench_service.api import (
     audit,
     audit_chain,
     batches,
-    console,
+    certificates,
     database,
     health,
     metrics,
@@ -37,11 +37,11 @@ from bench_service.api.campaigns import schedules
 from bench_service.api.feed import news
 from bench_service.api.feed import routes as feed
 from bench_service.api.http import bodies, door, endings, errors, headers, queries, request_id, transfer
-from bench_service.api.jobs import event_stream
+from bench_service.api.jobs import estimates, event_stream
 from bench_service.api.jobs import routes as jobs
 from bench_service.api.manual import routes as manual
 from bench_service.api.openapi import document
-from bench_service.api.units import calibrations
+from bench_service.api.units import calibrations, notes
 from bench_service.api.units import routes as units
 from bench_service.bench.devices import BenchDevices
 from bench_service.bench.directory import BenchDirectory
@@ -115,7 +115,9 @@ ROUTERS = (
     health,
     metrics,
     feed,
-    *console.PARTS,
+    certificates,
+    estimates,
+    notes,
 )
 PAGES = (
     static_files,

@@ -166,7 +166,7 @@ class BenchService:
         A stopped bench is such a note: a person has stopped it, and the service works. Raises `NotReady` with
         every reason, `StorageFailure` where the database does not answer.
         """
-        self.stores.jobs.counts()
+        self.stores.jobs.has_any()
         reasons = list(self.upkeep.troubles())
         free = self._free_bytes()
         if free is not None and free < LEAST_FREE_BYTES:

@@ -106,13 +106,13 @@ class Settings(BaseModel):
     log_level: Literal["debug", "info", "warning", "error"] | None = None
     """Lowest level that is logged; None: info for a service, warning for a command that works in this process."""
     log_file: Path | None = None
-    """File for the log's lines, begun anew at 10 MB, with the five before it kept; None: standard error."""
+    """File for the log's lines, begun again at 10 MB, with the five before it kept; None: standard error."""
     log_access: bool = False
     """True where every request is a line of the log."""
     traces_url: str | None = Field(None, pattern=r"^https?://\S+$")
     """Address for traces (OTLP over HTTP, protobuf); None: none, unless OTEL_EXPORTER_OTLP_ENDPOINT gives one."""
     notify: Path | None = None
-    """TOML file of mail servers and webhooks that get messages (`docs/who-is-told.md`); None: nobody is told."""
+    """TOML file of mail servers and webhooks that get messages (`docs/who-is-told.md`); None: no messages are sent."""
     max_import_mb: float = Field(1024, gt=0)
     """Largest recording file that may be imported [MB]."""
 
@@ -165,7 +165,7 @@ class Settings(BaseModel):
         """Read settings from a mapping such as ``os.environ``. Raises `BadSettings`."""
         unknown = sorted(key for key in environ if key.startswith("BENCH_") and key not in cls.variables())
         if unknown:
-            raise BadSettings(f"{unknown[0]} is no setting; there are {', '.join(cls.variables())}")
+            raise BadSettings(f"{unknown[0]} is not a setting; the settings are {', '.join(cls.variables())}")
         given = {name: environ[key] for name in cls.model_fields if (key := _variable(name)) in environ}
         collector = environ.get("OTEL_EXPORTER_OTLP_ENDPOINT")
         if collector and "traces_url" not in given:

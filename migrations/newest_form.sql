@@ -1,4 +1,4 @@
--- revision 0020
+-- revision 0021
 CREATE TABLE access_state (
 	id VARCHAR NOT NULL, 
 	revision INTEGER NOT NULL, 
@@ -380,7 +380,7 @@ CREATE TABLE recordings (
 	state VARCHAR NOT NULL, 
 	created_at DATETIME NOT NULL, 
 	source JSON NOT NULL, 
-	checkpoint JSON, launched_s FLOAT, measured JSON, raw VARCHAR DEFAULT 'stored' NOT NULL, raw_changed_at DATETIME, archive VARCHAR, 
+	checkpoint JSON, launched_s FLOAT, measured JSON, raw VARCHAR DEFAULT 'stored' NOT NULL, raw_changed_at DATETIME, archive VARCHAR, station_label VARCHAR, file_names VARCHAR, 
 	CONSTRAINT pk_recordings PRIMARY KEY (id), 
 	CONSTRAINT fk_recordings_job_id_jobs FOREIGN KEY(job_id) REFERENCES jobs (id)
 );
@@ -562,6 +562,10 @@ CREATE UNIQUE INDEX ix_jobs_number ON jobs (number);
 
 CREATE INDEX ix_jobs_procedure_id ON jobs (procedure, id);
 
+CREATE INDEX ix_jobs_requested_by_id ON jobs (requested_by, id);
+
+CREATE INDEX ix_jobs_result_id_id ON jobs (result_id, id);
+
 CREATE INDEX ix_jobs_state_id ON jobs (state, id);
 
 CREATE INDEX ix_jobs_unit_id ON jobs (unit, id);
@@ -580,6 +584,10 @@ CREATE INDEX ix_mountings_unit_id ON mountings (unit, id);
 
 CREATE INDEX ix_recording_holds_recording_id ON recording_holds (recording_id);
 
+CREATE INDEX ix_recordings_bench_id ON recordings (bench, id);
+
+CREATE INDEX ix_recordings_file_names_id ON recordings (file_names, id) WHERE file_names IS NOT NULL;
+
 CREATE INDEX ix_recordings_job_id_id ON recordings (job_id, id);
 
 CREATE INDEX ix_recordings_raw_state_stored_bytes ON recordings (raw, state, stored_bytes);
@@ -587,6 +595,8 @@ CREATE INDEX ix_recordings_raw_state_stored_bytes ON recordings (raw, state, sto
 CREATE INDEX ix_recordings_simulated_id ON recordings (simulated, id);
 
 CREATE INDEX ix_recordings_state_stored_bytes ON recordings (state, stored_bytes);
+
+CREATE INDEX ix_recordings_station_label_id ON recordings (station_label, id);
 
 CREATE INDEX ix_recordings_unit_id ON recordings (unit, id);
 
@@ -605,6 +615,8 @@ CREATE INDEX ix_results_job_id_id ON results (job_id, id);
 CREATE INDEX ix_results_name_id ON results (name, id);
 
 CREATE INDEX ix_results_unit_id ON results (unit, id);
+
+CREATE INDEX ix_results_unit_name_simulated_id ON results (unit, name, simulated, id, job_id, created_at, code_version);
 
 CREATE INDEX ix_results_verdict_id ON results (verdict, id);
 
@@ -628,5 +640,5 @@ CREATE UNIQUE INDEX uq_recordings_complete_station ON recordings (job_id, statio
 
 INSERT INTO "access_state" VALUES ('access', 0, '{a new secret}');
 
-INSERT INTO "alembic_version" VALUES ('0020');
+INSERT INTO "alembic_version" VALUES ('0021');
 

@@ -17,10 +17,21 @@ from procedures.parameters import Parameters
 class StopAt(Parameters):
     """Target of a dwell: it ends when the mean of every channel is known so well, at the latest after `dwell_s`."""
 
-    gyro_deg_h: float | None = Field(None, gt=0.0, le=1e6, description="standard uncertainty; null: not asked of gyros")
-    accelerometer_m_s2: float | None = Field(None, gt=0.0, le=100.0, description="the same of accelerometers")
-    check_s: float = Field(5.0, ge=0.1, le=3600.0, description="a dwell is a whole number of these")
-    level: float = Field(1e-3, ge=0.0, lt=0.5, description="of the test that the unit's noise is as its record has it")
+    gyro_deg_h: float | None = Field(
+        None, gt=0.0, le=1e6, description="standard uncertainty of gyro means; null: not asked of gyros"
+    )
+    accelerometer_m_s2: float | None = Field(
+        None,
+        gt=0.0,
+        le=100.0,
+        description="standard uncertainty of accelerometer means; null: not asked of accelerometers",
+    )
+    check_s: float = Field(
+        5.0, ge=0.1, le=3600.0, description="interval of the check; a dwell is a whole number of them"
+    )
+    level: float = Field(
+        1e-3, ge=0.0, lt=0.5, description="level of the test that the unit's noise is as its record has it"
+    )
     rule: StopRule | None = Field(None, description="null: made of the unit's own noise when the job is planned")
 
     @model_validator(mode="after")

@@ -7,6 +7,7 @@ from pydantic import Field
 from procedures.analysis.calibration.summary import TriadSummary
 from procedures.analysis.calibration.table_errors import TableUncertainty
 from procedures.analysis.calibration.triad_analysis import analyse_means
+from procedures.analysis.own_axes import own_axis_check
 from procedures.analysis.turns.ferraris import analyse_ferraris, rest_means
 from procedures.analysis.turns.summary import WholeTurns
 from procedures.core import units
@@ -26,8 +27,10 @@ class FerrarisLimits(Parameters):
     """Requirements on the calibration itself (this program's own)."""
 
     gyro_scale_3_sigma_ppm: float = Field(20.0, gt=0.0, le=1e6, description="three standard uncertainties")
-    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of each triad's residuals")
-    condition_max: float = Field(100.0, ge=1.0, le=1e9, description="of the accelerometers' design")
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of each triad's residuals")
+    condition_max: float = Field(
+        100.0, ge=1.0, le=1e9, description="largest condition number of the accelerometers' design"
+    )
 
 
 class Result(Outcome):
@@ -89,6 +92,7 @@ def _gyro_checks(found: WholeTurns, limits: FerrarisLimits) -> list[Check]:
 
 def _force_checks(found: TriadSummary, limits: FerrarisLimits) -> list[Check]:
     checks = [check("accelerometer condition number", found.condition, Limit("1", maximum=limits.condition_max))]
+    checks.append(own_axis_check("accelerometer", found.calibration.matrix_array))
     if found.p_value is not None:
         level, note = limits.residual_p_value_min, found.residual_note
         checks.append(significance(f"accelerometer {RESIDUALS}", found.p_value, level, note))

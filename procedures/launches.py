@@ -49,8 +49,12 @@ class NoiseLimits(Parameters):
         le=0.2,
         description="rate random walk and ramp must be absent; chance that a sound unit fails; null: no check",
     )
-    vibration_deg_h: float | None = Field(None, gt=0.0, description="of the base, rms above 1 Hz; null: no check")
-    vibration_m_s2: float | None = Field(None, gt=0.0, description="the same by the accelerometers")
+    vibration_deg_h: float | None = Field(
+        None, gt=0.0, description="vibration of the base by the gyros, rms above 1 Hz; null: no check"
+    )
+    vibration_m_s2: float | None = Field(
+        None, gt=0.0, description="vibration of the base by the accelerometers; null: no check"
+    )
 
 
 class NoiseParameters(JudgedParameters):
@@ -69,9 +73,9 @@ class NoiseParameters(JudgedParameters):
         "rescaled estimates it level by level",
     )
     wavelet_levels: int = Field(6, ge=1, le=20, description="2^levels cells is the longest scale that is split")
-    confidence: float = Field(0.95, gt=0.5, lt=1.0, description="of the intervals")
+    confidence: float = Field(0.95, gt=0.5, lt=1.0, description="confidence level of the intervals")
     level: float = Field(0.01, gt=0.0, le=0.2, description="chance that an absent process is reported present")
-    points_per_decade: int = Field(10, ge=3, le=100, description="of the deviation curves")
+    points_per_decade: int = Field(10, ge=3, le=100, description="averaging times in a decade of the deviation curves")
     band_step_decades: float | None = Field(
         None, ge=0.002, le=1.0, description="of the band over all starts (paper A: 0.002); null: as the curves"
     )
@@ -143,7 +147,7 @@ def analyse_launches(
 
 
 def _matched(launch: LaunchNoise, unit: Unit | None) -> LaunchNoise:
-    """The launch beside the unit's record: origins of its lines by the declared dithers, vibration by the known noise.
+    """The launch against the unit's record: origins of its lines by the declared dithers, vibration by the known noise.
 
     The fitted noise takes a part of a vibration for its own; that of the record does not know it.
     """

@@ -1,6 +1,6 @@
 """Calibration at any set of positions: parameters, result and analysis that the procedure and the method share.
 
-Twelve coefficients a triad as in `calibration_12_orientations`, with K₂, asymmetry and g-sensitivity beside them where
+Twelve coefficients a triad as in `calibration_12_orientations`, with K₂, asymmetry and g-sensitivity in addition where
 they are asked for and the positions determine them (`analysis.calibration.extra_terms`).
 """
 
@@ -14,13 +14,15 @@ from pydantic import Field
 from procedures.analysis.calibration.estimator import Weighting
 from procedures.analysis.calibration.extra_terms import ExtraFit, Kind, TermEstimate, fit_terms, require_terms, terms_of
 from procedures.analysis.calibration.misfit import MISFIT_MAX
+from procedures.analysis.calibration.multiposition import TriadFit
 from procedures.analysis.calibration.plan import TriadPlan, predicted_parts
 from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
 from procedures.analysis.calibration.station_means import StationMeans, launch_warnings, station_means
 from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
-from procedures.analysis.calibration.triad_analysis import analyse_inputs, noise_of_means
+from procedures.analysis.calibration.triad_analysis import analyse_inputs, noise_of_means, suspected
 from procedures.analysis.orientation_plan.requirements import IN_RUN_SOURCE
+from procedures.analysis.own_axes import OWN_AXES, own_axis_check
 from procedures.core import units
 from procedures.core.arrays import Array
 from procedures.core.coefficient_name import CoefficientName
@@ -53,8 +55,10 @@ class FitParameters(JudgedParameters):
         "gyros; each must be determined by the positions",
     )
     scalar_check: bool = Field(False, description="cross-check of the accelerometers with the magnitude alone")
-    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the residuals' chi-square")
-    condition_max: float = Field(100.0, ge=1.0, le=1e9, description="of the column-scaled design")
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the residuals' chi-square")
+    condition_max: float = Field(
+        100.0, ge=1.0, le=1e9, description="largest condition number of the column-scaled design"
+    )
 
     def terms_for(self, triad: str) -> tuple[Kind, ...]:
         """The terms that are asked of a triad, each once."""
@@ -130,14 +134,14 @@ def calibrated(
     recordings: Sequence[Recording], params: FitParameters, inputs: dict[str, Inputs], unit: Unit | None
 ) -> Result:
     """Calibrate the triads of `inputs`. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
-    summaries: list[TriadSummary] = []
+    fitted: list[tuple[TriadSummary, TriadFit]] = []
     extended: list[Extended] = []
     for triad, given in inputs.items():
         require_determined(params, triad, given)
         means, record = station_means(recordings, triad), unit.triad(triad) if unit else None
         scalar = params.scalar_check and triad == "accelerometer"
         found = analyse_inputs(means, given.vectors, given.errors, given.magnitude, record, scalar, params.weighting)
-        summaries.append(found[0])
+        fitted.append(found)
         if kinds := params.terms_for(triad):
             noise, known = noise_of_means(means, record)
             terms = terms_of(kinds, given.vectors, given.forces)
@@ -146,12 +150,13 @@ def calibrated(
                 f"the {triad} coefficients", given.vectors, means.outputs, noise, given.errors, terms, units, known
             )
             extended.append(_extended(triad, means, whole))
+    summaries = suspected(fitted)
     checks = tuple(c for t in summaries for c in _checks(t, _of(extended, t), params))
     return Result(
         checks=checks,
         verdict=verdict(checks),
         warnings=launch_warnings(recordings) + _unknown_noise(summaries),
-        triads=tuple(summaries),
+        triads=summaries,
         extended=tuple(extended),
     )
 
@@ -164,7 +169,7 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
 
 def quantities(params: FitParameters) -> tuple[str, ...]:
     """Checks and coefficients that a result will have."""
-    checks = (" condition number", " residuals, p-value of chi-square")
+    checks = (" condition number", OWN_AXES, " residuals, p-value of chi-square")
     return tuple(f"{triad}{n}" for triad in params.triads for n in (*checks, *(f".{c}" for c in COEFFICIENT_NAMES)))
 
 
@@ -205,6 +210,7 @@ def triad_checks(
         ),
         check(f"{triad} condition number", t.condition, Limit("1", maximum=condition_max)),
     ]
+    checks.append(own_axis_check(triad, t.calibration.matrix_array))
     if t.p_value is not None:
         name = f"{triad} residuals, p-value of chi-square"
         checks.append(significance(name, t.p_value, residual_p_value_min, t.residual_note))
@@ -220,6 +226,7 @@ def _checks(t: TriadSummary, extended: Extended | None, params: FitParameters) -
     triad = t.calibration.triad
     condition = t.condition if extended is None else extended.condition
     checks = [check(f"{triad} condition number", condition, Limit("1", maximum=params.condition_max))]
+    checks.append(own_axis_check(triad, (extended or t).calibration.matrix_array))
     p_value = t.p_value if extended is None else extended.p_value
     if p_value is not None:
         name = f"{triad} residuals, p-value of chi-square"

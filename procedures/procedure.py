@@ -36,7 +36,8 @@ class Statement:
 
 
 _SHOWN_WHERE_MADE = Field(
-    exclude_if=lambda found: found is None, description="None without checks and in results of older versions"
+    exclude_if=lambda found: found is None,
+    description="statement of conformity; None without checks and in results of older versions",
 )
 
 
@@ -234,7 +235,7 @@ class Procedure(Generic[P, R]):
     quantities: Callable[[P, Context], tuple[str, ...]] | None = None
     """Names of the checks and of the named estimates that a result will have; None: not known before the job."""
     planned_checks: Callable[[P, Context], tuple[PlannedCheck, ...]] = _no_checks
-    """Checks that a result will have, with the uncertainty of the plan; those that a plan can tell of."""
+    """Checks that a result will have, with the uncertainty of the plan; those that a plan can predict."""
     inspection: Callable[[P], Inspection] = _stations
     """Inspection of the recordings before the analysis; see `procedures.inspection`."""
 

@@ -47,9 +47,15 @@ class SiteParameters(JudgedParameters):
 class TableParameters(SiteParameters):
     """The site, and the table's accuracy."""
 
-    orthogonality_sd_arcsec: Arcsec | None = Field(None, description="of each of the table's two right angles")
-    pointing_sd_arcsec: Arcsec | None = Field(None, description="of each axis, anew at each station")
-    level_sd_arcsec: Arcsec | None = Field(None, description="of the outer axis about each horizontal direction")
+    orthogonality_sd_arcsec: Arcsec | None = Field(
+        None, description="standard uncertainty of each of the table's two right angles"
+    )
+    pointing_sd_arcsec: Arcsec | None = Field(
+        None, description="standard uncertainty of each axis' angle, independent at each station"
+    )
+    level_sd_arcsec: Arcsec | None = Field(
+        None, description="standard uncertainty of the outer axis' level about each horizontal direction"
+    )
     mounting_sd_arcsec: Arcsec | None = Field(
         None,
         exclude_if=lambda sd: sd is None,

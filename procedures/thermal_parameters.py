@@ -10,9 +10,9 @@ class Leg(Parameters):
     """A ramp to an air temperature and a soak there; times run from setting out."""
 
     target_c: float = Field(ge=-100.0, le=200.0)
-    ramp_c_min: float = Field(1.0, ge=0.01, le=100.0, description="of the chamber's set point")
+    ramp_c_min: float = Field(1.0, ge=0.01, le=100.0, description="rate of the chamber's set point")
     least_s: float = Field(0.0, ge=0.0, le=604_800.0, description="the leg is no shorter, however soon it has soaked")
-    least_soak_s: float = Field(600.0, ge=0.0, le=604_800.0, description="so long the criterion must hold")
+    least_soak_s: float = Field(600.0, ge=0.0, le=604_800.0, description="time for which the criterion must hold")
     longest_s: float = Field(14_400.0, ge=60.0, le=604_800.0, description="with no soak by then the job fails")
 
 
@@ -33,7 +33,7 @@ class Soak(Parameters):
     """Soak criterion of the unit, judged from its own case and converter sensors every ten seconds."""
 
     slope_c_min: float = Field(0.1, ge=1e-4, le=100.0, description="most that either sensor may drift")
-    window_s: float = Field(300.0, ge=60.0, le=86_400.0, description="of the straight line whose slope that is")
+    window_s: float = Field(300.0, ge=60.0, le=86_400.0, description="window of the straight line whose slope that is")
     air_within_c: float = Field(1.5, ge=0.01, le=100.0, description="chamber's air about the target")
 
 
@@ -50,8 +50,12 @@ class Regime(Parameters):
 class Limits(Parameters):
     """Requirements (thesis 4.3, 5.6; tests at the level of significance are this program's own)."""
 
-    three_sigma_m_s2: float = Field(0.0005, gt=0.0, le=100.0, description="of each axis after correction, worst soak")
-    magnitude_rms_m_s2: float = Field(0.0005, gt=0.0, le=100.0, description="of |ĝ| about its mean, worst run")
+    three_sigma_m_s2: float = Field(
+        0.0005, gt=0.0, le=100.0, description="largest 3σ of each axis after correction, at the worst soak"
+    )
+    magnitude_rms_m_s2: float = Field(
+        0.0005, gt=0.0, le=100.0, description="largest rms of |ĝ| about its mean, of the worst run"
+    )
     allan_rise: float = Field(
         1.0, gt=0.0, le=1e6, description="least sure deviation at a longer time over the most at a shorter one"
     )

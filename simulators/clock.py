@@ -83,11 +83,11 @@ class SimClock:
         return ceil(seconds * self.rate_hz - 1e-6)
 
     async def sleep(self, seconds: float) -> None:
-        """Let the world go on for `seconds` of bench time, in slices."""
+        """Let the world continue for `seconds` of bench time, in slices."""
         await self.pass_ticks(self.ticks_in(seconds))
 
     async def pass_ticks(self, ticks: int) -> None:
-        """Let the world go on for whole ticks; between slices a cancellation can land."""
+        """Let the world continue for whole ticks; between slices a cancellation can land."""
         longest = SLICE_S if self._slice_s is None else self._slice_s
         if self._factor is not None:
             longest = min(longest, REAL_TIME_SLICE_S * self._factor)

@@ -80,7 +80,7 @@ class SimulatedBench(Bench):
     current_source: SimCurrentSource | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def checkpoint(self) -> dict[str, Any]:
-        """State from which `build` goes on, JSON-ready. Raises `DeviceFault` while the table moves."""
+        """State from which `build` continues, JSON-ready. Raises `DeviceFault` while the table moves."""
         return {
             "version": CHECKPOINT_VERSION,
             "seed": self.config.seed,

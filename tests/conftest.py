@@ -1,5 +1,6 @@
 """What more than one folder of tests needs: the databases to run on."""
 
+import gc
 import os
 import shutil
 import socket
@@ -18,6 +19,15 @@ from bench_service.persistence import open_stores
 from tests.browser.chromium import missing
 from tests.shared_data import SHARED_DATA
 
+MEMORY = Path("/dev/shm")
+ROOM_BYTES = 4 << 30
+"""A run's files take up to 2 GB at a time."""
+
+# Files of tests stay in memory where there is room: no test is about what a power cut leaves, and a commit on a disk
+# takes 5 ms. `--basetemp`, TMPDIR and PYTEST_DEBUG_TEMPROOT say otherwise.
+if "TMPDIR" not in os.environ and MEMORY.is_dir() and shutil.disk_usage(MEMORY).free >= ROOM_BYTES:
+    os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY))
+
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
@@ -30,6 +40,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     left_out = collection_path.name == "browser" and not config.getoption("--browser")
     return True if left_out else None
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Keep the collector from looking through five thousand tests and all modules again and again."""
+    if session.items:
+        gc.collect()
+        gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:

@@ -122,12 +122,12 @@ class AccessBook:
                 said = ""
             except ServiceError as error:
                 if str(error) != said:
-                    log.warning("accounts and tokens cannot be read, the last known ones stand: %s", error)
+                    log.warning("accounts and tokens cannot be read, the last known ones stay in use: %s", error)
                 said = str(error)
             except Exception:  # a defect here must not leave requests waiting
                 log.exception("accounts and tokens could not be read")
             for each in waiting:
-                with suppress(InvalidStateError):  # whoever waited has gone
+                with suppress(InvalidStateError):  # the process that waited has gone
                     each.set_result(None)
 
     def _look(self, at_once: bool) -> None:

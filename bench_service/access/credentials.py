@@ -67,7 +67,7 @@ class Session:
 
     @property
     def over_at(self) -> datetime:
-        """Time of its end unless it is used before."""
+        """Time at which the session expires unless it is used before."""
         return min(self.last_used_at + IDLE, self.created_at + LONGEST)
 
     def valid(self, at: datetime) -> bool:

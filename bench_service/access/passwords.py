@@ -25,7 +25,9 @@ def check_rule(name: str, password: str) -> None:
     if not SHORTEST <= len(password) <= LONGEST:
         raise BadParameter("password", f"{len(password)} characters", f"{SHORTEST} … {LONGEST} characters")
     if name in password.lower() and len(password) < len(name) + SHORTEST:
-        raise BadParameter("password", "(not shown)", "one that is more than the name of the account")
+        raise BadParameter(
+            "password", "(not shown)", "a password that is not just the account's name with a few characters more"
+        )
 
 
 def hashed(password: str) -> str:

@@ -88,7 +88,9 @@ class AccessService:
     def log_out(self, identity: Identity) -> None:
         """End the session of an identity. Raises `IllegalTransition` where it has none."""
         if identity.proof is not Proof.SESSION:
-            raise IllegalTransition(f"there is no session to end: this request is known by {identity.proof.value}")
+            raise IllegalTransition(
+                f"there is no session to end: this request was authenticated by {identity.proof.value}"
+            )
         self._store.end_session(identity.credential)
         self.book.read_again()
 
@@ -136,7 +138,7 @@ class AccessService:
         return self._store.tokens()
 
     def revoke_token(self, token: str) -> AccessToken:
-        """Revoke a token by its id or name; jobs that were submitted with it go on. Raises `NotFound`."""
+        """Revoke a token by its id or name; jobs that were submitted with it continue. Raises `NotFound`."""
         revoked = self._store.revoke_token(token, now())
         self.book.read_again()
         return revoked
@@ -187,7 +189,7 @@ class AccessService:
 
 def _check_free(name: str) -> None:
     if name in RESERVED:
-        raise BadParameter("name", name, f"another name: the service itself signs as {', '.join(RESERVED)}")
+        raise BadParameter("name", name, f"another name: reserved for the service itself are {', '.join(RESERVED)}")
 
 
 def require(identity: Identity, right: Right) -> None:

@@ -44,12 +44,10 @@ class AuditView(BaseModel):
 
     id: str
     at: datetime
-    who: str = Field(
-        description=f"The proved name; without accounts `{REQUESTED_BY}`, or the address that it came from"
-    )
+    who: str = Field(description=f"Authenticated name; without accounts `{REQUESTED_BY}`, or the address of the client")
     action: str = Field(description="The operation, as this document names it")
-    target: str = Field(description="Path of what it was done to, or of what it made")
-    outcome: str = Field(description="Status code of the answer, or a word where it was no request")
+    target: str = Field(description="Path of the object of the operation, or of the object that it created")
+    outcome: str = Field(description="Status code of the answer, or a word for entries that are not requests")
     detail: dict[str, Any]
 
     @classmethod
@@ -69,7 +67,9 @@ class AuditPage(BaseModel):
 def list_audit(
     service: Service,
     who: Annotated[str | None, Query(max_length=WHO_LENGTH)] = None,
-    target: Annotated[str | None, Query(max_length=200, description="A path, or a part of it such as an id")] = None,
+    target: Annotated[
+        str | None, Query(max_length=200, description="Path of the object, or a part of it such as an id")
+    ] = None,
     after: After = None,
     limit: Limit = 50,
 ) -> AuditPage:

@@ -18,12 +18,13 @@ from procedures.core.errors import BadParameter
 router = APIRouter(prefix="/api/v1/audit", tags=["audit"])
 
 Expected = Annotated[
-    str | None, Query(pattern="^[0-9a-f]{64}$", description="Digest of an earlier check: it must still be there")
+    str | None,
+    Query(pattern="^[0-9a-f]{64}$", description="Digest of an earlier check, which must still be in the chain"),
 ]
 
 
 class CheckpointView(BaseModel):
-    """A closed stretch of the chain: its entries are gone, and the chain goes on from its digest."""
+    """A closed stretch of the chain: its entries are gone, and the chain continues from its digest."""
 
     first: int
     last: int
@@ -42,12 +43,12 @@ class CheckpointView(BaseModel):
 class ChainView(BaseModel):
     """The outcome of a check of the whole chain."""
 
-    whole: bool = Field(description="Whether no entry was changed, removed or put in between")
-    faults: list[str] = Field(description="What is wrong, by entry; at most 20")
+    whole: bool = Field(description="Whether no entry was changed, removed or inserted")
+    faults: list[str] = Field(description="Faults found, by entry; at most 20")
     entries: int = Field(description="Entries that were checked")
     sequence: int = Field(description="Place of the newest entry in the chain")
     digest: str = Field(
-        description="Digest of the newest entry: noted elsewhere, it shows later that all is still there"
+        description="Digest of the newest entry; kept elsewhere, it proves later that no entry is missing"
     )
     checkpoints: list[CheckpointView] = Field(description="Closed stretches, oldest first")
 
@@ -62,7 +63,7 @@ class ChainView(BaseModel):
 class Closing(Request):
     """Request to remove the entries whose retention has ended."""
 
-    before: AwareDatetime = Field(description="Entries before this moment go; a checkpoint stays in their place")
+    before: AwareDatetime = Field(description="Entries before this time are removed; a checkpoint replaces them")
 
 
 @router.get("/chain", responses=problems())

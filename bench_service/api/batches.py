@@ -33,12 +33,12 @@ class RecordingSelection(Request):
     """A query over complete recordings; all conditions that are given must hold."""
 
     unit: str | None = Field(None, max_length=100)
-    procedure: str | None = Field(None, max_length=100, description="Of the job that recorded")
+    procedure: str | None = Field(None, max_length=100, description="Procedure of the job that recorded")
     job: str | None = Field(None, max_length=100)
     simulated: bool | None = None
-    verdict: Verdict | None = Field(None, description="Of the job that recorded")
-    since: AwareDatetime | None = Field(None, description="Made at this moment or later; with its zone")
-    until: AwareDatetime | None = Field(None, description="Made before this moment; with its zone")
+    verdict: Verdict | None = Field(None, description="Verdict of the job that recorded")
+    since: AwareDatetime | None = Field(None, description="Created at this time or later, with time zone")
+    until: AwareDatetime | None = Field(None, description="Created before this time, with time zone")
     labels: list[LABEL] = Field(
         default_factory=list[str], max_length=20, description="`name` or `name=value` of the job; all must hold"
     )
@@ -62,7 +62,7 @@ class BatchView(BaseModel):
     calibrations: list[str]
     selection: dict[str, Any] = Field(description="The query as it was submitted; its recordings were fixed then")
     each: Grouping
-    priority: int = Field(description="Among batches, smaller first; every batch gives way to jobs on benches")
+    priority: int = Field(description="Order among batches, smaller first; jobs on benches go before every batch")
     requested_by: str
     created_at: datetime
     ended_at: datetime | None
@@ -95,7 +95,7 @@ class TaskView(BaseModel):
     worker: str
     claimed_at: datetime | None
     ended_at: datetime | None
-    not_before: datetime | None = Field(description="Its next attempt, after a failure that may pass")
+    not_before: datetime | None = Field(description="Earliest next attempt, after a failure that may pass")
     result: str | None
     failure: Failure | None
 

@@ -24,7 +24,7 @@ class TriadOfCertificate(BaseModel):
     triad: str
     stored: bool = Field(description="Whether this database has a calibration of that id and unit")
     same: bool | None = Field(description="Whether all coefficients are those stored; null: it is not stored here")
-    approval: str | None = Field(description="What people decided about it here; null: it is not stored here")
+    approval: str | None = Field(description="Approval in this service; null: the calibration is not stored here")
 
     @classmethod
     def of(cls, triad: CheckedTriad) -> "TriadOfCertificate":
@@ -35,11 +35,11 @@ class CheckedCertificate(BaseModel):
     """The outcome of a certificate's check."""
 
     valid: bool = Field(description="Signed by the owner of the laboratory's certificate, unchanged, and without fault")
-    signed_by: str | None = Field(description="Name in the laboratory's certificate; null: the signature does not hold")
+    signed_by: str | None = Field(description="Name in the laboratory's certificate; null: the signature is not valid")
     unchanged: bool = Field(description="Whether the text is as it was signed")
     unit: str | None
     calibrations: list[TriadOfCertificate]
-    faults: list[str] = Field(description="What is wrong; empty where it is valid")
+    faults: list[str] = Field(description="Faults found; empty where it is valid")
 
 
 @router.post("/check", responses=problems(413, 507))

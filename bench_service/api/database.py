@@ -24,7 +24,7 @@ class UpkeepView(BaseModel):
     by: str
     good: bool | None = Field(description="false where something is wrong; null while it has not ended")
     document: dict[str, Any] = Field(
-        description="Of a check: faults of the database, recordings checked, and each damaged chunk with its samples"
+        description="Report of a check: faults, number of recordings checked, each damaged chunk with its samples"
     )
 
     @classmethod
@@ -47,7 +47,7 @@ class DatabaseView(BaseModel):
     revision: str | None = Field(description="Revision of its tables")
     stored_bytes: int
     log_bytes: int | None = Field(description="Length of SQLite's write-ahead log")
-    free_bytes: int | None = Field(description="Room on the disk of an SQLite file")
+    free_bytes: int | None = Field(description="Free space on the disk of an SQLite file [bytes]")
     last_scrub: UpkeepView | None
     last_backup: UpkeepView | None
 

@@ -16,7 +16,7 @@ class Health(BaseModel):
     status: str = "ok"
     code_version: str
     notes: list[str] = Field(
-        default_factory=list[str], description="What a person should know: a stopped bench, a broken catalogue file"
+        default_factory=list[str], description="Notes for a person: a stopped bench, a broken catalogue file"
     )
 
 

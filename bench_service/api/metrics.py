@@ -59,12 +59,12 @@ class Snapshot(Collector):
         yield from self._jobs()
         yield from self._campaigns()
         yield from self._benches()
-        yield GaugeMetricFamily("bench_listeners", "Who listens to events of jobs here", self._hub.listeners)
+        yield GaugeMetricFamily("bench_listeners", "Listeners to events of jobs in this process", self._hub.listeners)
         dropped = "Listeners that were too slow and let go here"
         yield CounterMetricFamily("bench_listeners_dropped", dropped, self._hub.dropped)
         free = self._tallies.store.free_bytes()
         if free is not None:
-            yield GaugeMetricFamily("bench_free_disk_bytes", "Room on the disk of the database's file", free)
+            yield GaugeMetricFamily("bench_free_disk_bytes", "Free space on the disk of the database's file", free)
         yield GaugeMetricFamily(
             "bench_database_bytes", "Size of the database", self._service.upkeep.size().stored_bytes
         )
@@ -72,7 +72,11 @@ class Snapshot(Collector):
     def _jobs(self) -> Iterator[Metric]:
         tallies = self._tallies
         states = GaugeMetricFamily("bench_jobs", "Jobs by state", labels=["state"])
-        for state, count in self._service.stores.jobs.counts().items():
+        for state, count in self._service.stores.jobs.counts(
+            [state for state in JobState if state not in FINAL]
+        ).items():
+            states.add_metric([state.value], count)
+        for state, count in tallies.ended().items():
             states.add_metric([state.value], count)
         yield states
         labels = ["procedure", "state", "verdict"]

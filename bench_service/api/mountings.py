@@ -26,13 +26,16 @@ class MountingSubmission(Request):
     bench: Annotated[str, NAME] | None = Field(None, description="null: the bench of jobs that name none")
     plate: str = NAME
     azimuth_deg: float = Field(
-        ge=-360.0, le=360.0, allow_inf_nan=False, description="Heading of the unit's x at zero table angles, from north"
+        ge=-360.0,
+        le=360.0,
+        allow_inf_nan=False,
+        description="Heading of the unit's x at zero table angles, from north [deg]",
     )
     azimuth_sd_arcsec: float = Field(
         ge=0.0, le=3600.0, allow_inf_nan=False, description="Standard uncertainty of that reading"
     )
     mounted_at: AwareDatetime | None = Field(None, description="null: now")
-    instrument: str = Field("", max_length=200, description="Theodolite and prism")
+    instrument: str = Field("", max_length=200, description="Instrument of the reading: theodolite and prism")
     by: By | None = None
     remark: str = Field("", max_length=500)
 
@@ -50,8 +53,8 @@ class MountingView(BaseModel):
     unit: str
     bench: str
     plate: str
-    by: str = Field(description="Who mounted it")
-    proven: bool = Field(description="Whether the service knows the person by a log-in; else the name was declared")
+    by: str = Field(description="Person who mounted it")
+    proven: bool = Field(description="Whether the person was authenticated; else the name was declared")
     mounted_at: datetime
     entered_at: datetime
     azimuth_deg: float
@@ -105,9 +108,9 @@ def enter_mounting(
 @router.get("", responses=problems())
 def list_mountings(
     service: Service,
-    unit: Annotated[str | None, Query(max_length=100, description="Only those of this unit")] = None,
-    bench: Annotated[str | None, Query(max_length=100, description="Only those on this bench")] = None,
-    standing: Annotated[bool, Query(description="Only those that stand")] = False,
+    unit: Annotated[str | None, Query(max_length=100, description="Only mountings of this unit")] = None,
+    bench: Annotated[str | None, Query(max_length=100, description="Only mountings on this bench")] = None,
+    standing: Annotated[bool, Query(description="Only mountings that are in place")] = False,
     after: After = None,
     limit: Limit = 50,
 ) -> MountingPage:

@@ -55,7 +55,7 @@ class Preview(BaseModel):
     duration_s: float
     data_bytes: int
     predicted_uncertainties: list[PredictedUncertainty]
-    basis: str = Field(description="What the prediction rests on: a calibration, or nominal scale factors")
+    basis: str = Field(description="Basis of the prediction: a calibration, or nominal scale factors")
     warnings: list[str]
     violations: list[str]
 

@@ -49,19 +49,21 @@ class RecordingView(BaseModel):
     duration_s: float
     start_s: float
     launched_s: float | None = Field(description="Bench time at which the unit was switched on; null: not known")
-    measured: Measured | None = Field(description="Means of encoders and supply meanwhile; null: they were not read")
+    measured: Measured | None = Field(
+        description="Means of encoders and supply during the recording; null: they were not read"
+    )
     content_hash: str = Field(description="SHA-256 of samples and channel description, whatever the chunks")
     simulated: bool
     stored_bytes: int
     chunks: int
     created_at: datetime
     raw: RawState = Field(description="Where the raw samples are; `removed`: reading them answers 410")
-    raw_changed_at: datetime | None = Field(description="When they came there; null: never moved")
+    raw_changed_at: datetime | None = Field(description="When the samples were moved there; null: never moved")
     source: dict[str, Any] = Field(
-        description="Of an import: files, description, and `clock`, what its stamps say. Of a bench with a bench file: "
+        description="Import: files, description, and `clock`, what its stamps say. Bench with a bench file: "
         "`origin` (real, mixed or simulated) and `devices`, with identities and certificates"
     )
-    warnings: list[str] = Field(description="Of an import: what was found in the file that a person should know")
+    warnings: list[str] = Field(description="Findings of the import that a person should know")
     results: list[str] | None = Field(None, description="Results that used it; only where one recording is asked for")
 
     @classmethod
@@ -94,7 +96,9 @@ DATA: dict[int | str, dict[str, object]] = {
 def list_recordings(
     service: Service,
     search: Searched,
-    job: Annotated[str | None, Query(max_length=100, description="Of this job: its id, or its number")] = None,
+    job: Annotated[
+        str | None, Query(max_length=100, description="Only recordings of this job, by id or number")
+    ] = None,
     unit: Annotated[str | None, Query(max_length=100)] = None,
     simulated: bool | None = None,
     after: After = None,
@@ -121,7 +125,9 @@ async def read_data(
     service: Service,
     form: Annotated[ExportFormat, Query(alias="format")] = ExportFormat.ARROW,
     channels: Annotated[str | None, Query(max_length=4000, description="Names, separated by commas")] = None,
-    start_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="From the first sample")] = None,
+    start_s: Annotated[
+        float | None, Query(ge=0, allow_inf_nan=False, description="Time from the first sample [s]")
+    ] = None,
     stop_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="Not included")] = None,
 ) -> StreamingResponse:
     """Stream the raw samples, whole or by channel and time; none are held in memory, however long the recording.
@@ -181,7 +187,9 @@ def read_overview(
     recording_id: str,
     service: Service,
     channels: Annotated[str | None, Query(max_length=4000, description="Names, separated by commas")] = None,
-    start_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="From the first sample")] = None,
+    start_s: Annotated[
+        float | None, Query(ge=0, allow_inf_nan=False, description="Time from the first sample [s]")
+    ] = None,
     stop_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="Not included")] = None,
     bins: Annotated[int, Query(ge=1, le=5000)] = 800,
 ) -> OverviewView:

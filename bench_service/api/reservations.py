@@ -21,10 +21,10 @@ router = APIRouter(prefix="/api/v1/reservations", tags=["reservations"])
 class ReservationSubmission(Request):
     """Request to reserve a bench or a unit: until when, and for whom."""
 
-    bench: Annotated[str, NAME] | None = Field(None, description="Either this, or `unit`")
+    bench: Annotated[str, NAME] | None = Field(None, description="Bench to reserve; give either this or `unit`")
     unit: Annotated[str, NAME] | None = None
     holder: str = NAME
-    until: AwareDatetime | None = Field(None, description="Either this, or `minutes`")
+    until: AwareDatetime | None = Field(None, description="End of the reservation; give either this or `minutes`")
     minutes: float | None = Field(None, gt=0, le=LONGEST / timedelta(minutes=1), allow_inf_nan=False)
     note: str = Field("", max_length=500)
 
@@ -48,7 +48,7 @@ class ReservationView(BaseModel):
     created_at: datetime
     until: datetime
     ended_at: datetime | None = Field(description="When it was given back before its time")
-    active: bool = Field(description="Whether it holds now")
+    active: bool = Field(description="Whether it is active now")
 
     @classmethod
     def of(cls, kept: Reservation) -> "ReservationView":
@@ -91,7 +91,7 @@ def reserve(
 @router.get("", responses=problems())
 def list_reservations(
     service: Service,
-    active: Annotated[bool, Query(description="Only those that hold now")] = False,
+    active: Annotated[bool, Query(description="Only reservations that are active now")] = False,
     after: After = None,
     limit: Limit = 50,
 ) -> ReservationPage:

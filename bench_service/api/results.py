@@ -149,7 +149,7 @@ def list_results(
     service: Service,
     search: Searched,
     unit: Annotated[str | None, Query(max_length=100)] = None,
-    name: Annotated[str | None, Query(max_length=100, description="Of the procedure or method")] = None,
+    name: Annotated[str | None, Query(max_length=100, description="Name of the procedure or method")] = None,
     after: After = None,
     limit: Limit = 50,
 ) -> ResultPage:

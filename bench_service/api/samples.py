@@ -66,7 +66,9 @@ async def read_samples(
     corrected_by: CorrectedBy = None,
     decimate: Decimate = 1,
     channels: Annotated[str | None, Query(max_length=4000, description="Names, separated by commas")] = None,
-    start_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="From the first sample")] = None,
+    start_s: Annotated[
+        float | None, Query(ge=0, allow_inf_nan=False, description="Time from the first sample [s]")
+    ] = None,
     stop_s: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="Not included")] = None,
 ) -> StreamingResponse:
     """Stream a recording's samples with a column of time, in SI with units in the names, or raw.

@@ -19,12 +19,12 @@ router = APIRouter(prefix="/api/v1", tags=["health"])
 class StorageView(BaseModel):
     """The size of the database, where raw data are, how they grow, and how large the database will be."""
 
-    stored_bytes: int = Field(description="Of the database")
-    reusable_bytes: int | None = Field(description="Room inside an SQLite file that removed data left: used first")
-    free_bytes: int | None = Field(description="Room on the disk of an SQLite file")
+    stored_bytes: int = Field(description="Size of the database [bytes]")
+    reusable_bytes: int | None = Field(description="Free space inside the SQLite file, used first [bytes]")
+    free_bytes: int | None = Field(description="Free space on the disk of an SQLite file [bytes]")
     raw: dict[RawState, Share] = Field(description="Recordings and their bytes by where the raw data are")
-    growth: Growth = Field(description="Of the last 30 days, or since the first recording")
-    predicted: list[Prediction] = Field(description="Without and with the rules below")
+    growth: Growth = Field(description="Mean growth of the last 30 days, or since the first recording")
+    predicted: list[Prediction] = Field(description="Predicted sizes without and with the rules below")
     full_at: datetime | None = Field(description="When the disk is full; null: not within ten years, or not known")
     remove_days: float | None = Field(description="BENCH_RAW_DAYS")
     archive_days: float | None = Field(description="BENCH_ARCHIVE_DAYS")
@@ -40,16 +40,16 @@ class RuleRequest(Request):
     """Request to apply a rule to raw data."""
 
     days: float | None = Field(None, gt=0, le=36_525, description="Age in days; null: as the settings say")
-    dry_run: bool = Field(True, description="Only say what would go")
+    dry_run: bool = Field(True, description="true: only report what would be removed")
 
 
 class PlanView(BaseModel):
     """The recordings that a rule concerns, and what was done."""
 
     days: float
-    before: datetime = Field(description="Recordings made before this moment are old enough")
-    recordings: list[str] = Field(description="The first 200 of them")
-    stored_bytes: int = Field(description="Bytes of all that the rule concerns")
+    before: datetime = Field(description="Recordings created before this time are old enough")
+    recordings: list[str] = Field(description="The first 200 recordings of the plan")
+    stored_bytes: int = Field(description="Bytes of all recordings that the rule concerns")
     kept: dict[Keeping, int] = Field(description="Number of recordings that are old enough and kept, by the reason")
     done: int = Field(description="Recordings whose raw data went; 0 of a dry run")
     done_bytes: int

@@ -55,6 +55,8 @@ class DrivenBench:
         self._stopped = threading.Event()
         self._under_way: Future[Any] | None = None
         """The work that is under way."""
+        self._beginning = threading.Lock()
+        """Held while work begins and while a stop looks for it: none begins after a stop has looked."""
         self._safety = threading.Lock()
         """Held while the bench is made safe or the session ended, by the job's own thread or by a stopping one."""
         self._is_safe = False
@@ -67,11 +69,12 @@ class DrivenBench:
 
     def _run(self, work: Coroutine[Any, Any, T]) -> T:
         """Run work in the bench's thread and wait for its end. Raises `Stopped`, `Disconnected`, `ShuttingDown`."""
-        if self._stopped.is_set():
-            work.close()
-            raise Stopped(STOPPED)
-        under_way = asyncio.run_coroutine_threadsafe(work, self._loop)
-        self._under_way = under_way
+        with self._beginning:
+            if self._stopped.is_set():
+                work.close()
+                raise Stopped(STOPPED)
+            under_way = asyncio.run_coroutine_threadsafe(work, self._loop)
+            self._under_way = under_way
         try:
             return self._wait(under_way)
         except CancelledError:  # by `stop`
@@ -91,8 +94,9 @@ class DrivenBench:
         It waits only for the work to unwind, at most `UNWIND_S`: neither for a database nor for the job's own
         thread, which may hang in one.
         """
-        self._stopped.set()
-        under_way = self._under_way
+        with self._beginning:
+            self._stopped.set()
+            under_way = self._under_way
         if under_way is not None:
             self._cancel(under_way, "a stop came while a device or the database did not answer")
 
@@ -180,13 +184,17 @@ class DrivenBench:
     def _cancel(self, future: "Future[Any]", why: str) -> None:
         """Cancel a coroutine on the bench's loop and wait until it has unwound, or is lost."""
         future.cancel()
+        unwound = self._unwound()
         try:
-            asyncio.run_coroutine_threadsafe(self._unwound(), self._loop).result(UNWIND_S)
+            waiting = asyncio.run_coroutine_threadsafe(unwound, self._loop)
+        except RuntimeError:  # another thread has ended the session, and its loop every task
+            unwound.close()
+            return
+        try:
+            waiting.result(UNWIND_S)
         except TimeoutError:
             self._lost = why
-            log.error(
-                "%s, bench %s: %s, and its driver does not come back", self._name, self._bench.description.id, why
-            )
+            log.error("%s, bench %s: %s, and its driver does not return", self._name, self._bench.description.id, why)
 
     async def _unwound(self) -> None:
         """Wait for every task of the bench's loop but those that wait here: two stops would wait for each other."""
@@ -201,5 +209,7 @@ class DrivenBench:
     async def _make_safe(self) -> None:
         try:
             await self._leave()
+        except Exception:  # a defect in the procedure's own ending says nothing of the devices
+            log.exception("%s: its procedure's step could not be left in order", self._name)
         finally:
             await self._bench.make_safe()

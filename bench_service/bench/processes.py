@@ -32,7 +32,7 @@ class ProcessIdentity:
         return self.host == HOST
 
     def alive(self) -> bool:
-        """Return whether the process lives; a process of another host cannot be checked, and counts as dead."""
+        """Return whether the process is alive; a process of another host cannot be checked, and counts as dead."""
         return self.here and self.started != "" and _started(self.pid) == self.started
 
     def kill(self) -> bool:
@@ -70,7 +70,7 @@ class Watch(Protocol):
         ...
 
     def supervisor(self) -> ProcessIdentity | None:
-        """The process that supervises the bench on this host, if one lives."""
+        """The process that supervises the bench on this host, if one is alive."""
         ...
 
 

@@ -70,7 +70,7 @@ class AskedOperator:
         self._then = then
 
     async def set_by_hand(self, angles: TableAngles, request: str) -> None:
-        """Send the request, and wait for the answer without a limit. Raises `Stopped` where the person refuses."""
+        """Ask the person to set the unit, and wait without a limit. Raises `Stopped` where the person refuses."""
         wanted = (angles.outer_deg, angles.middle_deg, angles.inner_deg)
         self._prompts.ask(self._job_id, Prompt(new_id(), request, now(), wanted))
         try:

@@ -33,9 +33,9 @@ class Safety:
     """Explanation for a person, in whole sentences."""
     devices: DeviceState | None
     worker: ProcessIdentity | None
-    """The process of this host that drives the bench, if one lives."""
+    """The process of this host that drives the bench, if one is alive."""
     supervisor: ProcessIdentity | None
-    """The process of this host that supervises it, if one lives."""
+    """The process of this host that supervises it, if one is alive."""
 
 
 class SafetyService:
@@ -164,9 +164,9 @@ def _here(bench_id: str, state: DeviceState, worker: ProcessIdentity | None, sup
     if worker is not None and state.linked:
         return f"{unsafe} The worker, {worker}, drives them."
     if supervisor is not None:
-        return f"{unsafe} Nobody drives them; the supervisor, {supervisor}, makes them safe."
+        return f"{unsafe} No worker drives them; the supervisor, {supervisor}, makes them safe."
     if worker is not None:
-        return f"{unsafe} The worker, {worker}, has given them up; a release tries again."
+        return f"{unsafe} The worker, {worker}, has abandoned them; a release tries again."
     return (
         f"{unsafe} On this host neither a worker nor a supervisor of bench {bench_id!r} is alive: start one, or use "
         "the hardware emergency stop."
@@ -179,6 +179,6 @@ def _elsewhere(bench_id: str, stops: tuple[BenchStop, ...]) -> tuple[bool | None
         stop, seen = stops[-1], max(stop.safe_at for stop in stops if stop.safe_at is not None)
         return True, f"Seen safe on the bench's host at {seen.isoformat()}, last commanded by {stop.safe_by}."
     return None, (
-        f"The devices of bench {bench_id!r} are not on this host, and nobody on theirs has said that they are safe: "
-        "whether a worker or a supervisor is alive there is not known here."
+        f"The devices of bench {bench_id!r} are not on this host, and no process there has reported that they are "
+        "safe: whether a worker or a supervisor is alive there is not known here."
     )

@@ -201,7 +201,7 @@ class Supervisor:
         again = self._watch.driving()
         try:
             if again is None or not again.alive:  # else a process took the bench this moment, and makes it safe itself
-                self._try(now_s, f"{driving.process} is gone" if driving else "nobody drives the bench", state)
+                self._try(now_s, f"{driving.process} is gone" if driving else "no process drives the bench", state)
         finally:
             if lease is not None:
                 lease.release()
@@ -228,7 +228,7 @@ class Supervisor:
         self._told_not_safe, self._first_try_s = False, None
 
     def _not_safe(self, why: str, state: DeviceState) -> None:
-        """Stop the bench until a person has looked. Reported once, though the attempts go on."""
+        """Stop the bench until a person has looked. Reported once, though the attempts continue."""
         if self._told_not_safe:
             return
         self._unsaid_stop = why

@@ -59,7 +59,7 @@ class WorkerPatience:
     def _why(self, name: str) -> str:
         limit_s = self._limits_s[name]
         return {
-            "unanswered": f"left a stop unanswered for {limit_s:g} s",
-            "hung": f"has seen a stop and not made the bench safe within {limit_s:g} s",
+            "unanswered": f"did not answer a stop for {limit_s:g} s",
+            "hung": f"has seen a stop and has not made the bench safe within {limit_s:g} s",
             "silent": f"gave no heartbeat for {limit_s:g} s",
         }[name]

@@ -132,7 +132,7 @@ class Step(Document):
         if self.method is not None and not (self.calibrations_of or self.recordings_of):
             raise ValueError("a method needs calibrations_of or recordings_of")
         if self.method is not None and self.trends:
-            raise ValueError("trends are of procedures")
+            raise ValueError("only a step with a procedure has trends")
         return self
 
 
@@ -167,7 +167,7 @@ class Campaign(Document):
     labels: Labels = Field(default_factory=Labels, max_length=20)
     decision: DecisionRule = Field(default_factory=lambda: DecisionRule.model_validate({}))
     seeds: Seeds = Field(default_factory=lambda: Seeds.model_validate({}))
-    priority: int = Field(10, ge=1, le=1000, description="of its jobs; smaller runs first")
+    priority: int = Field(10, ge=1, le=1000, description="priority of its jobs; smaller runs first")
 
     @model_validator(mode="after")
     def _names(self) -> Self:
@@ -178,11 +178,11 @@ class Campaign(Document):
             for field in ("calibrations_of", "recordings_of"):
                 for position, other in enumerate(getattr(step, field)):
                     if other not in known:
-                        allowed = f"an earlier step is needed, there is {', '.join(known) or 'none'}"
+                        allowed = f"an earlier step is needed; there is {', '.join(known) or 'none'}"
                         raise _fault(("steps", index, field, position), other, allowed)
             for position, gate in enumerate(step.gates):
                 if gate.step not in known:
-                    allowed = f"an earlier step is needed, there is {', '.join(known) or 'none'}"
+                    allowed = f"an earlier step is needed; there is {', '.join(known) or 'none'}"
                     raise _fault(("steps", index, "gates", position, "step"), gate.step, allowed)
             known.append(step.name)
         return self

@@ -103,7 +103,7 @@ class Conductor:
             try:
                 self.advance(run.id)
             except ServiceError as error:
-                log.warning("campaign run %s cannot go on yet: %s", run.id, error)
+                log.warning("campaign run %s cannot continue yet: %s", run.id, error)
         return bool(runs)
 
     def advance(self, run_id: str) -> None:
@@ -132,7 +132,7 @@ class Conductor:
             try:
                 busy = self.look()
             except ServiceError as error:
-                log.warning("campaigns cannot go on yet: %s", error)
+                log.warning("campaigns cannot continue yet: %s", error)
             except Exception:  # a defect must not end all campaigns; the next look tries again
                 log.exception("conducting campaigns failed")
 
@@ -239,7 +239,7 @@ class Conductor:
             return transitions.out_of_time(run, at)
         why = "" if job.failure is None else f"{job.failure.kind}: {job.failure.message}"
         if job.state is JobState.CANCELLED:
-            stopped = self._stores.benches.bench_stop(run.bench) is not None  # it may go on once that is released
+            stopped = self._stores.benches.bench_stop(run.bench) is not None  # it may continue once that is released
             said = f"job {job.id} was cancelled" + (" when the bench was stopped" if stopped else "")
             return transitions.failed(run, index, StepState.CANCELLED, said, at, final=not stopped)
         kind = f"job {job.id} {job.state.value}: "
@@ -292,4 +292,4 @@ def key_of(run: CampaignRun, index: int) -> str:
 
 
 def _stopped(bench: str, stops: Sequence[BenchStop]) -> str:
-    return f"bench {bench} is stopped until somebody releases it: {reasons_of(stops)}"
+    return f"bench {bench} is stopped until a person releases it: {reasons_of(stops)}"

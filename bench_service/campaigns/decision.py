@@ -7,16 +7,16 @@ from dataclasses import replace
 
 from bench_service.campaigns.campaign import DecisionRule, StepLimit
 from procedures.core import limits
-from procedures.core.limits import Check, Rule, RuleName, coverage_factor
+from procedures.core.limits import Check, Rule, coverage_factor
 from procedures.parameters import DecisionRules
 
 
-def decided(check: Check, rule: DecisionRule, own: RuleName | None = None) -> Check:
-    """The check under the campaign's rule, or under its limit's `own`, with the decision in its note.
+def decided(check: Check, rule: DecisionRule) -> Check:
+    """The check under the rule of a campaign or of one of its limits (`rule_of`), with the decision in its note.
 
     A value that is not finite stays a fail.
     """
-    made = limits.decided(check, Rule(own or rule.rule, rule.guard, coverage_factor=rule.coverage_factor))
+    made = limits.decided(check, Rule(rule.rule, rule.guard, coverage_factor=rule.coverage_factor))
     said = "" if made.decision is None else made.decision.sentence
     return replace(made, note="; ".join(text for text in (made.note, said) if text))
 
@@ -44,7 +44,7 @@ def in_words(rule: DecisionRule) -> str:
         "(Bonferroni)"
     )
     if rule.rule == "simple":
-        told = f"simple acceptance: a value passes at its limit; U = k·u is told with k = {rule.coverage_factor:g}"
+        told = f"simple acceptance: a value passes at its limit; U = k·u is stated with k = {rule.coverage_factor:g}"
         return told + stated
     band = f"{rule.guard:g}·U, U = k·u with k = {rule.coverage_factor:g}"
     return f"guarded acceptance on the campaign's own limits: a value passes within its limit by {band}{stated}"

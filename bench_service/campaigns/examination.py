@@ -72,6 +72,12 @@ def _require_stated(rule: DecisionRule, levels: Sequence[float]) -> None:
         raise BadParameter("decision.false_alarm", stated, f"{enough} ({way_out})")
 
 
+def _previews(planned: Sequence[PlannedCheck], params: Any) -> list[LimitPreview]:
+    """Foresee a procedure's or method's own checks, by the decision rules of its parameters where it has some."""
+    rules = getattr(params, "decision", None)
+    return [preview(one, rule_of_check(rules, one.check)) for one in planned]
+
+
 _CORRECTED = "predicted without the share of the thermal correction, which an earlier step is to give"
 _EXPECTED = "predicted with the calibration that earlier steps are to give, at nominal scale factors"
 
@@ -153,7 +159,7 @@ class Examiner:
             progress.calibrating.add(step.name)
         params, record = method.params.model_validate(step.parameters), self._planner.context(unit, bench).unit
         checks = method.planned_checks(params, record, progress.plans_of(step.calibrations_of))
-        limits = tuple(preview(one, rule_of_check(getattr(params, "decision", None), one.check)) for one in checks)
+        limits = tuple(_previews(checks, params))
         coarse = (
             f"{one.check}: the limit of {one.maximum:g} {one.unit} cannot be resolved, U = "
             f"{one.expanded_uncertainty:.3g} {one.unit}"
@@ -192,10 +198,7 @@ class Examiner:
             progress.planned[step.name] = prediction.uncertainties
         if procedure.corrections is not NO_CORRECTIONS:
             progress.correcting.add(step.name)
-        checks = [
-            preview(one, rule_of_check(getattr(plan.parameters, "decision", None), one.check))
-            for one in procedure.planned_checks(plan.parameters, plan.context)
-        ]
+        checks = _previews(procedure.planned_checks(plan.parameters, plan.context), plan.parameters)
         checks += [
             preview(_of_campaign(limit, prediction.uncertainties), rule_of(limit, rule)) for limit in step.limits
         ]

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from bench_service.campaigns.campaign import Campaign, Step, StepLimit, TrendRule
-from bench_service.campaigns.decision import decided
+from bench_service.campaigns.decision import decided, rule_of
 from bench_service.campaigns.stores import Stores
 from bench_service.evidence.trend import trend_of, value_of
 from bench_service.model.errors import NotFound
@@ -76,7 +76,7 @@ def _limited(limit: StepLimit, campaign: Campaign, document: dict[str, Any]) -> 
     wanted = Limit(limit.unit, limit.maximum, limit.minimum, source)
     uncertainty = None if found.standard_uncertainty is None else found.standard_uncertainty * size
     made = check(f"{limit.quantity}, campaign's limit", found.value * size, wanted, uncertainty)
-    return decided(made, campaign.decision, limit.rule)
+    return decided(made, rule_of(limit, campaign.decision))
 
 
 def _trend(rule: TrendRule, result: StoredResult, stores: Stores) -> tuple[list[Check], list[str]]:

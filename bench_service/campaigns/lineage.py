@@ -59,7 +59,7 @@ def lineage_of(run: CampaignRun, stores: Stores) -> tuple[StepLineage, ...]:
 
 
 def failed_calibrations(run: CampaignRun, index: int, stores: Stores) -> str:
-    """The calibrations of earlier steps that failed and so do not count, in words; empty where there is none."""
+    """The calibrations of earlier steps that failed and so do not count, as a sentence; empty where there is none."""
     failed = {s.result_id: s.name for s in run.steps[:index] if s.verdict is not Verdict.PASS and s.result_id}
     gave = stores.calibrations.of_results(list(failed))
     names = dict.fromkeys(failed[c.result_id] for c in gave if c.result_id)

@@ -93,7 +93,7 @@ def beyond(planned: PlannedCheck, true: float, limit: float) -> float:
 def smallest_step(planned: PlannedCheck, power: float, of: int) -> float:
     """Smallest step of one of `of` launches against the others that a scatter between launches finds out so surely.
 
-    The scatter s² of n values, of which one lies δ beside the rest, is noncentral: ``(n − 1)·s²/σ²`` has the
+    The scatter s² of n values, of which one lies δ away from the rest, is noncentral: ``(n − 1)·s²/σ²`` has the
     noncentrality ``δ²(n − 1)/(n·σ²)``, σ² = expected² + u². The step is found by bisection, in the limit's unit.
     """
     from scipy.special import chndtr

@@ -87,7 +87,7 @@ def starts_after(cron: str, time_zone: str, moment: datetime) -> Iterator[dateti
     try:
         found = CronSim(cron, local.replace(tzinfo=None, fold=0) if _at_fixed_times(cron) else local)
     except CronSimError as error:
-        raise BadParameter("cron", cron, f"no cron expression that can ever be due: {error}") from None
+        raise BadParameter("cron", cron, f"a valid cron expression, which this is not: {error}") from None
     shown = (_moment_shown(start, zone) if start.tzinfo is None else start.astimezone(UTC) for start in found)
     return _rising(shown, moment)
 
@@ -130,7 +130,7 @@ def next_start(cron: str, time_zone: str, moment: datetime) -> datetime:
     """The first start after a moment, in UTC. Raises `BadParameter` for an expression not due within 50 years."""
     start = next(starts_after(cron, time_zone, moment), None)
     if start is None:
-        raise BadParameter("cron", cron, "a time that comes: this one is not due within 50 years")
+        raise BadParameter("cron", cron, "an expression that is due within 50 years")
     return start
 
 

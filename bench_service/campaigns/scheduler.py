@@ -88,7 +88,9 @@ class Scheduler:
         try:
             return self.get(schedule_id)
         except NotFound as error:
-            raise IdempotencyConflict(f"this key made schedule {schedule_id}, which was removed since") from error
+            raise IdempotencyConflict(
+                f"the idempotency key belongs to schedule {schedule_id}, which has been removed"
+            ) from error
 
     def enable(self, schedule_id: str, enabled: bool) -> Schedule:
         """Switch a schedule on or off; starts that passed while it was off are not made up. Raises `NotFound`."""

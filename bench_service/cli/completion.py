@@ -21,7 +21,7 @@ def prepare() -> None:
     completion_init()
 
 
-def completion(shell: Annotated[Shell, typer.Argument(help="The shell that is to complete")]) -> None:
+def completion(shell: Annotated[Shell, typer.Argument(help="Shell to write the completion for")]) -> None:
     """Print a script for completion: eval "$(bench completion bash)"."""
     from typer._completion_shared import get_completion_script
 

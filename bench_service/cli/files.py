@@ -29,7 +29,7 @@ def clear_place(file: Path) -> None:
     check_folder(file)
     try:
         if file.exists() and not file.is_file():
-            raise Refused(f"{file} cannot be written: it is no ordinary file")
+            raise Refused(f"{file} cannot be written: it is not an ordinary file")
         file.unlink(missing_ok=True)
     except OSError as error:
         raise Refused(f"an old {file} cannot be removed: {error.strerror}") from error

@@ -20,7 +20,8 @@ errors = Console(stderr=True, markup=False, emoji=False)
 
 Server = Annotated[str | None, typer.Option(help="Address of a service; without it, work in this process")]
 BenchFile = Annotated[
-    Path | None, typer.Option("--bench-file", dir_okay=False, help="Bench file of the bench; else that of the settings")
+    Path | None,
+    typer.Option("--bench-file", dir_okay=False, help="Bench file of the bench; default: the one in the settings"),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables")]
 Limit = Annotated[int, typer.Option(min=1, help="How many")]
@@ -85,7 +86,7 @@ def key_or_new(key: str | None) -> str:
     if key is None:
         return new_id()
     if not (key.isascii() and key.isprintable() and key):
-        raise Refused(f"--key {key!r}: letters, digits and signs of ASCII are needed")
+        raise Refused(f"--key {key!r}: only printable ASCII characters are allowed")
     return key
 
 
@@ -94,11 +95,11 @@ def named(by: str | None) -> dict[str, str]:
     if by is None:
         return {}
     if not (by.isprintable() and by.strip()):
-        raise Refused(f"--by {by!r}: a name in one line is needed")
+        raise Refused(f"--by {by!r}: a name without line breaks is needed")
     try:
         by.encode("latin-1")
     except UnicodeEncodeError as error:
-        raise Refused(f"--by {by!r}: a header holds Latin letters only") from error
+        raise Refused(f"--by {by!r}: only Latin letters are allowed") from error
     return {"X-Requested-By": by}
 
 

@@ -2,11 +2,11 @@
 
 
 class BadAnswer(ValueError):
-    """An answer that is none of the protocol: cut, garbled, or to another question. The line is out of step."""
+    """An answer that is none of the protocol: cut, garbled, or to another request. The line is out of step."""
 
 
 class Refusal(Exception):
-    """The device understood the question and said no; the message has its words or its code."""
+    """The device understood the request and said no; the message has its words or its code."""
 
 
 def shown(data: bytes, longest: int = 60) -> str:

@@ -35,7 +35,7 @@ class FaultRule(BaseModel):
     @model_validator(mode="after")
     def _only_a_lost_link_lasts(self) -> "FaultRule":
         if self.lasts_s is not None and self.kind != "lost":
-            raise ValueError(f"lasts_s is said of a lost link, not of kind {self.kind!r}")
+            raise ValueError(f"lasts_s applies to a lost link only, not to kind {self.kind!r}")
         return self
 
 
@@ -78,9 +78,9 @@ class DeviceFaults:
                 if rule.kind == "hang":
                     Event().wait(HANG_S)
                 if rule.kind == "fault":
-                    raise DeviceFault(f"{verb} {json.dumps(dict(arguments))}: a fault put in for an exercise")
+                    raise DeviceFault(f"{verb} {json.dumps(dict(arguments))}: an injected fault")
                 if rule.kind == "lost":
                     device = verb.partition(".")[0]
-                    self._cables.cut(device, "put in for an exercise", rule.lasts_s)
+                    self._cables.cut(device, "an injected fault", rule.lasts_s)
                     self._cables.need(device)
-                raise Disconnected(f"{verb}: no link, put in for an exercise")
+                raise Disconnected(f"{verb}: the link is lost, an injected fault")

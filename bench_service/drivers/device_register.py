@@ -1,6 +1,6 @@
 """Register of a simulated bench's devices: the state that real devices keep themselves, and a link for one master.
 
-A real table goes on moving when the process that commanded it dies, and can be asked afterwards. A simulated table
+A real table keeps moving when the process that commanded it dies, and can be asked afterwards. A simulated table
 dies with its process, so what was commanded last is kept in a file next to the database. The file's lock is the link:
 the kernel gives it to one process and takes it back at its death.
 """
@@ -79,11 +79,11 @@ class DeviceLink:
         """Write a demand on the devices, and the state that it leads to. Raises `Disconnected` once it is closed."""
         with self._mutex:
             if self._file is None:
-                raise Disconnected(f"{verb}: this process has given up the devices' link")
+                raise Disconnected(f"{verb}: this process has closed its link to the devices")
             self._note(self._file, verb, arguments, changes)
 
     def close(self) -> None:
-        """Release the link; a second call does nothing. A device that still moves goes on moving."""
+        """Release the link; a second call does nothing. A device that still moves keeps moving."""
         with self._mutex:
             if self._file is not None:
                 self._note(self._file, "link.closed", {}, {"linked": False})

@@ -100,7 +100,7 @@ def _agree_on_frames(file: BenchFile, bench: ServedBench) -> None:
 
 
 async def serve(bench: ServedBench, ended: Callable[[], bool], say: Callable[[str], object], look_s: float) -> None:
-    """Open the ports, let the world go on until `ended`, close. Raises `Misconfigured` for a port that is taken."""
+    """Open the ports, let the world continue until `ended`, close. Raises `Misconfigured` for a port that is taken."""
     try:
         numbers = await bench.open()
     except OSError as error:

@@ -8,7 +8,7 @@ from procedures.core.unit import TriadRecord, Unit
 
 
 def write_unit_file(folder: Path, unit: Unit) -> Path | None:
-    """Write ``units/<serial>.toml`` beside a bench file whose `units` folder is empty; None: it has units already."""
+    """Write ``units/<serial>.toml`` next to a bench file whose `units` folder is empty; None: it has units already."""
     place = folder / "units"
     if any(place.glob("*.toml")):
         return None

@@ -165,7 +165,9 @@ class SimulatedDriver:
     def make_safe(self, by: str) -> DeviceState:
         """Open the devices over the register, without a world. Raises `DeviceBusy`; `BenchError` without register."""
         if self._register is None:
-            raise BenchError("this bench keeps no register of its devices: only the job that drives it can stop them")
+            raise BenchError(
+                "this bench has no device register: only the job that drives the bench can stop its devices"
+            )
         return RegisteredDevices(self._register).make_safe(by)
 
     def truth(self, unit: str, seed: int) -> tuple[TrueTriad, ...]:

@@ -7,7 +7,7 @@ class WallBenchClock:
     """Implements `procedures.bench.clock.Clock` by real time, or by that of served simulators at a time factor."""
 
     def __init__(self, passed_s: float = 0.0, factor: float = 1.0) -> None:
-        """Begin at a bench time [s]: 0 for a job's first launch, later for one that goes on after a restart.
+        """Begin at a bench time [s]: 0 for a job's first launch, later for one that continues after a restart.
 
         `factor`: bench seconds in a real second; 1 with any real device.
         """

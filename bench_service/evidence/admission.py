@@ -48,10 +48,10 @@ class Places:
             full = len(self._taken) >= self._most
             heavy = bool(self._taken) and sum(self._taken) + wanted_bytes > self._most_bytes
             if full or heavy:
-                raise Overloaded(f"{len(self._taken)} {self._what} are under way already: ask again later")
+                raise Overloaded(f"{len(self._taken)} {self._what} are running already: try again later")
             available = available_bytes()
             if available is not None and available < SPARE_BYTES + wanted_bytes:
-                raise Overloaded(f"the machine is short of memory for {self._what}: ask again later")
+                raise Overloaded(f"the machine has too little free memory for {self._what}: try again later")
             self._taken.append(wanted_bytes)
         given_back = [False]
 
@@ -77,7 +77,7 @@ class Turns:
     async def run(self, work: Callable[..., Any], *arguments: Any) -> Any:
         """Run the work in a thread once it is its turn. Raises `Overloaded`, and its errors."""
         if self._inside >= self._most:
-            raise Overloaded(f"{self._inside} {self._what} are worked on or wait already: ask again later")
+            raise Overloaded(f"{self._inside} {self._what} are running or waiting already: try again later")
         self._inside += 1
         try:
             return await to_thread.run_sync(work, *arguments, limiter=self._limiter)

@@ -74,7 +74,7 @@ def _belongs(one: TriadExport, all_of_them: Sequence[TriadExport], asked: str) -
 def _of_unit(stores: EvidenceStores, unit: str, calibration_id: str) -> StoredCalibration:
     stored = stores.calibrations.get(calibration_id)
     if stored.unit != unit:
-        raise NotFound("calibration", calibration_id, f"unit {unit} has none of that id")
+        raise NotFound("calibration", calibration_id, f"unit {unit} has none with this id")
     return stored
 
 

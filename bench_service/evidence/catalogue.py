@@ -28,7 +28,7 @@ class Catalogue:
     def __init__(self) -> None:
         self._left_out: dict[tuple[str, str], str] = {}
         self._alone: dict[tuple[str, str], Any] = {}
-        """Entries that were read by their names, before or beside all the others."""
+        """Entries that were read by their names, before or apart from all the others."""
 
     @cached_property
     def procedures(self) -> Mapping[str, AnyProcedure]:
@@ -78,5 +78,5 @@ class Catalogue:
             sentence = f"{folder}/{name}.py is left out: {described(error)}"
             self._left_out[kind, name] = sentence
             log.error("%s", sentence)
-            log.debug("where %s/%s.py broke", folder, name, exc_info=error)
+            log.debug("traceback of %s/%s.py", folder, name, exc_info=error)
         return found.entries

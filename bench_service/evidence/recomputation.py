@@ -15,7 +15,7 @@ from bench_service.evidence.recordings import RecordingStore
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.evidence.work_processes import WorkProcesses
 from bench_service.formats.chunk import sample_type
-from bench_service.formats.content_hash import ContentHash
+from bench_service.formats.content_hash import hash_of_blocks
 from bench_service.model.context import context_of
 from bench_service.model.job import Job
 from bench_service.model.records import StoredResult
@@ -153,10 +153,8 @@ def digest_of(recordings: RecordingStore, recording_id: str) -> str:
     """Compute the content hash of a recording from its stored samples, a chunk at a time. Raises `NotFound`."""
     stored = recordings.get(recording_id)
     info = stored.info
-    digest = ContentHash(info.channels, info.rate_hz, sample_type(stored.dtype))
-    for block in recordings.read(recording_id, [c.name for c in info.channels], 0, info.count):
-        digest.update(block)
-    return digest.hexdigest()
+    blocks = recordings.read(recording_id, [c.name for c in info.channels], 0, info.count)
+    return hash_of_blocks(info.channels, info.rate_hz, sample_type(stored.dtype), blocks)
 
 
 def _differences(stored: Any, found: Any, pointer: str = "") -> Iterator[str]:

@@ -17,7 +17,7 @@ def treatment_of(stores: EvidenceStores, unit: str, corrected_by: str | None, de
     found = stores.calibrations.several(ids) if ids else ()
     for one in found:
         if one.unit != unit:
-            raise NotFound("calibration", one.id, f"unit {unit} has none of that id")
+            raise NotFound("calibration", one.id, f"unit {unit} has none with this id")
         if one.approval is Approval.REJECTED:
             raise BadParameter("corrected_by", one.id, "a calibration that was not rejected")
     triads = [one.triad for one in found]

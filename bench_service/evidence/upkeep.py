@@ -160,7 +160,7 @@ class NightlyScrub:
                 self._upkeep.scrub(lambda took_s: self._ending.wait(REST * took_s), at - APART)
                 self._then(self._ending)
             except ServiceError as error:
-                log.warning("the work of this night was not done: %s", error)
+                log.warning("the nightly maintenance failed: %s", error)
             except Exception:
                 log.exception("the work of the night on the database")
 

@@ -72,13 +72,13 @@ class WorkProcesses:
         too much work is waiting already.
         """
         if not self._places.acquire(blocking=False):
-            raise Overloaded(f"{self._waiting} such requests are worked on or wait already: ask again later")
+            raise Overloaded(f"{self._waiting} such requests are running or waiting already: try again later")
         try:
             found = self._submit(name, arguments).result()
         except BrokenProcessPool as broken:
             with self._mutex:
                 self._pool = None
-            raise StorageFailure("the process that worked on this ended before it was done: ask again") from broken
+            raise StorageFailure("the process that did this work ended before it had finished: try again") from broken
         finally:
             self._places.release()
         if isinstance(found, Refusal):

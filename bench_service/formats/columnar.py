@@ -16,9 +16,10 @@ from bench_service.formats.errors import UnreadableFile
 from procedures.core.arrays import Array
 
 _BLOCK_ROWS = 65_536
-_CUT_OFF = "it is cut off: what stands at its end, or what it announces, is missing; copy it once more"
-_DESCRIPTION = "it is damaged: its own description of columns and types cannot be read"
-_PACKED = "it is damaged: a column cannot be unpacked"
+_CUT_OFF = "it is cut off: what stands at its end, or what it announces, is missing; copy it again"
+_DESCRIPTION = "it is damaged: its own description of columns and types cannot be read; copy it again"
+_PACKED = "it is damaged: a column cannot be unpacked; copy it again"
+_UNFIT = "its parts do not fit together; copy it again, or export it anew"
 _DAMAGES = (
     ("magic bytes", _CUT_OFF),
     ("file size is", _CUT_OFF),
@@ -71,10 +72,9 @@ def columnar_columns(
 
 
 def _in_words(error: Exception) -> str:
-    """Arrow's message, shortened, after its meaning where that is known."""
+    """Return the meaning of Arrow's message, as far as it is known, and the message, shortened."""
     said = " ".join(str(error).split())[:120]
-    known = next((words for sign, words in _DAMAGES if sign in said), None)
-    return said if known is None else f"{known} ({said})"
+    return f"{next((words for sign, words in _DAMAGES if sign in said), _UNFIT)} ({said})"
 
 
 def _block(
@@ -129,7 +129,7 @@ def _clock(column: Any, name: str, asked: Column, description: ImportDescription
         return nanoseconds(column, description.clock_fraction)
     except NoClock as error:
         where = f"row {row + error.row + 1}, column {asked!r}"
-        raise UnreadableFile(name, f"{where}: {quoted(error.text)} is no text of a clock") from error
+        raise UnreadableFile(name, f"{where}: {quoted(error.text)} is not the text of a clock") from error
 
 
 def _opened(
@@ -195,10 +195,11 @@ def _indices(schema: Any, columns: Sequence[Column], name: str, timed: bool) -> 
 
 def _index(schema: Any, names: list[str], column: Column, name: str, is_time: bool) -> int:
     if isinstance(column, str) and names.count(column) != 1:
-        raise UnreadableFile(name, f"there is not one column {quoted(column)}; it has {listed(names)}")
+        found_of = "more than one" if column in names else "no"
+        raise UnreadableFile(name, f"has {found_of} column {quoted(column)}; the columns are {listed(names)}")
     index = names.index(column) if isinstance(column, str) else column
     if not 0 <= index < len(names):
-        raise UnreadableFile(name, f"there is no column {index}; there are {len(names)}")
+        raise UnreadableFile(name, f"has no column {index}; it has {len(names)} columns, numbered from 0")
     kind = schema.field(index).type
     if not (_is_number(kind) or (is_time and _is_time(kind))):
         expected = "numbers or times" if is_time else "numbers"

@@ -6,7 +6,7 @@ the samples, little-endian, row by row. Must not know chunks, files or databases
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -45,6 +45,12 @@ class ContentHash:
 
 def content_hash(channels: Sequence[Channel], rate_hz: float, samples: RawArray) -> str:
     """Compute the hash of a recording held in memory."""
-    whole = ContentHash(channels, rate_hz, samples.dtype)
-    whole.update(samples)
+    return hash_of_blocks(channels, rate_hz, samples.dtype, [samples])
+
+
+def hash_of_blocks(channels: Sequence[Channel], rate_hz: float, dtype: SampleType, blocks: Iterable[RawArray]) -> str:
+    """Compute the hash of a recording that comes in blocks, shape (n, channels). Raises what `blocks` does."""
+    whole = ContentHash(channels, rate_hz, dtype)
+    for block in blocks:
+        whole.update(block)
     return whole.hexdigest()

@@ -108,7 +108,7 @@ class _Reader:
             raise _NotANumber("a stamp is missing")
         stamps = column.to_numpy()
         if not np.all(np.isfinite(stamps)):
-            raise _NotANumber("a stamp is no finite number")
+            raise _NotANumber("a stamp is not a finite number")
         return stamps
 
 

@@ -54,7 +54,7 @@ class ImportedChannel(_Strict):
     scale: float = 1.0
     offset: float = 0.0
     period: float | None = Field(
-        None, gt=0, description="of an angle or velocity: where its raw value begins again, 360 or 65536 for example"
+        None, gt=0, description="for an angle or velocity: where its raw value begins again, 360 or 65536 for example"
     )
 
     @model_validator(mode="after")
@@ -106,7 +106,7 @@ class ImportDescription(_Strict):
         "stamps, and clocks of log files, know their own",
     )
     clock_fraction: Literal["decimal", "ms", "us"] = Field(
-        "decimal", description="of a clock's text: ms where 31.18 means 31.018 s, milliseconds without leading zeros"
+        "decimal", description="for a clock's text: ms where 31.18 means 31.018 s, milliseconds without leading zeros"
     )
     unwrap_clock: bool = Field(False, description="whether a counter of time that began again is carried on")
     repeats: Literal["refuse", "drop"] = Field("refuse", description="rows that were written twice with one time")

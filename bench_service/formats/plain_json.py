@@ -16,7 +16,7 @@ A_NUMBER = f"a finite number is expected, -{float_info.max:.2g} … {float_info.
 NOT_SO_DEEP = f"at most {DEPTH} lists and objects may lie in each other"
 
 _NESTING, _NUMBERS = (list, dict), (int, float)
-"""Tuples of types for `isinstance`: a union would be built anew at each of a million calls."""
+"""Tuples of types for `isinstance`: a union would be built again at each of a million calls."""
 _UNFIT = re.compile("[\x00\ud800-\udfff]")
 _ESCAPED = re.compile(r"\\u(0000|[dD][89a-fA-F])")
 

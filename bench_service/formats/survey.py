@@ -140,7 +140,7 @@ class Survey:
         self._require_room(count)
         count -= bool(self._increments.columns)
         if count < 1:
-            raise UnreadableFile(self._names[0], "has one row alone: the steps of an accumulated value need two")
+            raise UnreadableFile(self._names[0], "has only one row: the steps of an accumulated value need two")
         if self._integral and self._outside is not None:
             raise UnfitRecording(self._outside)
         whole = self._integral and (clock is None or not len(clock.gaps))

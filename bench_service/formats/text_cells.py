@@ -47,7 +47,7 @@ def first_fault(
 def _width(number: int, line: bytes, cells: int, width: int, description: ImportDescription) -> str:
     cut = "" if line.endswith(b"\n") else "; the file seems to be cut off"
     twice = description.delimiter == "," and cells > width and cells % 2 == 0
-    comma = "; a decimal comma cannot be told from the delimiter ','" if twice and b'"' not in line else ""
+    comma = "; a decimal comma cannot be distinguished from the delimiter ','" if twice and b'"' not in line else ""
     way = "; rows gives a range without it" if not comma else ""
     return f"line {number} has {cells} columns, {width} were expected{cut}{comma}{way}"
 

@@ -43,10 +43,13 @@ class TextSource:
             glance += more
         kind = foreign_kind(glance[:64])
         if kind is not None:
-            raise UnreadableFile(self._name, f"is no delimited text but {kind}")
+            raise UnreadableFile(self._name, f"is not delimited text but {kind}")
         encoding = _encoding(glance)
         if encoding is None and 20 * glance[:4096].count(0) > len(glance[:4096]):
-            raise UnreadableFile(self._name, "is no delimited text: it has bytes of nought, as binary files have")
+            raise UnreadableFile(
+                self._name,
+                "is not delimited text: it contains zero bytes, as a binary file does; give the format that wrote it",
+            )
         if encoding is not None:
             self._decoder = codecs.getincrementaldecoder(encoding)(errors="replace")
         text = self._decoded(glance.removeprefix(codecs.BOM_UTF8))
@@ -57,7 +60,9 @@ class TextSource:
         try:
             data = self._stream.read(size)
         except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-            raise UnreadableFile(self._name, f"the compressed file is cut off or damaged ({error})") from error
+            raise UnreadableFile(
+                self._name, f"is a compressed file that is cut off or damaged: copy it again ({error})"
+            ) from error
         self._left -= len(data)
         if self._left < 0:
             raise UnreadableFile(
@@ -118,7 +123,7 @@ class TextSource:
 
 def too_long(name: str, number: int) -> UnreadableFile:
     """Build the refusal of a line without an end."""
-    return UnreadableFile(name, f"line {number} has more than {LINE_BYTES} bytes: it is no table of text")
+    return UnreadableFile(name, f"line {number} has more than {LINE_BYTES} bytes: it is not a table of text")
 
 
 def _encoding(start: bytes) -> str | None:

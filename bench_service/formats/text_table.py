@@ -77,7 +77,7 @@ class TextTable:
             self._require_width(rows[comments : comments + 1], len(filled) - comments)
             return
         if comments == len(rows):
-            raise UnreadableFile(self.name, "has comments alone; a table was expected")
+            raise UnreadableFile(self.name, "has only comments; a table was expected")
         self.names = [_name(cell) for cell in self.cells(self.text.line(self.first_line))]
         self.first_line += 1
         data = [row for row in rows[comments + 1 :] if any(cell.strip() for cell in row)]
@@ -145,26 +145,27 @@ class TextTable:
 
     def indices(self, columns: Sequence[Column]) -> list[int]:
         """Find the indices of the columns. Raises `UnreadableFile`."""
-        present = listed(self.names) if self.names else f"0 … {self.width - 1}"
+        present = listed(self.names) if self.names else "0" if self.width == 1 else f"0 … {self.width - 1}"
         found: list[int] = []
         for column in columns:
             if isinstance(column, str):
                 matches = [i for i, n in enumerate(self.names or []) if _same(n, column)]
                 if len(matches) != 1:
+                    found_of = "more than one" if matches else "no"
                     raise UnreadableFile(
                         self.name,
-                        f"there is not one column {quoted(column)}; the columns are {present}"
+                        f"has {found_of} column {quoted(column)}; the columns are {present}"
                         f"{self._hint(column, len(matches))}",
                     )
                 column = matches[0]
             if not 0 <= column < self.width:
-                raise UnreadableFile(self.name, f"there is no column {column}; the columns are {present}{self._wide()}")
+                raise UnreadableFile(self.name, f"has no column {column}; the columns are {present}{self._wide()}")
             found.append(column)
         return found
 
     def _hint(self, column: str, matches: int) -> str:
         if matches > 1:
-            return f"; {matches} are called so: name it by its number, from 0"
+            return f"; {matches} have this name: give the column by its number, from 0"
         if self.names is None:
             return "; without a line of names (header = false) columns are given by number, from 0"
         if wide := self._wide():

@@ -11,7 +11,7 @@ def require_as_planned(job: Job, planner: Planner) -> None:
     """Refuse a station of a job whose conditions changed while it waited.
 
     Raises `NoCalibration` where the unit's calibration was rejected or expired, `MountingChanged` where the unit was
-    mounted anew, or taken off, since the job was planned.
+    mounted again, or taken off, since the job was planned.
     """
     triads = planner.catalogue.procedure(job.procedure).uses_calibration
     if refusal := withheld_calibration(job, triads):

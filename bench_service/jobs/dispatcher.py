@@ -43,7 +43,7 @@ class Unfinished:
     alive: bool = False
     """True where the engine resumes the workflow."""
     gone: Failure | None = None
-    """The reason why the workflow will not go on."""
+    """The reason why the workflow will not continue."""
 
 
 class JobEngine(Protocol):
@@ -181,14 +181,14 @@ class Dispatcher:
             self._running = False
 
     def _settle(self) -> None:
-        """Recover the bench's running job where its workflow does not go on: requeue or interrupt it."""
+        """Recover the bench's running job where its workflow does not continue: requeue or interrupt it."""
         job = self._stores.queue.running(self._bench_id)
         if job is None or self._ending.is_set():
             return
         found = self._engine.unfinished(job)
         now_running = self._stores.queue.running(self._bench_id)
         if found.alive or now_running is None or (now_running.id, now_running.attempt) != (job.id, job.attempt):
-            return  # it goes on, or it ended or was requeued between the two reads
+            return  # it continues, or it ended or was requeued between the two reads
         why = self._not_understood(job.id) or found.gone
         if why is None:
             never = Failure("NeverBegan", "the service ended after it had chosen this job and before it began")

@@ -31,6 +31,9 @@ SHUT_DOWN_S = 20.0
 """Time that the running job may take to leave the bench safe when the service ends [s]."""
 RETRY_S = 0.5
 """Interval between two attempts to write a bad end that could not be written [s]."""
+LISTEN_S = 0.1
+"""Interval at which DBOS looks for messages on SQLite [s]. Nobody sends any, so that a look costs nothing; but the
+service's end waits for the next one."""
 MAX_RECOVERIES = 50
 """Maximum number of times that a job may take the service down before it is given up."""
 
@@ -93,7 +96,7 @@ class Engine:
             "log_level": "WARNING",
             "console_log_level": "ERROR",
             "max_executor_threads": 8,
-            "notification_listener_polling_interval_sec": 1.0,
+            "notification_listener_polling_interval_sec": LISTEN_S,
         }
         self._dbos = DBOS(config=config)
 
@@ -132,7 +135,7 @@ class Engine:
         if status.app_version != self._version:
             if status.status in ALIVE:
                 DBOS.cancel_workflow(status.workflow_id)  # or an older version that is started again would resume it
-            begun = f"begun by version {status.app_version} of the procedures, this is {self._version}"
+            begun = f"begun by version {status.app_version} of the procedures; this is {self._version}"
             return Unfinished(gone=Failure("OtherVersion", begun))
         if status.status in ALIVE:
             return Unfinished(alive=True)
@@ -186,7 +189,7 @@ class Engine:
                 self._runner.make_safe(job_id)
                 return
             except ServiceError as error:
-                log.warning("nobody knows yet what bench job %s drove: %s", job_id, error)
+                log.warning("the bench of job %s is not known yet: %s", job_id, error)
             if self._ending.wait(RETRY_S):
                 return
 
@@ -202,7 +205,7 @@ class Engine:
             except (NotUnderstood, UnfitValue):  # its end cannot be written: the dispatcher interrupts it
                 return
             except (StorageFull, StorageFailure) as error:
-                log.warning("the end of job %s cannot be noted yet: %s", job_id, error)
+                log.warning("the end of job %s cannot be stored yet: %s", job_id, error)
             if self._ending.wait(RETRY_S):
                 raise ShuttingDown
 

@@ -6,7 +6,7 @@ from bench_service.jobs.stores import JobStore
 
 def is_empty(jobs: JobStore) -> bool:
     """Return whether the database has no job. Raises `StorageFailure`."""
-    return not any(jobs.counts().values())
+    return not jobs.has_any()
 
 
 def missing_history(devices: DeviceState | None, jobs: JobStore) -> str:

@@ -113,9 +113,9 @@ class QueueService:
 
 def _standing(job: Job, place: Place | None) -> Standing:
     if job.state is JobState.PAUSED:
-        return Standing(waiting="put aside until somebody resumes it")
+        return Standing(waiting="paused until a person resumes it")
     if job.state is JobState.INTERRUPTED:
-        return Standing(waiting="the service could not go on with it; it waits until somebody resumes it")
+        return Standing(waiting="the service could not continue it; it waits until a person resumes it")
     if job.state is JobState.RUNNING and job.prompt is not None:
         return Standing(waiting=f"a person at the bench is asked: {job.prompt.get('text', '')}")
     return Standing(place, None if place is None else place.waiting)

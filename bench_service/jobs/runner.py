@@ -258,7 +258,7 @@ class JobRunner:
     def _stop_wanted(self, job_id: str) -> bool:
         """Return whether the job was cancelled or its bench stopped, through any process.
 
-        A database that does not answer now, because it is restarted, counts as no stop: the recording goes on. A stop
+        A database that does not answer now, because it is restarted, counts as no stop: the recording continues. A stop
         on the bench's own host does not depend on it. One whose file was deleted or replaced takes no recording any
         more: the job is stopped.
         """

@@ -113,9 +113,9 @@ class JobService:
         """The true values of a simulated unit in a job. Raises `NotFound` on a real bench."""
         job = self._stores.jobs.get(job_id)
         if not job.simulated or job.seed is None:
-            raise NotFound("truth of job", job_id, "nobody knows it on a real bench")
+            raise NotFound("truth of job", job_id, "the truth of a real bench is not known")
         if self._driver is None or self._driver.description.id != job.bench:
-            raise NotFound("truth of job", job_id, f"the process that drives bench {job.bench} knows it")
+            raise NotFound("truth of job", job_id, f"only the process that drives bench {job.bench} has it")
         return self._driver.truth(job.unit, job.seed)
 
     def _new_job(self, request: JobRequest, plan: Plan, requested_by: str) -> Job:

@@ -48,7 +48,7 @@ class StopLedger:
         try:
             self._waiting.put_nowait(waiting)
         except Full:
-            waiting.entered.set_exception(StorageFailure(f"{WAITING} stops wait for the database already"))
+            waiting.entered.set_exception(StorageFailure(f"{WAITING} stops are waiting for the database already"))
         return waiting.entered
 
     def _run(self) -> None:
@@ -65,7 +65,7 @@ class StopLedger:
             waiting.entered.set_exception(refused)
         except ServiceError as error:
             if str(error) != self.failure:
-                log.warning("a stop of bench %s is not in the books yet: %s", waiting.bench_id, error)
+                log.warning("a stop of bench %s is not in the database yet: %s", waiting.bench_id, error)
             self.failure = str(error)
             return False
         except Exception as error:  # a defect must not keep the next stop out of the database

@@ -94,7 +94,7 @@ class StopService:
             job, books = self._entered(entering, books_by_s - monotonic_s())
             job = job or (safety.devices.job if safety.devices is not None and safety.worker is not None else None)
         else:
-            # A stop that no bench has heard is in the database or nowhere: whoever asked waits for that.
+            # A stop that no bench has received is in the database or nowhere: the caller waits for that.
             within_s = books_by_s - monotonic_s() if found is not None else BOOKS_S
             job, books = self._entered(entering, within_s)
             if found is None and books:

@@ -3,7 +3,7 @@
 Every method is one transaction: it commits, or it raises and nothing of it remains.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Protocol
@@ -54,8 +54,12 @@ class JobStore(Protocol):
         limit: int = 50,
     ) -> Page[Job]: ...
 
-    def counts(self) -> dict[JobState, int]:
-        """Number of jobs in each state."""
+    def counts(self, states: Collection[JobState] = tuple(JobState)) -> dict[JobState, int]:
+        """Number of jobs in each of some states; of the last states, that takes as long as the history is."""
+        ...
+
+    def has_any(self) -> bool:
+        """Return whether there is any job."""
         ...
 
     def transition(

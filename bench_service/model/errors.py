@@ -21,7 +21,7 @@ ServiceError
 ├── Overloaded           too much is requested at one time
 ├── NotUnderstood        a job was stored by a version whose format this one does not know
 ├── NotMounted           this bench does not have that unit
-├── MountingChanged      the unit was mounted anew, or taken off, since the job was planned
+├── MountingChanged      the unit was mounted again, or taken off, since the job was planned
 ├── RawDataRemoved       the raw data of a recording were removed by a rule
 ├── StorageFull          the database cannot grow
 └── StorageFailure       the database failed in another way

@@ -69,7 +69,7 @@ class ManualLease:
     ended_at: datetime | None = None
     ended_because: str = ""
     safe: bool | None = None
-    """Whether the bench was left safe; None while the lease lives."""
+    """Whether the bench was left safe; None while the lease is active."""
 
     def live(self, at: datetime) -> bool:
         """Return whether it holds the bench at a moment. Its end is this one moment and not that of its last motion."""

@@ -1,7 +1,7 @@
 """Watches one bench and its jobs, and puts messages about them into the outboxes; lives in a thread of its own.
 
-The process that drives a bench notifies for it, so each thing is told once. It looks at what happens while it lives,
-and at stops that stand.
+The process that drives a bench notifies for it, so each event is reported once. It reports what happens while it runs,
+and the stops in force.
 """
 
 import logging

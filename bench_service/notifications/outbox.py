@@ -18,7 +18,7 @@ FIRST_PAUSE = timedelta(seconds=5)
 LONGEST_PAUSE = timedelta(minutes=15)
 HOUR = timedelta(hours=1)
 REMEMBERED = 2000
-"""Number of messages that are remembered, so that a service that starts anew does not repeat them."""
+"""Number of messages that are remembered, so that a service that starts again does not repeat them."""
 MOST_FILES = 1000
 """Maximum number of waiting messages; further ones are logged and left out."""
 
@@ -53,7 +53,9 @@ class Outbox:
         if message.kind not in self.target.events or message.key in self._kept:
             return
         if not urgent and len(self._files()) >= MOST_FILES:
-            log.error("%s has %d messages waiting: left out: %s", self.target.name, MOST_FILES, message.title)
+            log.error(
+                "%s has %d messages waiting: this one is dropped: %s", self.target.name, MOST_FILES, message.title
+            )
             return
         part = file.with_suffix(".part")
         part.write_bytes(_MESSAGE.dump_json(message))
@@ -101,7 +103,7 @@ class Outbox:
         try:
             return _MESSAGE.validate_json(file.read_bytes())
         except ValueError as error:
-            log.error("a waiting message cannot be read and is left out (%s): %s", file, error)
+            log.error("a waiting message cannot be read and is dropped (%s): %s", file, error)
             return None
 
     def _deliver(self, message: Message, at: datetime) -> bool:

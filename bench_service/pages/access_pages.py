@@ -12,12 +12,12 @@ _OWN_PATH = re.compile(r"/(?![/\\])[^\x00-\x1f\\]*")
 
 
 def own_path(given: str) -> str:
-    """Return a path of this service to go on with after the log-in; the first page for anything else."""
+    """Return a path of this service to continue with after the log-in; the first page for anything else."""
     return given if len(given) <= 2000 and _OWN_PATH.fullmatch(given) else "/"
 
 
 @router.get("/log-in")
 def log_in_page(request: Request, next: str = "/") -> HTMLResponse:  # noqa: A002  the name in the address
-    """Page of the log-in; it goes on with the page that was wanted."""
+    """Page of the log-in; it continues with the page that was wanted."""
     headers = {"Cache-Control": "no-store"}
     return templates.TemplateResponse(request, "log_in.html", {"next": own_path(next)}, headers=headers)

@@ -108,6 +108,10 @@ class Database:
             key = int.from_bytes(hashlib.sha256(what.encode()).digest()[:8], "big", signed=True)
             session.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": key})
 
+    def turn_at_bench(self, session: Session, bench_id: str) -> None:
+        """Wait for one's turn at a bench: whoever claims a job of it, reserves it or changes what is mounted there."""
+        self.one_at_a_time(session, f"claim a job of bench {bench_id}")
+
     def free_bytes(self) -> int | None:
         """Free space on the disk of an SQLite file [bytes]; None where the database is elsewhere."""
         file = self.engine.url.database
@@ -142,6 +146,15 @@ class Database:
 def announce(session: Session, subject: str) -> None:
     """Announce a subject to the listeners of `Database.on_news` once this writing transaction is committed."""
     session.info[_NEWS].append(subject)
+
+
+def missing_file(database_url: str) -> Path | None:
+    """The file of an SQLite database that is not there, and that opening it would make; None for every other one."""
+    url = make_url(database_url)
+    if url.get_backend_name() != "sqlite" or url.database in (None, "", ":memory:"):
+        return None
+    file = Path(url.database or "")
+    return None if file.is_file() else file
 
 
 def connect(database_url: str) -> Database:
@@ -265,4 +278,6 @@ def is_damaged(error: BaseException | None) -> bool:
 
 
 def _damaged(error: BaseException | None) -> DamagedDatabase:
-    return DamagedDatabase(f"the database is damaged ({error}): `bench scrub` names what, `bench restore` takes a copy")
+    return DamagedDatabase(
+        f"the database is damaged ({error}): `bench scrub` lists the damage, `bench restore` restores a copy"
+    )

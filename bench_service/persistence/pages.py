@@ -4,10 +4,10 @@ Ids are found first, by indexes alone where the conditions allow it, and only th
 its documents is many times longer than its keys, and sorting or walking over those costs what the history costs.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from sqlalchemy import Select, select
+from sqlalchemy import ColumnElement, Select, select
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from bench_service.model.records import Page
@@ -23,11 +23,17 @@ def page(
     after: str | None,
     limit: int,
     item: Callable[[R], T | None],
+    either: Sequence[ColumnElement[bool]] | None = None,
 ) -> Page[T]:
-    """The next `limit` rows older than `after`, each made an item; one of which none can be made is left out."""
+    """The next `limit` rows older than `after`, each made an item; one of which none can be made is left out.
+
+    `either`: conditions of which at least one must hold, each found by an index of its own; None for no such thing.
+    """
     if after is not None:
         query = query.where(key < after)
-    ids = session.scalars(query.with_only_columns(key).order_by(key.desc()).limit(limit + 1)).all()
+    newest = query.with_only_columns(key).order_by(key.desc()).limit(limit + 1)
+    parts = [newest] if either is None else [newest.where(way) for way in either]
+    ids = sorted({found for part in parts for found in session.scalars(part)}, reverse=True)[: limit + 1]
     shown = ids[:limit]
     if not shown:
         return Page(())

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Any, TypeVar
 
-from sqlalchemy import ColumnElement, Select, exists, func, or_, select
+from sqlalchemy import ColumnElement, Select, and_, exists, func, or_, select
 from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.orm import InstrumentedAttribute
 from sqlalchemy.sql.functions import FunctionElement
 
 from bench_service.model.job import job_number
 from bench_service.model.search import LabelSought, Search
-from bench_service.persistence.tables.evidence import RecordingRow, ResultRow
+from bench_service.persistence.tables.evidence import NAMES_JOIN, RecordingRow, ResultRow
 from bench_service.persistence.tables.jobs import JobLabelRow, JobRow
 
 S = TypeVar("S", bound=Select[*tuple[Any, ...]])
@@ -29,42 +29,48 @@ class ImportedNames(FunctionElement[Any]):
     inherit_cache = True
 
 
-def find_jobs(query: S, search: Search) -> S:
-    """Restrict a query of jobs."""
+def find_jobs(query: S, search: Search, text: bool = True) -> S:
+    """Restrict a query of jobs.
+
+    `text`: also by the text; a list finds that along indexes instead (`text_search`).
+    """
     query = _made(query, JobRow.id, JobRow.created_at, search)
     if search.verdict is not None:
         query = query.where(JobRow.verdict == search.verdict.value)
     query = query.where(*(_has_label(label, JobRow.id) for label in search.labels))
-    if search.text is None:
+    if search.text is None or not text:
         return query
     named = (JobRow.id, JobRow.procedure, JobRow.unit, JobRow.bench, JobRow.requested_by)
     return query.where(or_(_one_holds(named, search.text), _of_job(search.text, JobRow.id)))
 
 
-def find_recordings(query: S, search: Search) -> S:
-    """Restrict a query of recordings; verdict and labels are those of the job that recorded."""
+def find_recordings(query: S, search: Search, text: bool = True) -> S:
+    """Restrict a query of recordings; verdict and labels are those of the job that recorded.
+
+    `text`: also by the text; a list finds that along indexes instead (`text_search`).
+    """
     query = _made(query, RecordingRow.id, RecordingRow.created_at, search)
     job = RecordingRow.job_id == JobRow.id
     if search.verdict is not None:
         query = query.where(exists().where(job, JobRow.verdict == search.verdict.value))
     query = query.where(*(_has_label(label, RecordingRow.job_id) for label in search.labels))
-    if search.text is None:
+    if search.text is None or not text:
         return query
-    station = RecordingRow.station["label"].as_string()
-    files = ImportedNames(RecordingRow.source).table_valued("name")
-    named = (RecordingRow.id, RecordingRow.unit, RecordingRow.bench, RecordingRow.job_id, station)
+    named = (RecordingRow.id, RecordingRow.unit, RecordingRow.bench, RecordingRow.job_id, RecordingRow.station_label)
     in_job = _of_job(search.text, RecordingRow.job_id)
-    in_file = exists(select(files.c.name).where(_holds(files.c.name, search.text)))
-    return query.where(or_(_one_holds(named, search.text), in_job, in_file))
+    return query.where(or_(_one_holds(named, search.text), in_job, imported_name_holds(search.text)))
 
 
-def find_results(query: S, search: Search) -> S:
-    """Restrict a query of results; labels are those of the job whose recordings were analysed."""
+def find_results(query: S, search: Search, text: bool = True) -> S:
+    """Restrict a query of results; labels are those of the job whose recordings were analysed.
+
+    `text`: also by the text; a list finds that along indexes instead (`text_search`).
+    """
     query = _made(query, ResultRow.id, ResultRow.created_at, search)
     if search.verdict is not None:
         query = query.where(ResultRow.verdict == search.verdict.value)
     query = query.where(*(_has_label(label, ResultRow.job_id) for label in search.labels))
-    if search.text is None:
+    if search.text is None or not text:
         return query
     named = (ResultRow.id, ResultRow.name, ResultRow.unit, ResultRow.job_id)
     in_job = _of_job(search.text, ResultRow.job_id)
@@ -104,7 +110,7 @@ def _one_holds(columns: Sequence[Any], text: str) -> ColumnElement[bool]:
     joined = func.coalesce(columns[0], "")
     for column in columns[1:]:
         joined = joined.concat("\n").concat(func.coalesce(column, ""))
-    return or_(*(_holds(column, text) for column in columns)) if "\n" in text else _holds(joined, text)
+    return or_(*(text_held(column, text) for column in columns)) if "\n" in text else text_held(joined, text)
 
 
 def _of_job(text: str, job: ColumnElement[Any] | InstrumentedAttribute[Any]) -> ColumnElement[bool]:
@@ -113,8 +119,18 @@ def _of_job(text: str, job: ColumnElement[Any] | InstrumentedAttribute[Any]) -> 
     return labelled if number is None else or_(labelled, job.in_(select(JobRow.id).where(JobRow.number == number)))
 
 
-def _holds(column: Any, text: str) -> ColumnElement[bool]:
+def text_held(column: Any, text: str) -> ColumnElement[bool]:
+    """Return whether a column holds a text, capital or small."""
     return column.icontains(text, autoescape=True)
+
+
+def imported_name_holds(text: str, row: type[RecordingRow] = RecordingRow) -> ColumnElement[bool]:
+    """Return whether the name of an imported file holds a text: a walk over those names, which jobs lack."""
+    held = text_held(row.file_names, text)
+    if NAMES_JOIN in text:
+        files = ImportedNames(row.source).table_valued("name")
+        held = and_(held, exists(select(files.c.name).where(text_held(files.c.name, text))))
+    return and_(row.file_names.is_not(None), held)
 
 
 @compiles(ImportedNames, "sqlite")

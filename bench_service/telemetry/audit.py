@@ -25,7 +25,7 @@ class AuditEntry:
     id: str
     at: datetime
     who: str
-    """The proved name; without accounts the name that the client gave, or the address from which it asked."""
+    """Authenticated name; without accounts the name that the client gave, or the address from which it asked."""
     action: str
     """Name of the operation, as in the API's document: "submit", "stop"."""
     target: str

@@ -1,7 +1,7 @@
 """The audit trail as a hash chain: each entry has the digest of itself and of the entry before.
 
 An entry that is changed, removed or put in between breaks the chain there. Whoever can write the database can chain
-all of it anew: note the digest of the head elsewhere, and compare it later. When the retention of a stretch ends, its
+all of it again: note the digest of the head elsewhere, and compare it later. When the retention of a stretch ends, its
 entries go and a checkpoint stays, which joins the chain before with the chain after.
 
 digest_n = SHA-256(digest_{n-1} + newline + JSON list of sequence, id, time, who, action, target, outcome, detail as
@@ -90,7 +90,7 @@ class ChainCheck:
     met: bool = False
 
     def pass_checkpoints(self, checkpoints: Iterable[Checkpoint]) -> None:
-        """Check that closed stretches follow one another, and go on from the last one."""
+        """Check that closed stretches follow one another, and continue from the last one."""
         self.checkpoints = tuple(checkpoints)
         for one in self.checkpoints:
             if (one.first, one.before) != (self.sequence + 1, self.digest) or one.last < one.first:

@@ -15,12 +15,13 @@ from threading import Lock
 from typing import Protocol
 
 from bench_service.background import in_background
+from bench_service.model.job import FINAL, JobState
 from bench_service.wall_clock import monotonic_s, now
 
 OVERLAP = timedelta(seconds=60)
 PAGE = 5000
 RECORDINGS_S = 30.0
-"""Age at which the sum over all recordings is made anew [s]: it walks an index, beside the scrapes."""
+"""Age at which the sum over all recordings is made again [s]: it walks an index, apart from the scrapes."""
 DURATION_S = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5)
 """Upper ends of the buckets of durations and waits [s]; one more bucket has no upper end."""
 
@@ -112,6 +113,13 @@ class Tallies:
                 self._recent = {k: None for k in self._recent if k[1] >= self._newest - OVERLAP}
             self.stations = self._ended_stations + self.store.stations_of_open_jobs()
             self._add_up_recordings()
+
+    def ended(self) -> dict[JobState, int]:
+        """Number of jobs in each of the last states, as counted: to count them anew takes as long as the history is."""
+        found = Counter[str]()
+        for (_, state, _), count in self.finished.items():
+            found[state] += count
+        return {state: found[state.value] for state in JobState if state in FINAL}
 
     def _add_up_recordings(self) -> None:
         """Make the sum over all recordings: the first one here, later ones in a thread of their own.

@@ -32,7 +32,7 @@ def follow(
         except (Unavailable, httpx.TransportError) as error:
             lost_s = time.monotonic() if lost_s is None else lost_s
             if time.monotonic() - lost_s > patience_s:
-                raise Unavailable(f"the events of job {job_id} do not come: {error}") from error
+                raise Unavailable(f"the events of job {job_id} cannot be read: {error}") from error
         pause(pause_s)
         pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
 

@@ -24,10 +24,10 @@ class Unavailable(BenchClientError):
 
 
 class TimedOut(BenchClientError):
-    """A job did not end in the time that the caller gave it; it goes on in the service."""
+    """A job did not end in the time that the caller gave it; it continues in the service."""
 
     def __init__(self, job: Job, timeout_s: float) -> None:
-        super().__init__(f"job {job.id} is still {job.state} after {timeout_s:g} s; it goes on in the service")
+        super().__init__(f"job {job.id} is still {job.state} after {timeout_s:g} s; it continues in the service")
         self.job = job
 
 

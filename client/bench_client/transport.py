@@ -83,7 +83,7 @@ class Transport:
         try:
             return answer.json()
         except ValueError as error:
-            raise BenchClientError(f"{answer.url} is no bench service: {answer.text[:120]!r}") from error
+            raise BenchClientError(f"{answer.url} is not a bench service: {answer.text[:120]!r}") from error
 
 
 def _good(answer: httpx.Response) -> httpx.Response:

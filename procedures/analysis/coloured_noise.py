@@ -53,11 +53,13 @@ def cosine_series(cells: Array, cell_s: float, most: int = MOST) -> CosineSeries
     if not 0.0 < cell_s < float("inf"):
         raise BadParameter("cell_s", cell_s, "finite and above 0 s")
     if cells.ndim != 1 or len(cells) < FEWEST:
-        raise UnfitRecording(f"{cells.size} cells are too few to tell a transient from noise; it takes {FEWEST}")
+        raise UnfitRecording(
+            f"{cells.size} cells are too few to separate a transient from noise; the least is {FEWEST}"
+        )
     if not np.all(np.isfinite(cells)):
         raise UnfitRecording(f"cell {int(np.argmin(np.isfinite(cells)))} is not finite: a transient cannot be sought")
     if np.ptp(cells) == 0.0:
-        raise UnfitRecording("all cells are equal: a channel that says nothing")
+        raise UnfitRecording("all cells are equal: the channel is constant")
     group = -(-len(cells) // most)
     values = cells[: len(cells) // group * group].reshape(-1, group).mean(axis=1)
     length = group * cell_s

@@ -43,7 +43,7 @@ class ChamberReading:
     air_c: float
     """Air temperature at the controller's sensor."""
     set_point_c: float | None
-    """Set point that moves along the ramp; None where the controller tells only the final one, `target_c`."""
+    """Set point that moves along the ramp; None where the controller reports only the final one, `target_c`."""
     target_c: float | None
     """Final set point, where the present ramp ends, read back from the controller; None: the plant is off."""
     door_open: bool

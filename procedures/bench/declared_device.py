@@ -29,5 +29,5 @@ class DeclaredDevice:
     driver: str = ""
     address: str = ""
     identity: DeviceIdentity | None = None
-    """Identity as the device told it when its link was made; None: it has not been reached yet."""
+    """Identity as the device reported it when its link was made; None: it has not been reached yet."""
     certificate: DeclaredCertificate | None = None

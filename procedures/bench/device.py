@@ -6,7 +6,7 @@ from typing import Protocol
 
 @dataclass(frozen=True)
 class DeviceIdentity:
-    """Identity of a device as it tells it itself; a field that it does not tell is empty."""
+    """Identity of a device as it reports it itself; a field that it does not report is empty."""
 
     maker: str = ""
     model: str = ""

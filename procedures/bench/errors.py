@@ -8,7 +8,7 @@ BenchError
 ├── DeviceFault     a device reports a fault; it is never reset by itself
 ├── Disconnected    a device does not answer
 ├── DeviceBusy      another process has the device's link, which admits one master
-├── OtherVersion    the bench cannot go on from a state that another version of it stored
+├── OtherVersion    the bench cannot continue from a state that another version of it stored
 └── Stopped         an operator's stop or cancel ended the work
 """
 
@@ -46,7 +46,7 @@ class DeviceBusy(BenchError):
 
 
 class OtherVersion(BenchError):
-    """The bench cannot go on from a state that another version of it stored."""
+    """The bench cannot continue from a state that another version of it stored."""
 
 
 class Stopped(BenchError):

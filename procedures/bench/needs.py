@@ -18,7 +18,7 @@ class BenchNeeds:
     currents: bool = False
     """True if a converter alone is tested, with a current source on its inputs, instead of a whole unit."""
     real_time: bool = False
-    """True if a person commands the bench: a simulated one is then no faster than real time, unless it is told how
+    """True if a person commands the bench: a simulated one is then no faster than real time, unless it is set
     fast it is."""
 
     @classmethod

@@ -32,7 +32,7 @@ class TableReading:
     homed: bool = True
     """False where the encoders do not know their zero: no angle is known, and no axis may move by it."""
     rates_deg_s: tuple[float, float, float] | None = None
-    """Rates of outer, middle and inner axis [deg/s]; None where the controller tells none."""
+    """Rates of outer, middle and inner axis [deg/s]; None where the controller reports none."""
 
 
 @dataclass(frozen=True)

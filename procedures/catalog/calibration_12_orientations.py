@@ -21,13 +21,19 @@ from procedures.analysis.calibration.scalar import require_scalar_determined
 from procedures.analysis.calibration.station_means import launch_warnings
 from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS, windows
 from procedures.analysis.calibration.summary import TriadSummary
-from procedures.analysis.calibration.triad_analysis import AccelerometerSettings, analyse_accelerometers, analyse_gyros
+from procedures.analysis.calibration.triad_analysis import (
+    AccelerometerSettings,
+    analyse_accelerometers,
+    analyse_gyros,
+    suspected,
+)
 from procedures.analysis.orientation_plan.requirements import (
     in_run_check,
     in_run_unresolved,
     run_to_run_requirements,
     unresolved,
 )
+from procedures.analysis.own_axes import OWN_AXES
 from procedures.analysis.recursive_bias.dwell import DwellsSaved, dwells_saved
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -47,7 +53,6 @@ from procedures.site_parameters import TableParameters, declared_table
 Angle = Annotated[float, Field(ge=-360.0, le=360.0)]
 Lag = Annotated[float, Field(ge=0.0, le=600.0)]
 
-
 _NOT_PREDICTED = (
     "the predicted uncertainties are without the thermal correction's share, which depends on the temperatures to come"
 )
@@ -64,8 +69,10 @@ class Limits(Parameters):
     accelerometer_bias_in_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
     accelerometer_bias_run_to_run_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
     accelerometer_scale_run_to_run_ppm: float = Field(200.0, gt=0.0, le=1e6)
-    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the residuals' chi-square")
-    condition_max: float = Field(100.0, ge=1.0, le=1e9, description="of the column-scaled design")
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the residuals' chi-square")
+    condition_max: float = Field(
+        100.0, ge=1.0, le=1e9, description="largest condition number of the column-scaled design"
+    )
 
 
 class Params(TableParameters):
@@ -80,7 +87,7 @@ class Params(TableParameters):
     dwell_s: float | None = Field(None, ge=1.0, le=86_400.0, description="None: the unit's averaging time")
     settle_s: float = Field(2.0, ge=0.0, le=3600.0)
     stop_at: StopAt | None = Field(
-        None, description="end each dwell when its means are known so well; dwell_s is longest"
+        None, description="end each dwell once the uncertainty of its means is this small; dwell_s is the longest"
     )
     weighting: Weighting = Field(
         "noise_and_table",
@@ -92,7 +99,7 @@ class Params(TableParameters):
         "none", description="current: the unit's thermal correction brings the accelerometers to its reference"
     )
     case_lag_s: Lag = Field(5.0, description="time constant of the case sensor; used by thermal_correction=current")
-    converter_lag_s: Lag = Field(5.0, description="the same of the converter's sensor")
+    converter_lag_s: Lag = Field(5.0, description="time constant of the converter's sensor")
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
 
@@ -101,10 +108,12 @@ class Result(Outcome):
 
     triads: tuple[TriadSummary, ...]
     thermal: ThermalShare | None = Field(
-        None, exclude_if=lambda share: share is None, description="of the accelerometers, where they were corrected"
+        None,
+        exclude_if=lambda share: share is None,
+        description="thermal correction of the accelerometers, where it was applied",
     )
     dwells: DwellsSaved | None = Field(
-        None, exclude_if=lambda saved: saved is None, description="of a stop rule: each dwell, and the time saved"
+        None, exclude_if=lambda saved: saved is None, description="dwells ended by the stop rule, and the time saved"
     )
 
 
@@ -173,10 +182,10 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     settings = AccelerometerSettings(
         params.scalar_check, params.weighting, correction, (params.case_lag_s, params.converter_lag_s)
     )
-    second, share, doubts = analyse_accelerometers(recordings, site, uncertainty, accelerometer, settings)
-    checks = tuple(c for t in (first, second) for c in _checks(t, params.limits))
+    second, fit, share, doubts = analyse_accelerometers(recordings, site, uncertainty, accelerometer, settings)
+    triads = suspected([first, (second, fit)])
+    checks = tuple(c for t in triads for c in _checks(t, params.limits))
     warnings = _warnings(params, plans) + launch_warnings(recordings) + doubts
-    triads = (first, second)
     return Result(
         checks=checks,
         verdict=verdict(checks),
@@ -194,7 +203,7 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
 
 def quantities(params: Params, context: Context) -> tuple[str, ...]:
     """Checks and coefficients that a result will have."""
-    checks = (" bias in run, δ/√3", " condition number", " residuals, p-value of chi-square")
+    checks = (" bias in run, δ/√3", " condition number", OWN_AXES, " residuals, p-value of chi-square")
     return tuple(f"{triad}{n}" for triad in TRIAD_NAMES for n in (*checks, *(f".{c}" for c in COEFFICIENT_NAMES)))
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydantic import Field
 
-from procedures import steps
+from procedures import chamber_steps
 from procedures.analysis.thermal.converter_bench import FittedChannel, fit_channels, read_soaks
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
@@ -46,16 +46,18 @@ class Params(JudgedParameters):
     temperatures_c: tuple[float, ...] = Field(TEMPERATURES_C, min_length=5, max_length=100)
     ramp_c_min: float = Field(2.0, ge=0.01, le=100.0)
     slope_c_min: float = Field(0.02, ge=1e-4, le=10.0, description="most that the converter's sensor may drift")
-    window_s: float = Field(300.0, ge=60.0, le=86_400.0, description="of the line whose slope that is")
+    window_s: float = Field(300.0, ge=60.0, le=86_400.0, description="window of the line whose slope that is")
     air_within_c: float = Field(1.5, ge=0.01, le=100.0, description="chamber's air about the target")
     longest_s: float = Field(14_400.0, ge=60.0, le=604_800.0, description="with no soak by then the job fails")
     settle_s: float = Field(2.0, ge=0.0, le=3600.0)
     record_s: float = Field(60.0, ge=1.0, le=86_400.0)
     sample_rate_hz: float = Field(100.0, ge=1.0, le=4000.0, description="the converter's cycles a second")
     reference_c: float = Field(20.0, ge=-100.0, le=200.0, description="reading of its sensor where Fc = 1, Fs = 0")
-    order: int | None = Field(None, ge=1, le=6, description="of Fc and Fs; None: by the information criterion")
-    gain_sd_ppm: float | None = Field(None, ge=0.0, le=1e6, description="of the source; None: as the bench declares")
-    zero_sd_ma: float | None = Field(None, ge=0.0, le=1e3, description="the same of its zero")
+    order: int | None = Field(None, ge=1, le=6, description="order of Fc and Fs; None: by the information criterion")
+    gain_sd_ppm: float | None = Field(
+        None, ge=0.0, le=1e6, description="standard uncertainty of the source's gain; None: as the bench declares"
+    )
+    zero_sd_ma: float | None = Field(None, ge=0.0, le=1e3, description="standard uncertainty of the source's zero")
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
 
@@ -137,7 +139,7 @@ def predict(params: Params, context: Context) -> Prediction:
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
     """Current, soak, record, station after station."""
     for station in stations:
-        yield await steps.record_current(bench, station)
+        yield await chamber_steps.record_current(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:

@@ -15,6 +15,7 @@ from procedures import ferraris, steps
 from procedures.analysis.calibration.plan import triad_plan
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.station_plan import windows
+from procedures.analysis.own_axes import OWN_AXES
 from procedures.analysis.turns.ferraris import END_REST_S, face_stations, ferraris_estimator, rests_and_turns
 from procedures.analysis.turns.plan import coefficient_names
 from procedures.bench import Bench
@@ -87,7 +88,9 @@ def predict(params: Params, context: Context) -> Prediction:
     plan = triad_plan("accelerometer", context.unit, still, context.bench.axis_motion, site, params.table(site))
     uncertainties = (*_gyro(params, context, stations), *predicted(plan))
     unknown = context.unit.gyro is None or context.unit.accelerometer is None
-    warnings = ("the noise of a triad is not known: of it nothing is predicted",) if unknown else ()
+    warnings = (
+        ("the noise of a triad is not known: its share in the uncertainties is not predicted",) if unknown else ()
+    )
     basis = "the unit's calibration" if context.unit.known_matrix("gyro") is not None else "nominal scale factors"
     return Prediction(float(spans[-1, 1]), uncertainties, warnings, basis if uncertainties else "")
 
@@ -127,7 +130,7 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
     scale = tuple(f"gyro scale factor {axis}, 3σ" for axis in AXES)
     residuals = tuple(f"{triad} {ferraris.RESIDUALS}" for triad in ("gyro", "accelerometer"))
     named = tuple(f"{triad}.{name}" for triad in ("gyro", "accelerometer") for name in COEFFICIENT_NAMES)
-    return (*scale, "accelerometer condition number", *residuals, *named)
+    return (*scale, "accelerometer condition number", f"accelerometer{OWN_AXES}", *residuals, *named)
 
 
 def planned_checks(params: Params, context: Context) -> tuple[PlannedCheck, ...]:

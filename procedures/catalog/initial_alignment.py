@@ -53,7 +53,7 @@ class Limits(Parameters):
     """Requirements on the alignment and its agreement with the prediction (this program's own, none in the thesis)."""
 
     heading_sd_max_deg: float = Field(0.1, gt=0.0, le=180.0, description="expected of one alignment's heading")
-    prediction_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the errors' chi-square")
+    prediction_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the errors' chi-square")
 
 
 class Params(TableParameters):
@@ -66,7 +66,7 @@ class Params(TableParameters):
         description="(outer, middle, inner) [deg] of each round; level: heading = azimuth − outer",
     )
     repetitions: int = Field(5, ge=1, le=300, description="rounds through the orientations")
-    alignment_s: float = Field(600.0, ge=1.0, le=86_400.0, description="averaged for one alignment")
+    alignment_s: float = Field(600.0, ge=1.0, le=86_400.0, description="time averaged for one alignment")
     off_time_s: float = Field(
         60.0, ge=0.0, le=604_800.0, description="switched off before each alignment; 0: all of them in one launch"
     )

@@ -47,7 +47,7 @@ class Params(FitParameters, TableParameters):
 def resolve(params: Params, context: Context) -> Params:
     """Positions of the thesis's program where none are given; dwell from the unit; site and table from the bench."""
     if params.program is not None and params.positions is not None:
-        raise BadParameter("positions", len(params.positions), "not beside a program: one of the two")
+        raise BadParameter("positions", len(params.positions), "not together with a program: give one of the two")
     own = {"positions": FOURTEEN} if params.program is None else {}
     dwell = {} if params.program is not None else {"dwell_s": context.unit.averaging_time_s}
     full = params.filled({**own, **dwell, **declared_table(context)})

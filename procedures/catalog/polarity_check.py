@@ -12,6 +12,7 @@ from pydantic import Field
 from procedures import steps
 from procedures.analysis.calibration.reference import TRIAD_NAMES
 from procedures.analysis.calibration.station_plan import windows
+from procedures.analysis.own_axes import wrong_axes
 from procedures.analysis.turns.plan import UPRIGHT
 from procedures.analysis.turns.polarity import Answers, answers, sentences
 from procedures.bench import Bench
@@ -136,9 +137,10 @@ def _turn(params: Params) -> Turn:
 def _checks(found: Answers, limits: Limits) -> list[Check]:
     own = Limit("1", None if found.relative else limits.own_max, limits.own_min, source="ours")
     other = Limit("1", limits.other_max, source="ours")
+    wrong = wrong_axes(found.triad, found.axes)
     made: list[Check] = []
     for i, (name, axis, row) in enumerate(zip(TRIADS[found.triad], found.axes, found.matrix, strict=True)):
-        note = f"answers to {axis}"
+        note = f"answers to {axis}" + (f"; {wrong}" if wrong and axis != f"+{AXES[i]}" else "")
         made.append(check(f"{name}: {OWN}", row[i], own, note=note))
         made.append(check(f"{name}: {OTHERS}", max(abs(v) for k, v in enumerate(row) if k != i), other, note=note))
     return made

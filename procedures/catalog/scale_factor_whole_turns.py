@@ -56,8 +56,8 @@ class Limits(Parameters):
 
     scale_factor_3_sigma_ppm: float = Field(1.0, gt=0.0, le=1e6, description="three standard uncertainties")
     asymmetry_ppm: float = Field(10.0, gt=0.0, le=1e6)
-    nonlinearity_ppm: float = Field(10.0, gt=0.0, le=1e6, description="each term at the reference rate")
-    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the residuals' chi-square")
+    nonlinearity_ppm: float = Field(10.0, gt=0.0, le=1e6, description="largest nonlinear term at the reference rate")
+    residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the residuals' chi-square")
 
 
 class Params(JudgedParameters):
@@ -78,8 +78,12 @@ class Params(JudgedParameters):
     )
     latitude_deg: float | None = Field(None, ge=-90.0, le=90.0)
     azimuth_deg: float | None = Field(None, ge=-360.0, le=360.0, description="heading of the table's zero")
-    orthogonality_sd_arcsec: Arcsec | None = Field(None, description="of each of the table's two right angles")
-    pointing_sd_arcsec: Arcsec | None = Field(None, description="of each axis, anew at each stop")
+    orthogonality_sd_arcsec: Arcsec | None = Field(
+        None, description="standard uncertainty of each of the table's two right angles"
+    )
+    pointing_sd_arcsec: Arcsec | None = Field(
+        None, description="standard uncertainty of each axis' angle, independent at each stop"
+    )
     cross_coupling_sd: float = Field(
         0.004,
         ge=0.0,

@@ -50,11 +50,11 @@ class Params(NoiseParameters):
 
     noise_limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))  # pyright: ignore[reportIncompatibleVariableOverride]
     temperatures: bool = Field(
-        False, description="record the unit's temperature sensors beside; the unit then stands in the thermal chamber"
+        False, description="record the unit's temperature sensors too; the unit then stands in the thermal chamber"
     )
 
     launches: int = Field(4, ge=1, le=100)
-    duration_s: float = Field(21_600.0, ge=600.0, le=1_209_600.0, description="of each launch")
+    duration_s: float = Field(21_600.0, ge=600.0, le=1_209_600.0, description="duration of each launch")
     off_time_s: float = Field(
         3600.0, ge=1.0, le=604_800.0, description="switched off before each launch, the first too; the thesis: 1 h"
     )

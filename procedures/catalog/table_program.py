@@ -76,7 +76,7 @@ class Result(Outcome):
 def resolve(params: Params, context: Context) -> Params:
     """The program from the positions or the thesis; the axes' motion from the bench."""
     if params.program is not None and params.positions is not None:
-        raise BadParameter("positions", len(params.positions), "not beside a program: one of the two")
+        raise BadParameter("positions", len(params.positions), "not together with a program: give one of the two")
     if len(set(params.axes)) < len(params.axes):
         raise BadParameter("axes", list(params.axes), "each of inner, middle and outer once")
     given = params.positions
@@ -182,7 +182,9 @@ def _dwells(params: Params) -> tuple[Dwell, ...]:
 def _used_s(dwell: Dwell, at: TableAngles, params: Params) -> float:
     """Time of a delay used before the recording: the least time to move, and the settling [s]."""
     if params.axis_motion is None:
-        raise BadParameter("axis_motion", None, "resolve the parameters first: how fast the axes move the bench says")
+        raise BadParameter(
+            "axis_motion", None, "resolve the parameters first: the rates of the axes come from the bench"
+        )
     return move_time_s(at, dwell.angles, params.axis_motion) + params.settle_s
 
 

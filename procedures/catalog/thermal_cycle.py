@@ -12,7 +12,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from procedures import steps
+from procedures import chamber_steps
 from procedures.analysis.calibration.reference import site_with
 from procedures.analysis.fitness.watched import each_watched
 from procedures.analysis.thermal.cycle.analysis import KnownOfUnit, analyse_cycle
@@ -54,7 +54,7 @@ class Params(JudgedParameters):
     cell_s: float = Field(60.0, ge=1.0, le=600.0, description="cells that the fits work on")
     case_lag_s: float = Field(5.0, ge=0.0, le=600.0, description="time constant of the case sensor, by its data sheet")
     converter_lag_s: float | None = Field(
-        None, ge=0.0, le=600.0, description="of the converter's sensor; None: found from the readings"
+        None, ge=0.0, le=600.0, description="time constant of the converter's sensor; None: found from the readings"
     )
     lag_sd_s: float = Field(0.05, ge=0.0, le=600.0, description="standard uncertainty of each time constant")
     reference_case_c: float = Field(
@@ -79,12 +79,12 @@ class Params(JudgedParameters):
     )
     gyro_dependence: Literal["fail", "correct"] = Field(
         "fail",
-        description="of a gyro that depends on temperature: fail it (thesis 4.2.3), or judge what a correction leaves "
+        description="for a gyro that depends on temperature: fail it (thesis 4.2.3), or judge what a correction leaves "
         "in runs that the correction has not seen",
     )
     gyro_trim_s: float = Field(600.0, ge=0.0, le=86_400.0, description="start of a launch that gyros are not judged by")
     level: float = Field(0.01, gt=0.0, le=0.2, description="chance that a sound set of gyros is said to depend")
-    confidence: float = Field(0.95, gt=0.5, lt=1.0, description="of the intervals")
+    confidence: float = Field(0.95, gt=0.5, lt=1.0, description="confidence level of the intervals")
     gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9, description="None: the site's")
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
@@ -157,7 +157,7 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
     for station in stations:
         axis = station.label.split()[0]
         request = f"Open the chamber, set the unit with its {axis} axis upwards and level, close the door."
-        yield await steps.record_profile(bench, station, request)
+        yield await chamber_steps.record_profile(bench, station, request)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
@@ -220,7 +220,7 @@ def _up(recording: Recording, context: Context) -> int:
     """The axis that stood upwards, by the station's attitude."""
     station = recording.info.station
     if station is None or station.angles is None:
-        raise UnfitRecording(f"recording {recording.info.id}: nobody told how the unit stood")
+        raise UnfitRecording(f"recording {recording.info.id}: the unit's attitude was not recorded")
     force = specific_force_b([station.angles], context.bench.site)[0]
     up = int(force.argmax())
     if force[up] < 0.99 * context.bench.site.gravity_m_s2:

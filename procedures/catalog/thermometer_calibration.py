@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from pydantic import Field
 
-from procedures import steps
+from procedures import chamber_steps
 from procedures.analysis.fitness.watched import Inspection
 from procedures.analysis.thermal.profile_progress import SENSORS
 from procedures.analysis.thermal.thermometers import Calibrated, Soaked, SoakSettings, calibrate, read_soaks
@@ -53,7 +53,10 @@ class Params(Parameters):
     ramp_c_min: float = Field(2.0, ge=0.01, le=100.0)
     soak_s: float = Field(21_600.0, ge=60.0, le=604_800.0, description="switched off at each temperature")
     time_constant_s: float = Field(
-        2200.0, ge=1.0, le=86_400.0, description="slowest of the unit's heat: what the soak leaves is told from it"
+        2200.0,
+        ge=1.0,
+        le=86_400.0,
+        description="slowest thermal time constant of the unit, from which the rest after the soak is computed",
     )
     air_within_c: float = Field(1.5, ge=0.01, le=100.0, description="chamber's air about the target at its end")
     record_s: float = Field(120.0, ge=30.0, le=600.0, description="from switching on")
@@ -62,9 +65,15 @@ class Params(Parameters):
     sensor_lag_sd_s: float = Field(1.0, ge=0.0, le=600.0)
     reference_c: float = Field(20.0, ge=-100.0, le=200.0, description="offsets are those at this reading")
     place_sd_c: float | None = Field(
-        None, ge=0.0, le=100.0, description="of the air at the unit against the chamber's reading; None: the bench's"
+        None,
+        ge=0.0,
+        le=100.0,
+        description="standard uncertainty of the air at the unit against the chamber's reading, the same at each soak; "
+        "None: the bench's",
     )
-    soak_sd_c: float | None = Field(None, ge=0.0, le=100.0, description="the same, another one at each soak")
+    soak_sd_c: float | None = Field(
+        None, ge=0.0, le=100.0, description="the same, independent at each soak; None: the bench's"
+    )
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
     def settings(self) -> SoakSettings:
@@ -141,7 +150,7 @@ def predict(params: Params, context: Context) -> Prediction:
 async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[Stream]:
     """Off, soak, on, record the first moments; temperature after temperature."""
     for station in stations:
-        yield await steps.record_cold_start(bench, station)
+        yield await chamber_steps.record_cold_start(bench, station)
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:

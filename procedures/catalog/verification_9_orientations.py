@@ -69,7 +69,7 @@ class Limits(Parameters):
 
     gyro_bias_in_run_deg_h: float | None = Field(0.015, gt=0.0, le=1e6, description=_OF_PLAN)
     accelerometer_bias_in_run_m_s2: float | None = Field(0.0005, gt=0.0, le=100.0, description=_OF_PLAN)
-    prediction_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the errors' chi-square")
+    prediction_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the errors' chi-square")
 
 
 class Params(TableParameters):
@@ -87,7 +87,7 @@ class Params(TableParameters):
         "none", description="current: the unit's thermal correction brings the accelerometers to its reference"
     )
     case_lag_s: Lag = Field(5.0, description="time constant of the case sensor; used by thermal_correction=current")
-    converter_lag_s: Lag = Field(5.0, description="the same of the converter's sensor")
+    converter_lag_s: Lag = Field(5.0, description="time constant of the converter's sensor")
     limits: Limits = Field(default_factory=lambda: Limits.model_validate({}))
 
 

@@ -84,7 +84,7 @@ class TriadCalibration:
 
     @property
     def correlations(self) -> Array:
-        """Correlation of each pair of coefficients, shape (12, 12): 1 on the diagonal, 0 beside a fixed coefficient."""
+        """Correlation of each pair of coefficients, shape (12, 12): 1 on the diagonal, 0 with a fixed coefficient."""
         sd = self.standard_uncertainties
         safe = np.where(sd > 0.0, sd, 1.0)
         found = self.covariance_array / np.outer(safe, safe)

@@ -28,7 +28,7 @@ class StopRule:
     check_s: float = 5.0
     """Interval at which the means are looked at; a dwell is a whole number of it."""
     level: float = 1e-3
-    """A dwell whose innovations are less likely than this under the declared noise goes on to its longest time."""
+    """A dwell whose innovations are less likely than this under the declared noise continues to its longest time."""
 
     def __post_init__(self) -> None:
         if not self.targets:

@@ -58,7 +58,7 @@ class Params(RecordedParameters):
         description="even: `points` of them; octave: 1, 2, 4 … samples; decade: 1, 2, 4, 10, 20, 40 … samples; all: "
         "every whole number of samples; or a list [s], each taken as the nearest whole number of samples",
     )
-    confidence: float = Field(0.6827, gt=0.0, lt=1.0, description="of the intervals")
+    confidence: float = Field(0.6827, gt=0.0, lt=1.0, description="confidence level of the intervals")
     density: bool = Field(True, description="the power spectral density beside each curve; none of a record too short")
     band: Literal["none", "all_starts", "sampled_intervals"] = Field(
         "none",
@@ -199,7 +199,7 @@ def _naming(recording: str, channel: str = "") -> Generator[None]:
 def beside(
     recordings: Sequence[Recording], curves: tuple[Curve, ...], params: Params
 ) -> tuple[tuple[Curve, ...], tuple[str, ...]]:
-    """The curves with densities and bands beside them, and sentences on what could not be told."""
+    """The curves with densities and bands, and sentences on what could not be found."""
     told: list[str] = []
     found: list[Curve] = []
     for recording in recordings:

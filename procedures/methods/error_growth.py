@@ -61,10 +61,14 @@ class Params(JudgedParameters):
         "self",
         description="self: by its own sensors where it stands; given: from outside, with the uncertainties below",
     )
-    alignment_s: float = Field(600.0, ge=1.0, le=86_400.0, description="of the self-alignment")
+    alignment_s: float = Field(600.0, ge=1.0, le=86_400.0, description="duration of the self-alignment")
     warm_up_s: float = Field(0.0, ge=0.0, le=86_400.0, description="since launch, before the alignment begins")
-    tilt_sd_arcsec: float = Field(10.0, ge=0.0, le=36_000.0, description="of a given attitude")
-    heading_sd_arcsec: float = Field(60.0, ge=0.0, le=360_000.0, description="of a given attitude")
+    tilt_sd_arcsec: float = Field(
+        10.0, ge=0.0, le=36_000.0, description="standard uncertainty of the tilt of a given attitude"
+    )
+    heading_sd_arcsec: float = Field(
+        60.0, ge=0.0, le=360_000.0, description="standard uncertainty of the heading of a given attitude"
+    )
     vertical: Literal["held", "free"] = Field("held", description="held: height from an altimeter")
     declared: Declared | None = Field(None, description="in place of a calibration")
     position_1h_max_m: float | None = Field(None, gt=0.0, le=1e7, description="limit of the radius that holds 95 %")

@@ -56,12 +56,22 @@ class Params(RecordedParameters):
     gyro: Literal["none", "bias", "bias_and_scale"] = Field(
         "bias", description="bias: tactical grade, scale factor nominal; bias_and_scale: from the Earth's rate"
     )
-    angle_sd_arcsec: float = Field(60.0, ge=0.0, le=36_000.0, description="of each turn, set by hand")
-    level_sd_arcsec: float = Field(60.0, ge=0.0, le=36_000.0, description="of a base taken as level, a spirit level")
-    azimuth_sd_arcsec: float = Field(3600.0, ge=0.0, le=360_000.0, description="of the azimuth, a compass")
-    cross_coupling_sd: float = Field(0.001, ge=0.0, le=0.1, description="of each of the six that are neglected")
+    angle_sd_arcsec: float = Field(
+        60.0, ge=0.0, le=36_000.0, description="standard uncertainty of each turn set by hand"
+    )
+    level_sd_arcsec: float = Field(
+        60.0, ge=0.0, le=36_000.0, description="standard uncertainty of a base taken as level by a spirit level"
+    )
+    azimuth_sd_arcsec: float = Field(
+        3600.0, ge=0.0, le=360_000.0, description="standard uncertainty of the azimuth by a compass"
+    )
+    cross_coupling_sd: float = Field(
+        0.001, ge=0.0, le=0.1, description="standard uncertainty of each of the six neglected cross-couplings"
+    )
     gravity_relative_sd: float = Field(1e-5, ge=0.0, le=0.01)
-    gyro_scale_sd: float = Field(0.01, ge=0.0, le=0.5, description="of a nominal scale factor, relative")
+    gyro_scale_sd: float = Field(
+        0.01, ge=0.0, le=0.5, description="relative standard uncertainty of a nominal scale factor"
+    )
     lever_min: float = Field(0.02, gt=0.0, le=1.0, description="least change of a channel's input, relative")
     scale_sd_max: float = Field(0.1, gt=0.0, le=1.0, description="relative; a worse scale factor is refused")
     scale_sd_limit: float = Field(0.005, gt=0.0, le=1.0, description="relative; a worse accelerometer fails")

@@ -45,7 +45,9 @@ class Params(RecordedParameters):
     earth_rate_rad_s: float = Field(units.EARTH_RATE, ge=7.0e-5, le=7.6e-5)
     alignment_s: float = Field(600.0, ge=1.0, le=86_400.0, description="first part of the recording, for the alignment")
     cell_s: float = Field(2.0, ge=0.01, le=60.0, description="means that are navigated with")
-    p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="of the last position's Mahalanobis distance")
+    p_value_min: float = Field(
+        0.001, ge=0.0, le=1.0, description="least p-value of the last position's Mahalanobis distance"
+    )
     drift_max_m: float | None = Field(None, gt=0.0, le=1e7, description="limit of the greatest distance from the start")
 
 

@@ -30,11 +30,15 @@ class Params(RecordedParameters):
     """Channels, prior knowledge and target uncertainty of the filter."""
 
     channels: tuple[str, ...] | None = Field(None, min_length=1, max_length=64, description="None: both triads")
-    window_s: float = Field(1.0, gt=0.0, le=3600.0, description="of one measurement; lengthened for long recordings")
+    window_s: float = Field(
+        1.0, gt=0.0, le=3600.0, description="averaging time of one measurement; lengthened for long recordings"
+    )
     known_input: dict[str, float] = Field(
         default_factory=dict[str, float], description="by channel, rad/s or m/s²: what it measures beside its bias"
     )
-    gyro_prior_sd_deg_h: float | None = Field(None, gt=0.0, le=1e6, description="of the bias about zero; None: unknown")
+    gyro_prior_sd_deg_h: float | None = Field(
+        None, gt=0.0, le=1e6, description="standard deviation of the bias about zero; None: unknown"
+    )
     accelerometer_prior_sd_m_s2: float | None = Field(None, gt=0.0, le=100.0)
     gyro_target_sd_deg_h: float = Field(0.005, gt=0.0, le=1e6, description="a third of thesis 4.3's 0.015")
     accelerometer_target_sd_m_s2: float = Field(1.5e-4, gt=0.0, le=100.0, description="a third of thesis 4.3's 0.0005")

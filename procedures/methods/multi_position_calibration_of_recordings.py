@@ -46,7 +46,7 @@ class Params(FitParameters, RecordedParameters):
         max_length=500,
         description="up in the unit's axes, of any length, one a recording; accelerometers alone; not beside positions",
     )
-    direction_sd_arcsec: Arcsec = Field(0.0, description="of each direction, about any axis")
+    direction_sd_arcsec: Arcsec = Field(0.0, description="standard uncertainty of each direction, about any axis")
     orthogonality_sd_arcsec: Arcsec = 0.0
     pointing_sd_arcsec: Arcsec = 0.0
     level_sd_arcsec: Arcsec = 0.0
@@ -65,7 +65,9 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
 
 def _from_directions(params: Params, recordings: int) -> Inputs:
     if params.positions is not None:
-        raise BadParameter("directions", len(params.directions or ()), "not beside positions: one of the two")
+        raise BadParameter(
+            "directions", len(params.directions or ()), "not together with positions: give one of the two"
+        )
     if "gyro" in params.triads:
         raise BadParameter(
             "triads",

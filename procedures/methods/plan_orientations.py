@@ -57,7 +57,7 @@ class Params(Parameters):
     )
     minimum_deg: tuple[Angle, Angle, Angle] = Field((-180.0, -180.0, -180.0), description="outer, middle, inner")
     maximum_deg: tuple[Angle, Angle, Angle] = (180.0, 180.0, 180.0)
-    rate_deg_s: float = Field(60.0, gt=0.0, le=1e4, description="of every axis, for the time that moves take")
+    rate_deg_s: float = Field(60.0, gt=0.0, le=1e4, description="rate of every axis, for the time of the moves")
     acceleration_deg_s2: float = Field(100.0, gt=0.0, le=1e5)
     orthogonality_sd_arcsec: Arcsec = 3.0
     pointing_sd_arcsec: Arcsec = 1.0
@@ -67,8 +67,10 @@ class Params(Parameters):
     gyro_scale_ppm: float = Field(10.0, gt=0.0, le=1e6)
     accelerometer_bias_m_s2: float = Field(0.0005, gt=0.0, le=100.0)
     accelerometer_scale_ppm: float = Field(200.0, gt=0.0, le=1e6)
-    cross_coupling_arcsec: float = Field(10.0, gt=0.0, le=36_000.0, description="of both triads (ours)")
-    grid_deg: float = Field(45.0, ge=15.0, le=90.0, description="of the first search")
+    cross_coupling_arcsec: float = Field(
+        10.0, gt=0.0, le=36_000.0, description="largest cross-coupling of both triads (ours)"
+    )
+    grid_deg: float = Field(45.0, ge=15.0, le=90.0, description="grid of the first search")
     starts: int = Field(4, ge=1, le=16)
     improvement_min: float = Field(1.3, ge=1.0, le=100.0, description="that a better plan should reach")
 

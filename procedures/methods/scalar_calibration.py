@@ -44,7 +44,7 @@ class Still(Parameters):
     """Criteria by which poses are found in one long recording."""
 
     initial_s: float = Field(20.0, gt=0.0, le=3600.0, description="the unit rests for this long at the beginning")
-    window_s: float = Field(1.0, gt=0.0, le=60.0, description="of the moving variance")
+    window_s: float = Field(1.0, gt=0.0, le=60.0, description="window of the moving variance")
     factor: float = Field(10.0, gt=1.0, le=1000.0, description="threshold over the initial variance")
     shortest_s: float = Field(1.0, gt=0.0, le=3600.0)
     margin_s: float = Field(0.25, ge=0.0, le=60.0, description="cut from both ends of each pose")
@@ -58,7 +58,7 @@ class Params(RecordedParameters):
     earth_rate_rad_s: float = Field(units.EARTH_RATE, ge=7.0e-5, le=7.6e-5)
     rows: Literal["samples", "pose_means"] = Field(
         "samples",
-        description="of a single recording; pose_means: each row is the mean over a pose, no stretch is sought",
+        description="samples: still stretches of one recording are found; pose_means: each row is the mean of a pose",
     )
     pose_sd: float | None = Field(
         None,
@@ -72,7 +72,9 @@ class Params(RecordedParameters):
         le=1.0,
         description="beyond it a parameter counts as undetermined: rad, or relative to the reference",
     )
-    condition_max: float = Field(1000.0, ge=1.0, le=1e9, description="of the linear system of thesis 3.23")
+    condition_max: float = Field(
+        1000.0, ge=1.0, le=1e9, description="largest condition number of the linear system of thesis 3.23"
+    )
     residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0)
     misfit_max: float = Field(
         MISFIT_MAX,

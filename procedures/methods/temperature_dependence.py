@@ -137,7 +137,7 @@ def _channels(recordings: Sequence[Recording], params: Params) -> tuple[str, ...
         for recording in recordings:
             recording.info.column(name)
     if not names:
-        raise UnfitRecording(f"recording {info.id} has temperature channels alone")
+        raise UnfitRecording(f"recording {info.id} has only temperature channels")
     return names
 
 
@@ -206,7 +206,7 @@ def _series(recording: Recording, channel: str, sensor: str, params: Params, uni
     count = len(values) // size
     if count < FEWEST:
         raise UnfitRecording(
-            f"recording {recording.info.id}: {count} cells of {params.cell_s:g} s are too few, it takes {FEWEST}: "
+            f"recording {recording.info.id}: {count} cells of {params.cell_s:g} s are too few, the least is {FEWEST}: "
             "make cell_s shorter"
         )
     rows = [v[: count * size].reshape(count, size) for v in (values, temperature - params.reference_c)]

@@ -1,4 +1,4 @@
-"""Plots and table of Allan deviations, each with the power spectral density beside it."""
+"""Plots and table of Allan deviations, each with the power spectral density with it."""
 
 from collections.abc import Sequence
 

@@ -149,7 +149,7 @@ def magnitude_table(all_magnitudes: Sequence[Magnitudes], title: str) -> Table:
 
 
 def station_table(m: Magnitudes) -> Table:
-    """Figure of the magnitude at every orientation."""
+    """Table of the magnitude at every orientation, before and after correction, with its error and expected spread."""
     unit, size = units.DISPLAY[m.unit]
     before = m.before or (None,) * len(m.after)
     expected = m.expected_sd or (None,) * len(m.after)

@@ -1,4 +1,4 @@
-"""Tables and figures of launches at rest: Tables 4.1 and 4.2, figures 4.1-4.7 of the thesis in our words."""
+"""Tables and figures of launches at rest: Tables 4.1 and 4.2, figures 4.1-4.7 of the thesis, laid out again."""
 
 from collections.abc import Sequence
 from math import sqrt
@@ -45,7 +45,7 @@ def noise_report(
 def _summary(launches: Sequence[LaunchNoise], averaging_time_s: float | None) -> str:
     hours = sum(launch.duration_s for launch in launches) / HOUR
     dwell = (
-        "Quantization rules at no averaging time."
+        "Quantization dominates at no averaging time."
         if averaging_time_s is None
         else f"Quantization falls below the rest of the noise after {averaging_time_s:.0f} s at the latest."
     )

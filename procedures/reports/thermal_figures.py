@@ -1,4 +1,4 @@
-"""Figures of a thermal cycle: 3.15 to 3.17 and 4.11 to 4.16 of the thesis, in our words."""
+"""Figures of a thermal cycle: 3.15 to 3.17 and 4.11 to 4.16 of the thesis, in the words of this page."""
 
 from collections.abc import Sequence
 

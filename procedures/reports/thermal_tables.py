@@ -1,4 +1,4 @@
-"""Tables of a thermal cycle: 4.3 to 4.7 of the thesis in our words, the ways to correct, the soaks' evidence."""
+"""Tables of a thermal cycle: 4.3 to 4.7 of the thesis, laid out again, the ways to correct, the soaks' evidence."""
 
 from procedures.analysis.thermal.cycle.results import AxisFound, GyroNoise, LegRegime, ThermalCycle
 from procedures.analysis.thermal.profile_progress import LegEvidence

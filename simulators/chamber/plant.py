@@ -22,7 +22,7 @@ SQRT_2 = sqrt(2.0)
 
 @dataclass
 class PlantState:
-    """State that goes on from one second to the next, JSON-ready by `ChamberPlant.checkpoint`."""
+    """State that continues from one second to the next, JSON-ready by `ChamberPlant.checkpoint`."""
 
     temperatures_c: list[float]
     """Temperatures in the order of `NODES` [°C]."""

@@ -18,7 +18,7 @@ Fixed = NDArray[np.int64]
 class Blocks:
     """Three channels of values, one for each tick since power-up, of which the last block that was asked for is kept.
 
-    The block is one array, filled anew each time: fresh memory for every block costs more than what is written in it.
+    The block is one array, filled again each time: fresh memory for every block costs more than what is written in it.
     """
 
     def __init__(self, ticks: int, dtype: type[np.generic], fill: Callable[[int, NDArray[Any]], None]) -> None:
@@ -42,7 +42,7 @@ class Blocks:
             at += step
 
     def forget(self) -> None:
-        """Discard the kept block, so that the next one is made anew."""
+        """Discard the kept block, so that the next one is made again."""
         self._block = -1
 
 

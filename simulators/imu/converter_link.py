@@ -1,6 +1,6 @@
 """The data link of a signal converter on a bench of its own, before final assembly: implements `procedures.bench.imu`.
 
-A current instead of three accelerometers; nothing of the triads is there. ``code = round(K0·Fc·I + N0 + Fs)`` anew each
+A current instead of three accelerometers; nothing of the triads is there. ``code = round(K0·Fc·I + N0 + Fs)`` at each
 cycle, which is one tick (thesis 3.8); the current's own noise lies over the rounding.
 """
 

@@ -10,7 +10,7 @@ from simulators.truth import Array
 
 @dataclass(frozen=True)
 class Path:
-    """Pieces of constant acceleration of one axis; the last one has none and goes on for ever."""
+    """Pieces of constant acceleration of one axis; the last one has none and continues for ever."""
 
     starts_s: Array
     positions: Array
@@ -35,7 +35,7 @@ class Path:
         return self.positions[k] + 0.5 * (self.rates[k] + rate) * t, rate
 
     def shifted(self, by: float) -> "Path":
-        """The same path, its positions called by other names."""
+        """Copy of the path with `by` added to every position."""
         return Path(self.starts_s, self.positions + by, self.rates, self.accelerations)
 
 
@@ -76,7 +76,7 @@ class Swing:
 
 
 def held(position: float) -> Path:
-    """Path that stands still."""
+    """Path of an axis that rests at one angle."""
     return _path(position, 0.0, [])
 
 
@@ -135,7 +135,7 @@ class Paths:
 
     @property
     def duration_s(self) -> float:
-        """Time until the last axis stands still; infinite while one is to go on [s]."""
+        """Time until the last axis stands still; infinite while one is to continue [s]."""
         if any(path.final_rate != 0.0 for path in self.paths):
             return float("inf")
         return max(0.0, *(path.duration_s - age for path, age in zip(self.paths, self.ages_s, strict=True)))

@@ -114,7 +114,7 @@ class ServedBench:
             await port.close()
 
     def check(self) -> None:
-        """Raise why the world does not go on, where it does not."""
+        """Raise why the world does not continue, where it does not."""
         for task in self._tasks:
             if task.done() and not task.cancelled():
                 task.result()

@@ -25,7 +25,7 @@ class PacedClock(SimClock):
             await self._passed.wait()
 
     def go(self, ticks: int) -> None:
-        """Let the world go on for whole ticks, and wake who waits."""
+        """Let the world continue for whole ticks, and wake who waits."""
         self.advance_world(ticks)
         passed, self._passed = self._passed, asyncio.Event()
         passed.set()

@@ -115,5 +115,5 @@ class Lines:
         return None
 
     def answer(self, request: bytes) -> bytes:
-        """Answer a request, see `Talker`."""
+        """Answer a request by the rules of `Talker.answer`."""
         return self._answer(request)

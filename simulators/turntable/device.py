@@ -139,7 +139,7 @@ class SimTurntable:
         if self._fault:
             raise DeviceFault(self._fault)
         if not self.locked:
-            raise DeviceFault("the table is moving: one demand at a time")
+            raise DeviceFault("the table is moving: wait for the end of its motion")
 
     async def identify(self) -> DeviceIdentity:
         """Identity of the simulated table."""

@@ -2,6 +2,8 @@
 
 import ast
 import re
+from functools import cache
+from pathlib import Path
 
 from tests.kit.documents import PACKAGES, PAGES, ROOT
 from tests.kit.page_texts import of_scripts, of_templates
@@ -15,10 +17,17 @@ POETIC = re.compile(r"^(Told\w*|\w*Beside\w*|\w*Whoever\w*|\w*Eye|\w*Nobody\w*|i
 PRIVATE = re.compile(r"in our words|nobody's|\bthe told\b|\bpatience\b", re.IGNORECASE)
 
 
+@cache
+def _parsed(path: Path) -> tuple[ast.AST, ...]:
+    """Return the definitions of a file and the file itself; each of the tests reads all of them."""
+    defined = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+    return tuple(node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, defined))
+
+
 def _summaries() -> list[tuple[str, str]]:
     found = []
     for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in _parsed(path):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
                 text = ast.get_docstring(node)
                 if text:
@@ -40,7 +49,7 @@ def test_no_class_or_function_has_a_poetic_name() -> None:
     poetic = {
         f"{path.relative_to(ROOT)}: {node.name}"
         for path in SOURCES
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in _parsed(path)
         if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and POETIC.match(node.name)
     }
     assert poetic == set(), f"name it after its pattern or its thing, see docs/english.md: {poetic}"
@@ -68,7 +77,7 @@ def test_the_names_that_the_page_recommends_are_those_of_the_code() -> None:
     named = {
         node.name
         for path in SOURCES
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in _parsed(path)
         if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
     }
     assert {after for _, after in pairs} - named == set()

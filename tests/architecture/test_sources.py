@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.kit import citations_page
 from tests.kit.documents import PACKAGES, ROOT, docstrings, texts_of_code
 
 PAGE = (ROOT / "docs" / "sources.md").read_text(encoding="utf-8")
-ENTRIES = re.findall(r"^\| (.+?) \| (.+) \|$", PAGE, re.MULTILINE)
+ENTRIES = re.findall(r"^\| (.+?) \| (.+) \| .+? \|$", PAGE, re.MULTILINE)
 KEYS = {key for key, _ in ENTRIES} - {"key", "---"}
 SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 BARE = re.compile(r"(?<![\w.])(?<!textbook )(?<!Textbook )[TSAC] \d+\.\d|(?<![\w.])(?<![Pp]aper )F \d+(?=[-, )])")
@@ -80,3 +81,16 @@ def _authors(entry: str) -> list[str]:
 def test_no_source_is_a_file_that_is_not_here(word: str) -> None:
     named = [place for place, text in TEXTS if word in text and "thesis_acceptance.json" not in place]
     assert not named, f"{word} is no source: {named}"
+
+
+def test_the_page_of_citations_is_that_of_the_docstrings() -> None:
+    assert citations_page.PAGE.read_text(encoding="utf-8") == citations_page.text(), "run `make references`"
+
+
+def test_every_entry_says_how_it_was_checked_and_is_cited() -> None:
+    marks = {"original", "title page", "publisher, thesis", "thesis", "others", "no"}
+    checked = re.findall(r"^\| (.+?) \| .+ \| (.+?) \|$", PAGE, re.MULTILINE)
+    assert {mark for key, mark in checked if key not in ("key", "---")} <= marks
+    background = {"paper M", "IEEE Std 1554", "Titterton and Weston"}  # compared with, used for no formula
+    of_tests = {"Newey and West 1987", "Champ and Woodall 1987"}
+    assert KEYS - set(citations_page.cited()) - background - of_tests == set(), "cite it, or take it off the page"

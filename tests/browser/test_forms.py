@@ -114,6 +114,59 @@ def test_a_campaign_is_made_started_and_scheduled_by_forms(window: Watched, serv
     page.wait_for_url(re.compile("/campaign-runs/"))
 
 
+def test_a_limit_s_own_decision_rule_is_kept_by_the_form(window: Watched, service: BenchProcess) -> None:
+    """The form has no field for it: what it does not show, it hands on."""
+    limit = {
+        "quantity": "gyro.b_x",
+        "unit": "deg/h",
+        "minimum": -1e6,
+        "maximum": 1e6,
+        "source": "a test",
+        "rule": "guarded",
+    }
+    step = {"name": "only", "procedure": "calibration_12_orientations", "limits": [limit]}
+    made = service.client.post("/api/v1/campaigns", json={"name": "guarded", "title": "Before", "steps": [step]})
+    assert made.is_success, made.text
+    page = window.open("/campaigns")
+    page.locator('td[data-campaign="guarded"]').get_by_role("button", name="Change").click()
+    form = page.locator("#campaign form")
+    form.get_by_label("Title").fill("After")
+    form.get_by_label("Greatest", exact=True).fill("2e6")
+    form.get_by_role("button", name="Change the campaign").click()
+    expect(page.locator("#campaign form output p").or_(page.get_by_role("cell", name="After")).first).to_be_visible()
+    kept = service.client.get("/api/v1/campaigns/guarded").json()["campaign"]
+    assert (kept["title"], kept["steps"][0]["limits"]) == ("After", [{**limit, "maximum": 2e6}])
+
+
+def test_a_batch_is_started_from_a_search_followed_and_asked_for_its_failures(
+    window: Watched, service: BenchProcess, calibrated: str
+) -> None:
+    """Twelve short recordings one by one: those that are too short for the method fail, and their reasons are shown."""
+    page = window.open(f"/recordings?job={calibrated}")
+    page.locator("#method").select_option("allan_deviation")
+    page.locator("#each").select_option("recording")
+    page.get_by_role("button", name="Run the method").click()
+    expect(page.locator("#refusal")).to_contain_text("The batch is queued")
+    batch = page.locator("#batches tr[data-batch]").first
+    expect(batch).to_contain_text("12 of 12", timeout=60_000)
+    expect(batch).to_contain_text(f"Job {calibrated}")
+    expect(batch.locator(".badge")).to_have_text("succeeded")
+    batch.get_by_text("Results and failures").click()
+    expect(batch.get_by_role("link", name="result")).to_have_count(12)
+    page.locator("#each").select_option("")
+    page.get_by_role("button", name="Run the method").click()
+    expect(page.locator("#refusal")).to_contain_text("Choose recordings in the list above first.")
+    page.locator("#each").select_option("job")
+    page.locator("#method").select_option("noise_analysis")
+    page.get_by_role("button", name="Run the method").click()
+    short = page.locator("#batches tr[data-batch]").first
+    expect(short).to_contain_text("1 of 1", timeout=60_000)
+    expect(short.locator(".badge")).to_have_text("failed")
+    short.get_by_text("Results and failures").click()
+    expect(short).to_contain_text("too few for a noise analysis")
+    expect(short.get_by_role("button", name="Once more")).to_be_visible()
+
+
 def test_a_known_calibration_is_entered_and_a_remark_added(window: Watched, service: BenchProcess) -> None:
     page = window.open("/units/SIM-0001")
     page.get_by_role("link", name="Enter a calibration").click()

@@ -48,7 +48,7 @@ def test_an_operator_moves_the_table_by_hand(
     expect(chamber.locator("output.refused")).to_contain_text("ramp_c_min")
     rate = page.locator('form[data-kind="rate"]')
     rate.get_by_label("Rate").fill("5")
-    rate.get_by_label("From rest to rest").fill("900")
+    rate.get_by_label("Duration from rest to rest").fill("900")
     rate.get_by_role("button", name="Turn").click()
     expect(page.locator("#readings")).to_contain_text("5.0000")
     pictures: str | None = request.config.getoption("--pictures")

@@ -161,7 +161,7 @@ def test_a_prompt_is_on_every_page_and_a_stale_answer_is_refused(window: Watched
     assert second != old
     stale = service.client.post(f"/api/v1/jobs/{job}/answer", json={"prompt": old, "done": True})
     assert stale.status_code == 409
-    assert "older question" in stale.json()["detail"]
+    assert "older one" in stale.json()["detail"]
     box = other.locator(".prompt")
     box.get_by_role("button", name="It cannot be done").click()
     expect(box.locator("output")).to_contain_text("Say in the remark")

@@ -29,7 +29,7 @@ LEGAL = {
     "cancelled": set(),
 }
 """Which state may follow which, as the service's documents say; a queued job fails or is interrupted in no run here."""
-INJECTED = ("put in for an exercise", "the turntable has not answered turntable.move_to")
+INJECTED = ("an injected fault", "the turntable has not answered turntable.move_to")
 """What a failure says that was meant to happen: a fault, a lost link, a hang."""
 LATE_S = 60.0
 """How long after a stop a job may still end for it [s]: its process may be killed and started again meanwhile."""

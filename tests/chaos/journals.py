@@ -64,7 +64,7 @@ def struck(run: Run) -> Iterator[str]:
     for bench in run.topology.benches:
         for entry in journal(run.folder, bench):
             error = entry["arguments"].get("error", "")
-            if "put in for an exercise" in error:
+            if "an injected fault" in error:
                 device = entry["verb"].partition(".")[0]
                 kinds = {"lost": "lost link", "no link": "disconnect"}
                 yield f"{device} {next((kind for words, kind in kinds.items() if words in error), 'fault')}"

@@ -115,7 +115,7 @@ def test_events_come_once_each_until_the_end(client: Client, calibrated: tuple[J
 
 def test_a_job_without_result_and_one_that_takes_too_long_are_said(client: Client) -> None:
     job = client.submit("static_run", "SIM-0001", {"duration_s": 200_000.0})
-    with pytest.raises(TimedOut, match="it goes on in the service"):
+    with pytest.raises(TimedOut, match="it continues in the service"):
         client.wait(job, timeout_s=0.1)
     client.cancel(job)
     ended = client.wait(job, timeout_s=30)

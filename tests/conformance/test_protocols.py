@@ -116,7 +116,7 @@ def test_a_scpi_error_names_code_and_words() -> None:
         scpi.no_error(b'-222,"Data out of range"')
     scpi.no_error(b'+0,"No error"')
     for bad in (b'--222,"Data out of range"', b"-,x", b"1e3,x", b"222"):
-        with pytest.raises(BadAnswer, match="no entry of an error queue"):
+        with pytest.raises(BadAnswer, match="not an entry of an error queue"):
             scpi.error(bad)
 
 

@@ -26,7 +26,7 @@ def test_the_trace_is_the_sinusoid_and_the_table_rests_where_it_began(rig: Table
         await rig.port.move_to(TableAngles(20, 0, 0))
         assert len(rig.port.trace().time_s) == 0
         await rig.port.command_sinusoid(SWING)
-        with pytest.raises(DeviceFault, match="one demand at a time"):
+        with pytest.raises(DeviceFault, match="the table is moving"):
             await rig.port.move_to(TableAngles())
         await rig.clock.sleep(SWING.lead_s)
         rig.port.trace()

@@ -188,7 +188,7 @@ def test_one_that_takes_the_line_and_is_silent_is_busy(tmp_path: Path) -> None:
         server = await asyncio.start_server(silent, "127.0.0.1", 0)
         port = server.sockets[0].getsockname()[1]
         device = opened("supply", "scpi", port, tmp_path, limits=SUPPLY_LIMITS, answer_s=0.2)
-        with pytest.raises(DeviceBusy, match="another master may have it"):
+        with pytest.raises(DeviceBusy, match="another master may hold it"):
             await device.read()
         device.close()
         server.close()

@@ -166,7 +166,7 @@ def test_a_second_master_is_refused(tmp_path: Path) -> None:
         await rig.port.read()
         other = acutrol(rig.behind, tmp_path)
         try:
-            with pytest.raises(DeviceBusy, match="another master may have it"):
+            with pytest.raises(DeviceBusy, match="another master may hold it"):
                 await other.read()
         finally:
             other.close()

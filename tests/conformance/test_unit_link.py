@@ -95,8 +95,8 @@ def test_data_that_are_not_valid_yet_are_refused(tmp_path: Path, name: str) -> N
     ("kind", "words"),
     [
         ("lost_counter", r"1 frames were lost: after counter \d+ came \d+"),
-        ("wrong_crc", r"1 frames were lost: after counter \d+ came \d+ \(a frame in between was spoiled\)"),
-        ("half", r"were? lost: after counter \d+ came \d+ \(a frame in between was spoiled\)"),
+        ("wrong_crc", r"1 frames were lost: after counter \d+ came \d+ \(a frame in between was damaged\)"),
+        ("half", r"were? lost: after counter \d+ came \d+ \(a frame in between was damaged\)"),
         ("doubled", r"a frame came twice: counter \d+"),
         ("invalid", r"data are not valid, in frame \d+"),
     ],

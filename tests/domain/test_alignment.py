@@ -155,5 +155,5 @@ def test_without_a_calibration_nothing_is_aligned(channels: tuple[Channel, ...],
 def test_a_recording_on_end_is_named(channels: tuple[Channel, ...], unit: Unit):
     params = METHOD.params(latitude_deg=LATITUDE, gravity_m_s2=G)
     recordings = (resting(channels, 12.0), resting(channels, 13.0, pitch=89.0))
-    with pytest.raises(UnfitRecording, match="recording h13: the heading of a unit on end"):
+    with pytest.raises(UnfitRecording, match="recording h13: the heading of a unit that stands on end"):
         METHOD.analyse(Evidence(recordings, (calibration(),)), params, unit)

@@ -74,3 +74,24 @@ def test_the_disturbed_station_and_channel_are_named(context: Context) -> None:
     result = calibrated(context, 1, disturb)
     accelerometer = next(t for t in result.triads if t.calibration.triad == "accelerometer")
     assert accelerometer.worst.startswith(f"{accelerometer.residuals[4].label}, channel y")
+
+
+@pytest.mark.parametrize(("triad", "first"), [("gyro", 0), ("accelerometer", 3)])
+def test_exchanged_channels_fail_and_are_named_though_they_fit_as_well(
+    context: Context, triad: str, first: int
+) -> None:
+    def exchanged(raw: list[np.ndarray], _: np.random.Generator) -> None:
+        for x in raw:
+            x[:, [first + 1, first + 2]] = x[:, [first + 2, first + 1]]
+
+    def reversed_one(raw: list[np.ndarray], _: np.random.Generator) -> None:
+        for x in raw:
+            x[:, first] *= -1.0
+
+    for spoil, said in (
+        (exchanged, f"{triad}_y and {triad}_z are exchanged"),
+        (reversed_one, f"{triad}_x is reversed"),
+    ):
+        result = calibrated(context, 2, spoil)
+        failed = [c for c in result.checks if not c.passed]
+        assert [(c.name, c.note) for c in failed] == [(f"{triad} channels on their own axes", said)]

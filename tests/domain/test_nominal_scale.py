@@ -1,4 +1,4 @@
-"""Counts to nominal values and rates by hand, and the refusals of samples that are no numbers or too few."""
+"""Counts to nominal values and rates by hand, and the refusals of samples that are not numbers or too few."""
 
 from dataclasses import replace
 

@@ -76,6 +76,7 @@ def test_a_wrong_channel_fails_and_is_named(rows: Any, said: str, taken: list[Me
     assert said in result.sentences[0]
     assert len(result.sentences) == 1
     assert said in POLARITY.report(result).summary
+    assert any(said in c.note for c in result.checks if not c.passed)
 
 
 def test_a_turned_mounting_is_told_from_axes_that_no_mounting_gives(taken: list[MemoryRecording], context: Context):

@@ -109,7 +109,8 @@ def drawn_correction(truth: UnitThermalTruth, rng: np.random.Generator) -> Therm
 
 def calibrated(data: list[MemoryRecording], correction: ThermalCorrection | None):
     settings = AccelerometerSettings(False, "noise_and_table", correction, (LAG_S, LAG_S))
-    return analyse_accelerometers(data, SITE, TableUncertainty(), RECORD, settings)
+    summary, _, share, doubts = analyse_accelerometers(data, SITE, TableUncertainty(), RECORD, settings)
+    return summary, share, doubts
 
 
 def errors(summary, bias: np.ndarray) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Residuals that look like a flaw of the reference: named as what they are, and as large as the size foreseen."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from procedures.analysis.calibration.station_plan import THESIS_ORIENTATIONS
 from procedures.analysis.calibration.suspect_flaw import smallest_size, suspect
 from procedures.analysis.calibration.table_errors import TableUncertainty, table_errors
 from procedures.core.frames import orientation_beta_gamma
+from procedures.core.site import Site
 from procedures.core.units import ARCSEC
 from tests.kit.forward_model import ACCELEROMETER_NOISE, GYRO_NOISE, K_ACCELEROMETER, K_GYRO, SITE
 
@@ -20,10 +23,10 @@ DECLARED = TableUncertainty(3.0, 1.0, 1.0, 5.0)
 TRIADS = {"gyro": (GYRO_NOISE, K_GYRO, "rad/s"), "accelerometer": (ACCELEROMETER_NOISE, K_ACCELEROMETER, "m/s^2")}
 
 
-def fitted(triad: str, dice: np.random.Generator, flaw: np.ndarray):
+def fitted(triad: str, dice: np.random.Generator, flaw: np.ndarray, site: Site = SITE):
     """A fit of one set of outputs whose vectors are off by a flaw of each column, (P,) [rad]."""
     noise, matrix, unit = TRIADS[triad]
-    vectors = reference_vectors(triad, ANGLES, SITE)
+    vectors = reference_vectors(triad, ANGLES, site)
     table = table_errors(ANGLES, vectors, DECLARED, of_gravity=triad == "accelerometer")
     covariance = np.array([mean_covariance(noise, WINDOWS)] * 3)
     truth = vectors + table.sensitivity @ (flaw + table.sd * dice.normal(size=len(table.sd)))
@@ -57,6 +60,34 @@ def test_a_wrong_azimuth_is_named_with_its_size():
     assert len(good) >= 36
     sizes = [float(s.split(": ")[1].split(" ±")[0]) for s in good]
     assert np.mean(sizes) == pytest.approx(2400.0, rel=0.1)
+
+
+def test_gyros_alone_cannot_tell_an_azimuth_from_a_level_and_accelerometers_can():
+    """With the outer axis at zero, heading north, turns about up and about north both give the rate a part to the east.
+
+    They are then one column, exactly. The level is named beside the azimuth by the gyros alone, and is left out where
+    the accelerometers, which see an arcsecond of it, say nothing of it; a real level stays, and the accelerometers
+    name it.
+    """
+    north = replace(SITE, azimuth_deg=0.0)
+    azimuth, level = (column("gyro", source) * 20.0 * 60.0 * ARCSEC for source in ("azimuth", "level"))
+    for seed in range(10):
+        dice = np.random.default_rng(seed)
+        gyro = fitted("gyro", dice, azimuth, north)[0]
+        force = fitted("accelerometer", dice, 0.0 * azimuth, north)[0]
+        assert gyro.free is not None
+        assert force.free is not None
+        alone, beside = suspect(gyro.free, LABELS), suspect(gyro.free, LABELS, [force.free])
+        assert "wrong azimuth" in alone
+        assert "wrong level" in alone
+        assert "cannot tell which" in alone
+        assert beside.startswith("the residuals look like a wrong azimuth: ")
+        assert "cannot tell" not in beside
+        gyro = fitted("gyro", dice, level, north)[0]
+        force = fitted("accelerometer", dice, level, north)[0]
+        assert gyro.free is not None
+        assert force.free is not None
+        assert "wrong level" in suspect(gyro.free, LABELS, [force.free])
 
 
 def test_one_station_and_a_loose_mounting_are_told_apart():

@@ -170,7 +170,7 @@ def test_positions_are_written_as_a_program(context: Context):
     assert ":demand:position 1,-30; p 2,20.5; p 3,10\ndelay 40\n" in params.program
     assert PROCEDURE.params.model_validate_json(params.model_dump_json()) == params
     assert PROCEDURE.resolve(params, context) == params
-    with pytest.raises(BadParameter, match="not beside a program"):
+    with pytest.raises(BadParameter, match="not together with a program"):
         PROCEDURE.resolve(PROCEDURE.params(program=HOME, positions=((0.0, 0.0, 0.0, 5.0),)), context)
 
 

@@ -192,8 +192,11 @@ def test_recordings_that_do_not_hold_the_turns_are_refused(turnable: Context) ->
     with pytest.raises(UnfitRecording, match=r"x \+20 deg/s.*gyro_x counted 0.7"):
         PROCEDURE.analyse(lost, params, turnable)
     exchanged = [replace(r, raw=r.raw[:, [1, 0, 2]]) for r in recordings]
-    with pytest.raises(UnfitRecording, match="gyro_y counted them: the channels are exchanged"):
+    with pytest.raises(UnfitRecording, match="made: gyro_x and gyro_y are exchanged"):
         PROCEDURE.analyse(exchanged, params, turnable)
+    apart = [replace(r, raw=r.raw[:, [1, 0, 2]] * (1.5, 0.7, 1.0)) for r in recordings]  # other nominal scale factors
+    with pytest.raises(UnfitRecording, match="made: gyro_x and gyro_y are exchanged"):
+        PROCEDURE.analyse(apart, params, turnable)
     still = replace(recordings[0].info, station=replace(recordings[0].info.station, turn=None))
     with pytest.raises(UnfitRecording, match="its station has no whole turns"):
         PROCEDURE.analyse([replace(recordings[0], info=still), *recordings[1:]], params, turnable)

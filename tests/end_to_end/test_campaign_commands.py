@@ -1,4 +1,7 @@
-"""``bench campaign`` and ``bench schedule`` against one served process: what they print, and their exit codes."""
+"""``bench campaign`` and ``bench schedule`` against one served process: what they print, and their exit codes.
+
+The commands run in this process, but for the one that is killed; `test_command_line.py` has them as processes.
+"""
 
 import json
 import os
@@ -13,7 +16,7 @@ import pytest
 from junitparser import JUnitXml
 
 from tests.end_to_end.bench_process import BenchProcess
-from tests.kit.command_line import Command, Done, command_in, environment, one_line
+from tests.kit.command_line import Command, Done, command_here, environment, one_line
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -66,8 +69,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def bench(service: BenchProcess, folder: Path) -> Command:
-    """``bench`` as a client of the service."""
-    run = command_in(folder)
+    """``bench`` as a client of the service, in this process."""
+    run = command_here(folder)
     return lambda *arguments: run(*arguments, "--server", str(service.client.base_url))
 
 
@@ -202,8 +205,8 @@ def test_a_server_that_is_not_there_is_one_line(folder: Path, free_port: int) ->
     away = ("--server", f"http://127.0.0.1:{free_port}")
     export = ("export", "x", "-o", "x.csv")
     for arguments in (("campaign", "list"), ("campaign", "run", "good", *UNIT), ("schedule", "remove", "x"), export):
-        one_line(command_in(folder)(*arguments, *away), "does not answer", str(free_port))
-    one_line(command_in(folder)("campaign", "list", "--server", "http://x:y"), "--server http://x:y")
+        one_line(command_here(folder)(*arguments, *away), "does not answer", str(free_port))
+    one_line(command_here(folder)("campaign", "list", "--server", "http://x:y"), "--server http://x:y")
 
 
 @pytest.mark.usefixtures("added")

@@ -11,8 +11,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from bench_service.jobs.engine import SHUT_DOWN_S
 from tests.end_to_end.bench_process import BenchProcess
-from tests.kit.command_line import Command, command_in, one_line
+from tests.kit.command_line import Command, command_here, command_in, one_line
 
 pytestmark = pytest.mark.timeout(240)
 
@@ -21,8 +22,14 @@ FAST = ("--set", "dwell_s=5.0", "--set", "settle_s=0.5")
 
 @pytest.fixture
 def bench(tmp_path: Path) -> Command:
-    """``bench`` with a database of this test's own."""
+    """``bench`` as a process, with a database of this test's own."""
     return command_in(tmp_path)
+
+
+@pytest.fixture
+def bench_here(tmp_path: Path) -> Command:
+    """The same in this process: for what a command says and how it is used, not how its process ends."""
+    return command_here(tmp_path)
 
 
 @pytest.fixture(scope="module")
@@ -60,8 +67,8 @@ def test_a_run_gives_job_and_result_with_what_was_set(calibrated: Any) -> None:
     assert len(result["lineage"]["recordings"]) == 12
 
 
-def test_the_exit_code_is_the_verdict(bench: Command) -> None:
-    good = bench("run", "no_operation", "--unit", "SIM-0001")
+def test_the_exit_code_is_the_verdict(bench: Command, bench_here: Command) -> None:
+    good = bench_here("run", "no_operation", "--unit", "SIM-0001")
     assert (good.code, "verdict pass" in good.out) == (0, True)
     limits = 'limits={"gyro_bias_in_run_deg_h": 1e-9}'
     bad = bench("run", "calibration_12_orientations", "--unit", "SIM-0001", "--seed", 3, *FAST, "--set", limits)
@@ -69,7 +76,7 @@ def test_the_exit_code_is_the_verdict(bench: Command) -> None:
 
 
 def test_jobs_are_listed_newest_first(folder: Path, calibrated: Any) -> None:
-    bench = command_in(folder)
+    bench = command_here(folder)
     table = bench("jobs")
     assert table.code == 0
     assert calibrated["job"]["id"] in table.out
@@ -79,7 +86,7 @@ def test_jobs_are_listed_newest_first(folder: Path, calibrated: Any) -> None:
 
 
 def test_samples_go_out_as_csv_parquet_and_arrow(folder: Path, calibrated: Any) -> None:
-    bench = command_in(folder)
+    bench = command_here(folder)
     recording = calibrated["result"]["lineage"]["recordings"][0]["id"]
     files = {form: folder / f"out.{form}" for form in ("csv", "parquet", "arrow")}
     for file in files.values():
@@ -98,7 +105,7 @@ def test_samples_go_out_as_csv_parquet_and_arrow(folder: Path, calibrated: Any) 
 
 
 def test_what_cannot_be_exported_leaves_no_file(folder: Path, calibrated: Any) -> None:
-    bench = command_in(folder)
+    bench = command_here(folder)
     recording = calibrated["result"]["lineage"]["recordings"][0]["id"]
     refused = bench("export", recording, "-o", folder / "out.xls")
     assert refused.code == 2
@@ -122,7 +129,7 @@ def still_poses(path: Path) -> None:
     path.write_text("\n".join(lines) + "\n")
 
 
-def test_a_file_is_imported_and_analysed(bench: Command, tmp_path: Path) -> None:
+def test_a_file_is_imported_and_analysed(bench_here: Command, tmp_path: Path) -> None:
     still_poses(tmp_path / "poses.csv")
     channels = [
         {"name": f"accelerometer_{axis}", "column": axis, "quantity": "specific_force", "unit": "m/s^2"}
@@ -130,21 +137,21 @@ def test_a_file_is_imported_and_analysed(bench: Command, tmp_path: Path) -> None
     ]
     description = tmp_path / "poses.json"
     description.write_text(json.dumps({"unit": "HAND-1", "rate_hz": 50.0, "channels": channels}))
-    imported = bench("import", tmp_path / "poses.csv", "--description", description)
+    imported = bench_here("import", tmp_path / "poses.csv", "--description", description)
     assert imported.code == 0, imported.err
     recording = imported.json()["id"]
     arguments = ("analyse", "scalar_calibration", "--recording", recording)
-    one_line(bench(*arguments[:2], "--recording", "none", "--set", "gravity_m_s2=9.81"), "no recording 'none'")
-    done = bench(*arguments, "--set", "gravity_m_s2=9.81", "--json")
+    one_line(bench_here(*arguments[:2], "--recording", "none", "--set", "gravity_m_s2=9.81"), "no recording 'none'")
+    done = bench_here(*arguments, "--set", "gravity_m_s2=9.81", "--json")
     found = {p["name"]: p["estimate"] for p in done.json()["document"]["parameters"]}
     assert done.code == {"pass": 0, "fail": 1}[done.json()["verdict"]]
     assert [found[f"b_{axis}"] for axis in "xyz"] == pytest.approx([0.05, -0.03, 0.02], abs=0.002)
     assert [found[f"s_{axis}"] for axis in "xyz"] == pytest.approx([1 / 1.01, 1 / 0.99, 1 / 1.02], rel=2e-4)
-    printed = bench(*arguments, "--set", "gravity_m_s2=9.81").out
+    printed = bench_here(*arguments, "--set", "gravity_m_s2=9.81").out
     rows = {line.split()[1]: line for line in printed.splitlines() if line.startswith(("│ b_", "│ s_"))}
     assert set(rows) == {f"{kind}_{axis}" for kind in "bs" for axis in "xyz"}
     assert f"{found['s_x']:.6g}"[:6] in rows["s_x"]
-    refused = bench(*arguments)
+    refused = bench_here(*arguments)
     assert refused.code == 2
     assert "gravity_m_s2 is needed" in refused.err
 
@@ -159,9 +166,9 @@ def test_a_file_is_imported_and_analysed(bench: Command, tmp_path: Path) -> None
     ],
 )
 def test_what_cannot_be_done_is_one_line_and_exit_code_2(
-    bench: Command, arguments: tuple[str, ...], words: tuple[str, ...]
+    bench_here: Command, arguments: tuple[str, ...], words: tuple[str, ...]
 ) -> None:
-    one_line(bench(*arguments), *words)
+    one_line(bench_here(*arguments), *words)
 
 
 @pytest.mark.parametrize("arguments", [("run", "no_operation"), ("dance",), ("jobs", "--limit", "many")])
@@ -179,13 +186,13 @@ def test_a_wrong_use_shows_the_usage_and_exits_with_2(bench: Command, arguments:
         ("BENCH_ID", "no spaces"),
     ],
 )
-def test_a_bad_setting_is_one_line_that_names_it(bench: Command, name: str, value: str) -> None:
-    one_line(bench("jobs", **{name: value}), name, repr(value))
+def test_a_bad_setting_is_one_line_that_names_it(bench_here: Command, name: str, value: str) -> None:
+    one_line(bench_here("jobs", **{name: value}), name, repr(value))
 
 
 @pytest.mark.parametrize("url", ["nonsense", "sqlite:////proc/none/bench.sqlite", "sqlite:///:memory:"])
-def test_a_database_that_cannot_be_opened_is_one_line(bench: Command, url: str) -> None:
-    one_line(bench("jobs", BENCH_DATABASE_URL=url))
+def test_a_database_that_cannot_be_opened_is_one_line(bench_here: Command, url: str) -> None:
+    one_line(bench_here("jobs", BENCH_DATABASE_URL=url))
 
 
 @pytest.mark.parametrize(
@@ -193,12 +200,12 @@ def test_a_database_that_cannot_be_opened_is_one_line(bench: Command, url: str) 
     [("BENCH_UNIT_TRUTH", None), ("BENCH_TRUTH", "id = "), ("BENCH_UNIT_TRUTH", "serial = 3")],
 )
 def test_a_truth_file_that_cannot_be_used_is_one_line(
-    bench: Command, tmp_path: Path, name: str, content: str | None
+    bench_here: Command, tmp_path: Path, name: str, content: str | None
 ) -> None:
     file = tmp_path / "truth.toml"
     if content is not None:
         file.write_text(content)
-    one_line(bench("run", "no_operation", "--unit", "SIM-0001", **{name: str(file)}), str(file))
+    one_line(bench_here("run", "no_operation", "--unit", "SIM-0001", **{name: str(file)}), str(file))
 
 
 @pytest.fixture
@@ -212,15 +219,15 @@ def served(tmp_path: Path, free_port: int) -> Generator[BenchProcess]:
 
 
 def test_a_second_process_is_kept_off_the_bench_and_the_port_but_may_read(
-    served: BenchProcess, bench: Command, free_port: int
+    served: BenchProcess, bench: Command, bench_here: Command, free_port: int
 ) -> None:
     one_line(bench("serve", BENCH_PORT=str(free_port)), f"port {free_port}", "is taken", "BENCH_PORT")
-    one_line(bench("run", "no_operation", "--unit", "SIM-0001"), "bench 'sim'")
-    one_line(bench("serve", "--port", "0"), "bench 'sim'")
-    assert bench("jobs", "--json").json() == {"items": [], "next": None}
+    one_line(bench_here("run", "no_operation", "--unit", "SIM-0001"), "bench 'sim'")
+    one_line(bench_here("serve", "--port", "0"), "bench 'sim'")
+    assert bench_here("jobs", "--json").json() == {"items": [], "next": None}
     server = f"http://127.0.0.1:{free_port}"
-    assert bench("run", "no_operation", "--unit", "SIM-0001", "--server", server).code == 0
-    assert len(bench("jobs", "--json", "--server", server).json()["items"]) == 1
+    assert bench_here("run", "no_operation", "--unit", "SIM-0001", "--server", server).code == 0
+    assert len(bench_here("jobs", "--json", "--server", server).json()["items"]) == 1
 
 
 def test_a_service_that_is_asked_to_end_does_so_soon_and_its_job_goes_on_after_the_next_start(
@@ -229,12 +236,12 @@ def test_a_service_that_is_asked_to_end_does_so_soon_and_its_job_goes_on_after_t
     body = {"procedure": "calibration_12_orientations", "unit": "SIM-0001", "seed": 7}
     job = served.client.post("/api/v1/jobs", json=body).json()["id"]
     served.station_reached(job, 3)
-    assert served.terminate() < 8.0
+    assert served.terminate() < SHUT_DOWN_S, "a job was waited for that does not end"
     assert "Traceback" not in served.log.read_text()
     served.start()
     ended = served.station_reached(job, 13)
     assert (ended["state"], ended["verdict"]) == ("succeeded", "pass"), ended
     items = served.recordings(job)
     assert sorted(r["station"]["index"] for r in items if r["state"] == "complete") == list(range(12))
-    assert served.terminate() < 8.0
+    assert served.terminate() < SHUT_DOWN_S, "a job was waited for that does not end"
     assert "Traceback" not in served.log.read_text()

@@ -68,7 +68,8 @@ def test_an_engine_whose_books_cannot_be_read_ends_the_start(command: str, tmp_p
     books.write_text("Dear laboratory, " * 500)
     arguments = ("-m", "bench_service", *command.split())
     failed = Started(tmp_path, free_port, *arguments)
-    damage = "the database is damaged (file is not a database): `bench scrub` names what, `bench restore` takes a copy"
+    ways = "`bench scrub` lists the damage, `bench restore` restores a copy"
+    damage = f"the database is damaged (file is not a database): {ways}"
     sentence = f"the job engine did not start: {damage}"
     assert failed.err == f"bench: {sentence}\n"
     assert failed.code == 2

@@ -10,6 +10,9 @@ import pytest
 from bench_service.wall_clock import pause
 from tests.end_to_end.bench_process import BenchProcess
 
+LAUNCH_S = 900.0
+"""A launch of 2.3 s at 400 times real time; a part of it is stored every 0.6 s."""
+
 
 def serving(database_url: str, port: int, folder: Path) -> BenchProcess:
     """A station of about 75 s takes 0.2 s: time to hit one."""
@@ -74,7 +77,7 @@ def test_a_launch_that_is_cut_off_is_kept_and_repeated_whole(tmp_path: Path, fre
     """Its continuity is the measurement: half a launch is no launch, and the unit is switched off and on again."""
     service = serving(f"sqlite:///{tmp_path / 'bench.sqlite'}", free_port, tmp_path)
     try:
-        parameters = {"launches": 2, "duration_s": 1200.0, "off_time_s": 30.0}
+        parameters = {"launches": 2, "duration_s": LAUNCH_S, "off_time_s": 30.0}
         body = {"procedure": "static_run", "unit": "SIM-0001", "seed": 7, "parameters": parameters}
         undisturbed = service.client.post("/api/v1/jobs", json=body).json()["id"]
         assert service.station_reached(undisturbed, 3)["state"] == "succeeded"
@@ -87,7 +90,7 @@ def test_a_launch_that_is_cut_off_is_kept_and_repeated_whole(tmp_path: Path, fre
         assert job["state"] == "succeeded", job
         items = service.recordings(disturbed)
         states = sorted((r["station"]["index"], r["state"], r["count"]) for r in items)
-        whole = 1200 * 400
+        whole = int(LAUNCH_S) * 400
         assert [s for s in states if s[1] == "complete"] == [(0, "complete", whole), (1, "complete", whole)]
         (cut,) = [s for s in states if s[1] == "interrupted"]
         assert cut[0] == 1
@@ -95,7 +98,7 @@ def test_a_launch_that_is_cut_off_is_kept_and_repeated_whole(tmp_path: Path, fre
         complete = {r["station"]["index"]: r for r in items if r["state"] == "complete"}
         expected = {k: r["content_hash"] for k, r in by_station(service, undisturbed).items()}
         assert {k: r["content_hash"] for k, r in complete.items()} == expected
-        assert complete[1]["launched_s"] > complete[0]["start_s"] + 1200.0
+        assert complete[1]["launched_s"] > complete[0]["start_s"] + LAUNCH_S
     finally:
         service.client.close()
         service.terminate()

@@ -16,7 +16,7 @@ from tests.kit.command_line import Command, Done, command_in, environment
 
 pytestmark = pytest.mark.timeout(240)
 
-RUN = ("run", "calibration_12_orientations", "--unit", "SIM-0001", "--set", "dwell_s=120.0", "--set", "settle_s=0.5")
+RUN = ("run", "calibration_12_orientations", "--unit", "SIM-0001", "--set", "settle_s=0.5", "--set")
 
 
 def stations_done(folder: Path) -> int:
@@ -49,7 +49,7 @@ def interrupted(folder: Path, *arguments: str, **settings: str) -> Done:
 
 def test_a_job_left_with_ctrl_c_is_paused_and_goes_on_only_when_it_is_asked_for(tmp_path: Path) -> None:
     bench: Command = command_in(tmp_path)
-    left = interrupted(tmp_path, *RUN, BENCH_REAL_TIME_FACTOR="100")
+    left = interrupted(tmp_path, *RUN, "dwell_s=120.0", BENCH_REAL_TIME_FACTOR="100")
     (job,) = bench("jobs", "--json").json()["items"]
     assert left.code == 130
     assert job["state"] == "paused"
@@ -57,7 +57,7 @@ def test_a_job_left_with_ctrl_c_is_paused_and_goes_on_only_when_it_is_asked_for(
     assert f"job {job['id']} is paused after {job['progress']['station']} of 12 stations" in left.err
     assert f"bench job resume {job['id']}" in left.err
     assert bench("run", "no_operation", "--unit", "SIM-0001").code == 0, "no other command takes it up: it would wait"
-    resumed = bench("job", "resume", job["id"], "--json")
+    resumed = bench("job", "resume", job["id"], "--json", BENCH_REAL_TIME_FACTOR="2000")
     assert resumed.code in (0, 1), resumed.err
     assert resumed.json()["job"]["state"] == "succeeded"
     assert resumed.json()["job"]["attempt"] == 2
@@ -74,7 +74,7 @@ def service(tmp_path: Path, free_port: int) -> Generator[BenchProcess]:
 
 def test_a_job_of_a_service_goes_on_after_ctrl_c(service: BenchProcess, tmp_path: Path) -> None:
     address = str(service.client.base_url)
-    left = interrupted(tmp_path, *RUN, "--label", "lot=7", "--server", address)
+    left = interrupted(tmp_path, *RUN, "dwell_s=60.0", "--label", "lot=7", "--server", address)
     (job,) = service.client.get("/api/v1/jobs").json()["items"]
     assert left.code == 130
     assert f"`bench job wait {job['id']} --server {address}`" in left.err

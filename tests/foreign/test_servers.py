@@ -67,7 +67,7 @@ def test_a_server_that_takes_one_client_leaves_the_second_one_busy(tmp_path: Pat
         first = opened("supply", "scpi", port, tmp_path, limits=LIMITS, answer_s=2.0)
         await first.connect()
         second = opened("supply", "scpi", port, tmp_path, limits=LIMITS, answer_s=0.3)
-        with pytest.raises(DeviceBusy, match="another master may have it"):
+        with pytest.raises(DeviceBusy, match="another master may hold it"):
             await second.connect()
         await first.read()
         first.close()

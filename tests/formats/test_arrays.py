@@ -60,7 +60,7 @@ def test_mutated_mat_files_are_refused_with_the_place() -> None:
     at = len(data) - 500
     with pytest.raises(UnreadableFile, match=rf"is cut off at byte {at}: the variable at byte \d+ needs"):
         proposed(data[:at])
-    with pytest.raises(UnreadableFile, match=r"byte 128 begins no variable \(type 99\)"):
+    with pytest.raises(UnreadableFile, match=r"byte 128 is not the start of a variable \(type 99\)"):
         proposed(data[:128] + b"\x63" + data[129:])
     broken = bytearray(data)
     broken[300:340] = bytes(40)

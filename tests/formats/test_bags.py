@@ -89,16 +89,16 @@ def test_an_mcap_that_is_cut_in_its_only_chunk_says_so(mcap: bytes) -> None:
 
 
 def test_mutated_bags_are_refused_with_the_place(mcap: bytes, database: bytes, tmp_path: Path) -> None:
-    with pytest.raises(UnreadableFile, match="byte 8 begins no header record of an MCAP"):
+    with pytest.raises(UnreadableFile, match="byte 8 is not the start of a header record of an MCAP"):
         proposed(mcap[:8] + b"\x09" + mcap[9:])
     with pytest.raises(UnreadableFile, match=r"the database cannot be read|cannot be read as an SQLite database"):
         read(database[: len(database) // 2], proposed(database).description)
-    with pytest.raises(UnreadableFile, match="is an SQLite database but no ROS 2 bag"):
+    with pytest.raises(UnreadableFile, match="is an SQLite database but not a ROS 2 bag"):
         proposed(_other_database(tmp_path / "other.db"))
     bag = bag1(tmp_path / "one.bag", None)
     with pytest.raises(UnreadableFile, match=r"is a bag of #ROSBAG V1.2; version 2.0 is read"):
         proposed(b"#ROSBAG V1.2\n" + bag[13:])
-    with pytest.raises(UnreadableFile, match="byte 13 begins no record of a bag"):
+    with pytest.raises(UnreadableFile, match="byte 13 is not the start of a record of a bag"):
         proposed(bag[:13] + b"\xff" * 8 + bag[21:])
 
 

@@ -107,7 +107,7 @@ def test_mutated_ulogs_are_refused_or_read_as_far_as_they_go() -> None:
     with pytest.raises(UnreadableFile, match="is a ULog of version 7; versions 0 and 1 are read"):
         proposed(data[:7] + b"\x07" + data[8:])
     at = data.index(b"sensor_gyro:") - 1
-    with pytest.raises(UnreadableFile, match=rf"byte {at - 2} begins no message of a ULog \(type 1\)"):
+    with pytest.raises(UnreadableFile, match=rf"byte {at - 2} is not the start of a message of a ULog \(type 1\)"):
         proposed(data[:at] + b"\x01" + data[at + 1 :])
     with pytest.raises(UnreadableFile, match="uses a newer feature of ULog"):
         proposed(data[:16] + _message("B", bytes(8) + b"\x06" + bytes(31)) + data[59:])

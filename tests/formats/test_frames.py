@@ -184,7 +184,7 @@ def test_messages_of_a_vectornav() -> None:
 
 def test_a_stream_of_noise_is_no_log() -> None:
     noise = np.random.default_rng(4).integers(0, 256, 200_000).astype(np.uint8).tobytes()
-    with pytest.raises(UnreadableFile, match=r"is no delimited text: it has bytes of nought|no table of numbers"):
+    with pytest.raises(UnreadableFile, match=r"is not delimited text: it contains zero bytes|no table of numbers"):
         proposed(noise)
     with pytest.raises(UnreadableFile, match=r"has no whole iXCOM messages|wrong checksum"):
         proposed(noise, format="ixcom")

@@ -1,12 +1,17 @@
-"""Run of ``bench`` as a process of its own, with its output."""
+"""Run of ``bench`` with its output: as a process of its own, or in this one where the process is not the point."""
 
+import io
 import json
 import os
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
+
+from bench_service import __main__
 
 ROOT = Path(__file__).parents[2]
 
@@ -44,6 +49,28 @@ def command_in(folder: Path) -> Command:
             check=False,
         )
         return Done(done.returncode, done.stdout, done.stderr)
+
+    return run
+
+
+def command_here(folder: Path) -> Command:
+    """The same entry point with the same arguments, environment and folder, without the second of a start."""
+
+    def run(*arguments: object, **settings: str) -> Done:
+        out, err = io.StringIO(), io.StringIO()
+        with (
+            patch.dict(os.environ, environment(folder, **settings), clear=True),
+            patch.object(sys, "argv", ["bench", *map(str, arguments)]),
+            chdir(folder),
+            redirect_stdout(out),
+            redirect_stderr(err),
+        ):
+            try:
+                __main__.main()
+            except SystemExit as end:
+                code = end.code
+        assert isinstance(code, int)
+        return Done(code, out.getvalue(), err.getvalue())
 
     return run
 

@@ -31,10 +31,11 @@ class Client:
         return self.http.get(f"/api/v1/jobs/{job_id}").json()
 
     def wait(self, job_id: str, *states: str, seconds: float = 60.0) -> dict:
-        deadline = monotonic_s() + seconds
+        deadline, look_s = monotonic_s() + seconds, 0.01
         while (job := self.job(job_id))["state"] not in (states or ENDED):
             assert monotonic_s() < deadline, f"job {job_id} is still {job['state']}: {job}"
-            pause(0.02)
+            pause(look_s)
+            look_s = min(1.2 * look_s, 0.1)  # a look takes the service's time, which the job shares
         return job
 
     def calibrate(self, seed: int, **parameters: object) -> dict[str, str]:

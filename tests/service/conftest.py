@@ -1,5 +1,6 @@
 """A real service over a real HTTP client, on SQLite and on Postgres."""
 
+import random
 import subprocess
 import sys
 from collections.abc import Generator, Iterator
@@ -7,14 +8,38 @@ from pathlib import Path
 
 import pytest
 
+from bench_service.campaigns import service as campaign_service
 from bench_service.cli.asking.client import connect
+from bench_service.jobs import service as job_service
 from bench_service.settings import Settings
 from tests.service.client import Client
 
 
-@pytest.fixture(scope="module", params=["sqlite", "postgres"])
-def database_url(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> str:
-    if request.param == "sqlite":
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run a module's tests on each database, or on those that it names in `BACKENDS` with its reason."""
+    if "database_kind" in metafunc.fixturenames:
+        backends = getattr(metafunc.module, "BACKENDS", ("sqlite", "postgres"))
+        metafunc.parametrize("database_kind", backends, indirect=True, scope="module")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def repeatable_seeds(request: pytest.FixtureRequest) -> Generator[None]:
+    """Draw seeds where a test names none from the module's own sequence: no verdict hangs on the day."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(job_service, "SEEDS", random.Random(f"jobs of {request.module.__name__}"))
+        patch.setattr(campaign_service, "SEEDS", random.Random(f"runs of {request.module.__name__}"))
+        yield
+
+
+@pytest.fixture(scope="module")
+def database_kind(request: pytest.FixtureRequest) -> str:
+    """The kind of database that the module's service works on."""
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def database_url(database_kind: str, request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> str:
+    if database_kind == "sqlite":
         return f"sqlite:///{tmp_path_factory.mktemp('service') / 'bench.sqlite'}"
     return request.getfixturevalue("new_postgres_database")()
 

@@ -20,7 +20,7 @@ STOP = "/api/v1/benches/sim/stop"
 IN_TIME_S = 6.0
 """A stop waits 1 s for the database, and up to 0.3 s for its entry; the rest is for a loaded machine. A request that
 waits for the database waits for as long as it hangs."""
-FLOOD = 20
+FLOOD = 8
 """Stops in a row, as of a person who presses again and again, or of a program that does it by the thousand."""
 CROWD = 60
 """Requests that hang in the database meanwhile: more than there are threads for requests (40)."""

@@ -40,7 +40,7 @@ def test_one_that_wants_more_than_there_is_gets_its_place_alone() -> None:
 
 def test_a_machine_without_memory_takes_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(admission, "available_bytes", lambda: admission.SPARE_BYTES)
-    with pytest.raises(Overloaded, match="short of memory"):
+    with pytest.raises(Overloaded, match="too little free memory"):
         Places("exports", most=2, most_bytes=100).take(1)
 
 

@@ -8,6 +8,9 @@ import pytest
 from tests.service.client import Client
 from tests.service.entries import PATH, enter
 
+BACKENDS = ("sqlite",)
+"""Forms of files that other programs read; `tests/storage/test_calibration_exports.py` has what the database gives."""
+
 
 @pytest.fixture(scope="module")
 def client(sqlite_client: Client) -> Client:

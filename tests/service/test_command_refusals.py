@@ -56,7 +56,7 @@ def test_what_is_no_bench_service_is_named_with_its_answer(
     with answering(lambda method, path: answer) as address:
         line = refused(capsys, *arguments, "--server", address)
     assert f"{address}/api/v1/" in line
-    assert f"is no bench service: it answered 200 OK: {answer[2][:15]}" in line
+    assert f"is not a bench service: it answered 200 OK: {answer[2][:15]}" in line
     assert len(line) < 400
     assert not list(tmp_path.iterdir())
 
@@ -86,7 +86,7 @@ def test_a_refusal_of_any_form_is_told(
 @pytest.mark.parametrize("host", ["ex..ample", "a" * 64 + ".org"])
 def test_an_address_that_no_resolver_takes_is_named(capsys: pytest.CaptureFixture[str], host: str) -> None:
     line = refused(capsys, "jobs", "--server", f"http://{host}")
-    assert f"--server http://{host}: {host!r} is no name of a host" in line
+    assert f"--server http://{host}: {host!r} is not a host name" in line
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,7 @@ def test_a_service_that_stays_away_is_given_up_with_the_way_back_and_no_old_repo
         job = capsys.readouterr().err.splitlines()[-1]
     assert told.count("502 Bad Gateway") == 2, "once on the display, once at the end"
     last = told.splitlines()[-1]
-    assert "waited for 0 s. The service has run r1 and goes on with it: the same command with --key 'night 7'" in last
+    assert "waited for 0 s. The service has run r1 and continues it: the same command with --key 'night 7'" in last
     assert not list(tmp_path.iterdir())
     key = keyless.split("--key ")[1].split()[0]
     assert len(key) == 36, "a command without a key of the user's has one of its own"
@@ -130,7 +130,7 @@ def test_an_old_report_that_cannot_be_removed_is_said_before_anything_is_asked(
 ) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    for file, why in (("/proc/version", "an old /proc/version cannot be removed"), (str(pipe), "no ordinary file")):
+    for file, why in (("/proc/version", "an old /proc/version cannot be removed"), (str(pipe), "not an ordinary file")):
         with answering(lambda method, path: pytest.fail("asked")) as address:
             assert run(address, *CAMPAIGN, "--junit", file) == 2
         assert why in capsys.readouterr().err

@@ -61,7 +61,7 @@ def test_jobs_are_queued_ordered_paused_and_cancelled(bench: Bench) -> None:
     assert f"#{first['number']} " in bench("jobs").out
     assert f"job {second['id']} is paused" in bench("job", "pause", second["id"]).out
     assert f"job {second['id']} is queued" in bench("job", "resume", second["id"], "--no-wait").out
-    one_line(bench("job", "answer", third["id"], "--done"), "asks nothing")
+    one_line(bench("job", "answer", third["id"], "--done"), "has no open prompt")
     assert [j["id"] for j in bench("jobs", "--label", "lot=7", "--json").json()["items"]] == [third["id"]]
     for made in (third, second, first):
         assert bench("job", "cancel", made["id"]).code == 0
@@ -88,7 +88,7 @@ def test_a_stop_is_released_with_a_name_and_a_remark(bench: Bench, address: str)
         pause(0.05)
     done = bench(*release)
     assert done.code == 0, done.err
-    assert "the bench goes on" in done.out
+    assert "the bench takes jobs again" in done.out
     assert httpx.get(f"{address}/api/v1/benches/sim/stops").json()["items"][0]["released_by"] == "Olena"
 
 
@@ -167,7 +167,7 @@ def test_a_station_that_is_given_up_leaves_the_pause_asked_for(bench: Bench, add
         leaving.leave(Impatient(client), job, None, said.append)  # pyright: ignore[reportArgumentType]
         assert client.get(f"/api/v1/jobs/{job['id']}").json()["pause_requested"]
     assert "Ctrl-C again" in said[0]
-    assert "Nothing goes on with it by itself" in said[1]
+    assert "It does not continue by itself" in said[1]
     bench("job", "cancel", job["id"])
 
 
@@ -252,7 +252,7 @@ def test_a_calibration_is_entered_from_a_file_and_exported(bench: Bench, tmp_pat
     (tmp_path / "no.pdf").write_bytes(b"%PDF-1.7\n")
     one_line(bench("certificate", "check", tmp_path / "no.pdf", "--certificate", tmp_path / "lab.cert.pem"), "PDF")
     assert bench("calibration", "reject", "SIM-0001", known, "--remark", "wrong unit").code == 0
-    one_line(bench(*make), "no certificate is made of it: calibration")
+    one_line(bench(*make), "no certificate can be made of it: calibration")
     refused = bench("calibration", "export", "SIM-0001", known, "--format", "excel")
     assert refused.code != 0
     assert "ardupilot" in refused.err

@@ -128,7 +128,8 @@ def test_a_unit_that_is_not_fit_goes_no_further(sqlite_client: Client) -> None:
     run_id = start(sqlite_client, "acceptance", seed=5, parameters={**SCALED_DOWN, "static": static})["id"]
     run = ended(sqlite_client, run_id)
     assert (run["state"], run["verdict"]) == ("succeeded", "fail")
-    first, *others = run["steps"]
+    polarity, first, *others = run["steps"]
+    assert (polarity["name"], polarity["verdict"]) == ("polarity", "pass")
     assert (first["verdict"], {step["state"] for step in others}) == ("fail", {"skipped"})
     assert {step["job"] for step in others} == {None}
     assert others[0]["reason"].startswith("gate: static failed (gyro_x random walk = ")

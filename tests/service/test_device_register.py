@@ -250,7 +250,7 @@ def test_a_full_disk_costs_lines_of_the_journal_and_no_state(small_disk: Path) -
         ("hang", "no JSON"),
         ('{"rules": [{"verb": "*", "kind": "hang", "probability": 1.5}]}', "rules.0.probability = 1.5"),
         ('{"rules": [{"verb": "*", "kind": "melt", "probability": 0.5}]}', "rules.0.kind = 'melt'"),
-        ('{"rules": [{"verb": "*", "kind": "hang", "probability": 0.5, "lasts_s": 2}]}', "lasts_s is said of a lost"),
+        ('{"rules": [{"verb": "*", "kind": "hang", "probability": 0.5, "lasts_s": 2}]}', "lasts_s applies to a lost"),
         ('{"seed": 1}', "rules"),
         ("[1]", "valid dictionary"),
     ],

@@ -95,7 +95,7 @@ def test_a_package_that_cannot_be_loaded_is_named(monkeypatch: pytest.MonkeyPatc
     )
     with pytest.raises(Misconfigured, match=r"broken.*cannot be loaded"):
         registry.driver("chamber", "broken")
-    with pytest.raises(Misconfigured, match="no DeviceDriver of that name"):
+    with pytest.raises(Misconfigured, match="not a DeviceDriver of that name"):
         registry.driver("chamber", "other")
     with pytest.raises(Misconfigured, match="there is simulated"):
         registry.driver("chamber", "nothing")

@@ -90,7 +90,7 @@ def test_a_body_that_is_announced_too_long_is_refused_before_it_comes(small: htt
             "/api/v1/recordings", content=pieces(), headers={**headers, "Content-Length": str(len(body))}
         )
         assert answer.status_code == 413
-        assert answer.json()["errors"][0]["message"] == "at most 1500000 bytes are taken"
+        assert answer.json()["errors"][0]["message"] == "at most 1500000 bytes are accepted"
     except httpx.WriteError:
         assert came < len(body)  # the line was closed while it was still sending
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bench_service.campaigns.campaign import DecisionRule
-from bench_service.campaigns.decision import decided
+from bench_service.campaigns.campaign import DecisionRule, StepLimit
+from bench_service.campaigns.decision import decided, rule_of
 from bench_service.campaigns.power import beyond, preview, smallest_step
 from procedures.core.limits import Limit, PlannedCheck, check
 
@@ -70,5 +70,8 @@ def test_a_value_without_uncertainty_says_so() -> None:
 
 def test_a_limit_may_have_a_rule_of_its_own() -> None:
     made = check("value", 0.9, Limit("1", maximum=1.0), 0.1)
-    assert decided(made, DecisionRule(), "guarded").passed is False
-    assert decided(made, DecisionRule(rule="guarded"), "simple").passed is True
+    limit = {"quantity": "gyro.b_x", "unit": "1", "maximum": 1.0, "source": "a test"}
+    own = {rule: StepLimit.model_validate({**limit, "rule": rule}) for rule in ("simple", "guarded", None)}
+    assert decided(made, rule_of(own["guarded"], DecisionRule())).passed is False
+    assert decided(made, rule_of(own["simple"], DecisionRule(rule="guarded"))).passed is True
+    assert decided(made, rule_of(own[None], DecisionRule(rule="guarded"))).passed is False

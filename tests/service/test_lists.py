@@ -64,7 +64,9 @@ def test_an_unknown_name_in_a_query_is_refused_with_the_known_ones(sqlite_client
     assert "unit" in errors["foo"]
     assert "simulated" in errors["foo"]
     none = sqlite_client.http.post("/api/v1/jobs", params={"dry": "1"}, json={})
-    assert [e["message"] for e in none.json()["errors"] if e["field"] == "dry"] == ["none: this address takes no query"]
+    assert [e["message"] for e in none.json()["errors"] if e["field"] == "dry"] == [
+        "none: this address takes no query parameters"
+    ]
     assert sqlite_client.http.get("/metrics", params={"any": "1"}).status_code == 200
 
 

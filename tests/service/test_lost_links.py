@@ -201,7 +201,7 @@ def test_a_link_that_is_lost_for_a_while_keeps_the_bench_stopped_for_so_long(tmp
         job = client.wait(client.submit(seed=1)["id"])
         lost = json.loads((tmp_path / "bench-sim.turntable.lost").read_text())
         begun = monotonic_s()
-        assert "the turntable cannot be reached: its link is lost (put in for an exercise)" in job["error"]["message"]
+        assert "the turntable cannot be reached: its link is lost (an injected fault)" in job["error"]["message"]
         assert "the turntable cannot be reached" in refused_release(client)
         assert bench_of(client)["safety"]["devices"]["powered"] is False
         while client.http.post(RELEASE).status_code == 409:

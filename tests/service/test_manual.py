@@ -256,7 +256,7 @@ def test_it_ends_by_itself_in_mid_motion_while_the_service_is_busy(client: Clien
     while now().isoformat() < hand.lease["until"].replace("Z", "+00:00"):  # requests as fast as they are answered
         assert client.http.get("/api/v1/jobs").status_code == 200
     lease = hand.ended()
-    assert (lease["ended_because"], lease["safe"]) == ("its time was over", True)
+    assert (lease["ended_because"], lease["safe"]) == ("its time has ended", True)
     assert _safe(folder)
     # A quarter of a second for the look at the time, a second for braking at the factor, and a busy machine.
     late_s = (_moment(lease["ended_at"]) - _moment(lease["until"])).total_seconds()

@@ -36,13 +36,13 @@ def bench(address: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.
 
 def test_manual_mode_from_start_to_end(bench: Bench) -> None:
     one_line(bench("home"), "is not in manual mode")
-    assert "nobody has its devices open" in bench("read").out
+    assert "no process has its devices open" in bench("read").out
     assert "in manual mode by ann until" in bench("start", "--reason", "a look", "--by", "ann").out
     one_line(bench("start", "--reason", "me too", "--by", "bob"), "is in manual mode by ann")
     moved = bench("go", "--middle-deg", 20, "--by", "ann")
     assert (moved.code, moved.out) == (0, "go_to: done: at rest at 0.0000, 20.0000, 0.0000 deg\n")
     one_line(bench("go", "--middle-deg", 200, "--by", "ann"), "middle_deg", "-190 … 190")
-    one_line(bench("home", "--by", "bob"), "only its holder commands")
+    one_line(bench("home", "--by", "bob"), "only its holder may command")
     turning = bench("rate", "outer", 5, "--duration-s", 900, "--no-wait", "--by", "ann")
     assert (turning.code, turning.out.split(":")[1].strip()) == (0, "accepted")
     refused = bench("home", "--by", "ann")

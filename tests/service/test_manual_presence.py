@@ -47,7 +47,10 @@ def test_a_lease_lives_while_somebody_answers_clients(
         assert lease is None
         return
     assert lease is not None
-    assert (lease["safe"], lease["ended_because"]) == (True, "no process that answers clients was heard of for 1 s")
+    assert (lease["safe"], lease["ended_because"]) == (
+        True,
+        "no process that serves clients has given a heartbeat for 1 s",
+    )
     state = DeviceRegister(tmp_path, "sim").read()
     assert state is not None
     assert state.safe

@@ -95,7 +95,7 @@ def hung(x: np.ndarray) -> np.ndarray:
         (constant, "reads 7 throughout"),
         (saturated, "saturated"),
         (stuck_bit, "bit 3 (of 8 counts) is stuck at 1"),
-        (hung, "the data link seems to have hung"),
+        (hung, "the data link seems to have stalled"),
     ],
 )
 def test_a_flaw_is_refused_in_a_sentence(client: Client, flaw: Callable[[np.ndarray], np.ndarray], words: str) -> None:

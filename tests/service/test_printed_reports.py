@@ -10,17 +10,17 @@ from pathlib import Path
 import pytest
 
 from bench_service.cli.asking.client import connect
-from bench_service.evidence.reports.printing_process import open_printing
-from bench_service.evidence.work_processes import WorkProcesses
+from bench_service.evidence.catalogue import Catalogue
+from bench_service.evidence.reports.result_report import gathered, result_report
+from bench_service.evidence.reports.unit_report import unit_report
 from bench_service.formats.certificate.document import certificate
 from bench_service.formats.certificate.laboratory import laboratory_of
 from bench_service.formats.certificate.rules import faults
 from bench_service.formats.certificate.signature import KeyPair, new_key, signed, verified
-from bench_service.formats.printed.document import Paragraph, PrintedDocument
-from bench_service.formats.printed.typesetting import printable, typeset
+from bench_service.persistence.stores import open_stores
 from bench_service.settings import Settings
-from bench_service.wall_clock import now
 from tests.kit.pdf_a import attached, structural_faults, text_of
+from tests.kit.printed_words import words_of
 from tests.service.client import Client
 from tests.service.entries import PATH, enter
 
@@ -223,18 +223,30 @@ def test_pages_lead_to_the_reports(calibrated: Calibrated) -> None:
         assert f"/api/v1{page}/report.pdf" in calibrated.client.http.get(page).text
 
 
-def test_a_process_of_its_own_prints_the_same_bytes() -> None:
-    document = PrintedDocument(
-        "A", "B", "PASS", "c", now().replace(year=2026, microsecond=0), (Paragraph("#d *e* $f$"),)
-    )
-    processes = WorkProcesses(open_printing, at_once=1)
+def test_a_static_run_shows_the_noise_as_found_and_as_left_and_its_trend(calibrated: Calibrated) -> None:
+    """Two short launches; the record of the second one's report begins where the first one's ended."""
+    http = calibrated.client.http
+    noted = http.post("/api/v1/units/SIM-0001/notes", json={"text": "a pin of J2 is bent", "by": "Олена"})
+    assert noted.is_success, noted.text
+    short = {"launches": 1, "duration_s": 600.0, "sample_rate_hz": 50.0, "off_time_s": 10.0}
+    jobs = [calibrated.client.submit("static_run", seed=seed, parameters=short)["id"] for seed in (5, 6)]
+    first, second = (calibrated.client.wait(job)["result"] for job in jobs)
+    stores, opened = open_stores(f"sqlite:///{calibrated.books}")
     try:
-        found = base64.b64decode(processes.result("print", document))
+        results = [stores.results.get(r) for r in (first, second)]
+        one, two = (
+            words_of(result_report(stores, Catalogue(), gathered(stores, r, stores.jobs.get(r.job_id))))
+            for r in results
+        )
+        unit = words_of(unit_report(stores, "SIM-0001"))
     finally:
-        processes.close()
-    assert found == typeset(document)
-    assert "#d *e* $f$" in text_of(found), "text is no markup"
-
-
-def test_what_a_pdf_a_may_not_hold_is_written_as_its_code() -> None:
-    assert printable("a\x00b\u200bc漢\ue000√\nЇ") == "abc[U+6F22][U+E000]√\nЇ"
+        opened.dispose()
+    for words in ("noise of the gyros data sheet", f"result {first}", "a pin of J2 is bent", "Олена (name as given)"):
+        assert words in one, words
+    assert "Noise of the unit from one static run" not in one, "one result is no trend"
+    for words in (f"noise of the gyros result {first}", f"result {second}", "Noise of the unit from one static run"):
+        assert words in two, words
+    for words in ("Quantization of the gyros", f"Origin: result {second}", "a pin of J2 is bent"):
+        assert words in unit, words
+    record = http.get("/api/v1/units/SIM-0001").json()
+    assert record["gyro"]["noise_origin"] == f"result {second}"

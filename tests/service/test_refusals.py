@@ -307,10 +307,10 @@ def test_a_channel_that_is_not_there_is_refused_with_those_that_are(client: Clie
 TIMED = [0.0, 0.01, 0.02, 0.05, 0.06]
 FILES = {
     "line cut off": ({}, [HEAD + b"1,2\n3"], ("line 3 has 1 columns, 2 were expected", "cut off")),
-    "gzip cut off": ({}, [gzip.compress(GOOD + b"1,2\n" * 9999)[:-20]], ("compressed file is cut off",)),
+    "gzip cut off": ({}, [gzip.compress(GOOD + b"1,2\n" * 9999)[:-20]], ("a compressed file that is cut off",)),
     "not a number": ({}, [HEAD + b"1,2\nnan,4\n"], ("line 3, column 'gyro_x': 'nan'", "finite number")),
     "a word": ({}, [HEAD + b"1,2\n3,four\n"], ("line 3, column 'gyro_y': 'four'", "finite number")),
-    "unknown column": ({}, [b"gyro_x,b\n1,2\n"], ("not one column 'gyro_y'", "the columns are gyro_x, b")),
+    "unknown column": ({}, [b"gyro_x,b\n1,2\n"], ("has no column 'gyro_y'", "the columns are gyro_x, b")),
     "empty": ({}, [b""], ("line 1 is empty",)),
     "gap": (
         {"time_column": "t"},

@@ -80,7 +80,7 @@ def test_of_a_bench_on_another_host_only_that_host_can_say_that_it_is_safe(
     assert "not on this host" in said["explanation"]
     refused = reader.post(RELEASE)
     assert refused.status_code == 409
-    assert "nobody on theirs has said that they are safe" in refused.json()["detail"]
+    assert "no process there has reported that they are safe" in refused.json()["detail"]
     stores, database = open_stores(url)
     stores.benches.confirm_safe("sim", now(), "the supervisor, process 1 on bench-host")
     database.dispose()

@@ -13,6 +13,9 @@ from procedures.core.imu_model import correct, triad_calibration
 from tests.service.client import Client
 from tests.service.entries import PATH, enter
 
+BACKENDS = ("sqlite",)
+"""Forms of samples; `tests/storage` has recordings on both databases."""
+
 GYROS = ["gyro_x_rad_per_s", "gyro_y_rad_per_s", "gyro_z_rad_per_s"]
 
 

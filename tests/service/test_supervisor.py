@@ -95,7 +95,7 @@ def test_only_a_stop_that_is_not_answered_kills_and_only_the_process_that_is_mea
     assert state(tmp_path).safe
     supervisor.look()
     assert (
-        "has seen a stop and not made the bench safe within 0.3 s (the table moves, the unit is on): killed"
+        "has seen a stop and has not made the bench safe within 0.3 s (the table moves, the unit is on): killed"
         in books.said[0]
     )
     pause(0.5)

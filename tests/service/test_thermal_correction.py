@@ -18,6 +18,9 @@ from simulators.truth.thermal import REFERENCE_C
 from tests.service.client import Client
 from tests.service.page import page
 
+BACKENDS = ("sqlite",)
+"""What is computed with a correction; `tests/storage/test_corrections.py` has its rows on both databases."""
+
 UNIT = "/api/v1/units/SIM-0001"
 SPREAD = np.array([1e-9, 4e-8, 1e-9, 4e-8, 8e-7, 2e-8, 8e-7, 2e-8])
 WARM = {"dwell_s": 70.0, "thermal_correction": "current"}

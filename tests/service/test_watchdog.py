@@ -153,7 +153,7 @@ def test_a_fault_for_an_exercise_goes_the_same_way(stores: Stores, tmp_path: Pat
     plan = FaultPlan.parse('{"rules": [{"verb": "turntable.move_to", "kind": "disconnect", "probability": 1}]}')
     driver = FailingDriver(tmp_path, faults=plan)
     runner, job, why = failed_first_station(stores, driver)
-    assert why == "turntable.move_to: no link, put in for an exercise"
+    assert why == "turntable.move_to: the link is lost, an injected fault"
     assert runner.make_safe(job.id).good
     assert safe(driver)
 

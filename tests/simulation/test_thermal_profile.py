@@ -1,19 +1,22 @@
 """A profile driven on the simulated bench: followed, soaked by the unit's own sensors, and every fault told by name."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncGenerator, Callable
+from contextlib import aclosing
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from procedures import steps
+from procedures import chamber_steps
 from procedures.analysis.thermal.cycle.series import read_cycle
 from procedures.analysis.turns.plan import UPRIGHT
 from procedures.bench.errors import BenchError, DeviceFault, Disconnected, SoakNotReached
 from procedures.bench.imu import Stream
 from procedures.core.recording import MemoryRecording, RecordingInfo, Station
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
+from simulators.imu.device import SimImu
 from simulators.truth import BenchTruth, default_bench, default_unit
 from simulators.truth.thermal import ChamberFault, ThermometerTruth
 from simulators.world import SimulatedBench, WorldConfig, build
@@ -83,7 +86,7 @@ def drive(
 
     async def run() -> Run:
         world = build(WorldConfig(unit, truth, seed=7, sample_rate_hz=RATE_HZ, thermal=True))
-        stream = await steps.record_profile(world, station(legs), "x up, please")
+        stream = await chamber_steps.record_profile(world, station(legs), "x up, please")
         found = Run(world, stream, [], None)
         try:
             async for block in stream.blocks:
@@ -206,10 +209,43 @@ def test_a_lost_link_is_passed_on_and_the_unit_is_switched_off_all_the_same():
 def test_a_bench_without_a_chamber_is_refused_before_anything_moves():
     async def run() -> None:
         bench = build(WorldConfig(seed=7, sample_rate_hz=RATE_HZ))
-        await steps.record_profile(bench, station(), "x up, please")
+        await chamber_steps.record_profile(bench, station(), "x up, please")
 
     with pytest.raises(DeviceFault, match="needs a thermal chamber"):
         asyncio.run(run())
+
+
+@pytest.mark.parametrize("record", [chamber_steps.record_profile, chamber_steps.record_cold_start])
+def test_whoever_stops_reading_early_closes_the_units_stream(
+    record: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+):
+    """Without it the unit would go on recording until the collector finds the stream."""
+    closed: list[bool] = []
+    begun = SimImu.record
+
+    async def noting(blocks: AsyncGenerator[np.ndarray]) -> AsyncGenerator[np.ndarray]:
+        async with aclosing(blocks):
+            try:
+                async for block in blocks:
+                    yield block
+            finally:
+                closed.append(True)
+
+    def noted(imu: SimImu, *asked: Any) -> Stream:
+        stream = begun(imu, *asked)
+        return replace(stream, blocks=noting(stream.blocks))  # pyright: ignore[reportArgumentType]
+
+    async def run() -> int:
+        world = build(WorldConfig(default_unit(), default_bench(), seed=7, sample_rate_hz=RATE_HZ, thermal=True))
+        more = ("x up, please",) if record is chamber_steps.record_profile else ()
+        stream = await record(world, station(LEGS[:1]), *more)
+        first = await anext(stream.blocks)
+        await stream.blocks.aclose()
+        assert closed == [True]
+        return first.shape[1] - len(stream.channels)
+
+    monkeypatch.setattr(SimImu, "record", noted)
+    assert asyncio.run(run()) == 0, "the chamber's readings stand beside"
 
 
 def test_limits_of_the_chamber_are_violations_of_the_plan():

@@ -190,6 +190,19 @@ def _watched(bench: BenchProcess, samples: Samples, since_s: float, folder: Path
         return
 
 
+def descriptors_of(process_id: int) -> Counter[str]:
+    """Open descriptors of a process by what they are: the name of a file, or sockets, pipes and the like."""
+    found: Counter[str] = Counter()
+    folder = Path(f"/proc/{process_id}/fd")
+    for entry in folder.iterdir():
+        try:
+            target = os.readlink(entry)
+        except OSError:
+            continue
+        found[Path(target).name if target.startswith("/") else target.split(":")[0]] += 1
+    return found
+
+
 def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) -> list[str]:
     """Run the soak; print its figures, and return what was not kept."""
     chance, samples = Random(seed), Samples()
@@ -220,6 +233,7 @@ def run(minutes: float, factor: float, seed: int, mean_s: float, kill_s: float) 
                     _watched(bench, samples, begun_s, folder)
                 pause(0.1)
             bench.until(lambda: _idle(load), 120)
+            print(f"descriptors at the end: {dict(descriptors_of(bench.process.pid).most_common(12))}")
             good, wrong = checked_recordings(load, bench.client, journal)
         finally:
             bench.end()

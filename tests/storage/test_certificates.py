@@ -43,7 +43,7 @@ def a_certificate(seed: int, laboratory: Laboratory, **changes: object) -> etree
 
 
 def by_xmlsec(data: bytes, pair: KeyPair) -> None:
-    """The other implementation. Raises `xmlsec.Error` where the signature does not hold."""
+    """The other implementation. Raises `xmlsec.Error` where the signature is not valid."""
     root = etree.fromstring(data)
     context = xmlsec.SignatureContext()
     context.key = xmlsec.Key.from_memory(pair.certificate, xmlsec.constants.KeyDataFormatCertPem)
@@ -84,7 +84,7 @@ def test_each_changed_digit_is_refused_by_both(pair: KeyPair, laboratory: Labora
     digits = [i for i in range(values.start(1), values.end(1)) if data[i : i + 1].isdigit()]
     for i in digits[::17]:
         changed = data[:i] + str((int(data[i : i + 1]) + 1) % 10).encode() + data[i + 1 :]
-        with pytest.raises(CertificateRefused, match="does not hold"):
+        with pytest.raises(CertificateRefused, match="is not valid"):
             verified(changed, pair.certificate)
         with pytest.raises(xmlsec.Error):
             by_xmlsec(changed, pair)
@@ -104,7 +104,7 @@ def test_another_key_no_signature_and_two_are_refused(pair: KeyPair, laboratory:
     wrapped = b"<x>" + data.partition(b"?>")[2] + b"</x>"
     with pytest.raises(CertificateRefused):
         verified(wrapped, pair.certificate)
-    with pytest.raises(CertificateRefused, match="document type"):
+    with pytest.raises(CertificateRefused, match="DOCTYPE"):
         parsed(b'<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>')
 
 
@@ -182,6 +182,6 @@ def test_the_check_at_the_command_line(tmp_path: Path, pair: KeyPair, laboratory
     made = bench("key", "Other", "-o", tmp_path / "other")
     assert made.returncode == 0, made.stderr
     assert (tmp_path / "other.key.pem").stat().st_mode & 0o777 == 0o600
-    assert "never written over" in bench("key", "Other", "-o", tmp_path / "other").stderr
+    assert "never overwritten" in bench("key", "Other", "-o", tmp_path / "other").stderr
     bad = bench("check", tmp_path / "c.xml", "--certificate", tmp_path / "other.cert.pem")
-    assert (bad.returncode, "does not hold" in bad.stderr) == (2, True)
+    assert (bad.returncode, "is not valid" in bad.stderr) == (2, True)

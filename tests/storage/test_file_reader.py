@@ -104,12 +104,16 @@ def test_a_reader_that_dies_on_a_file_is_a_refusal(reader: FileReader) -> None:
     assert len(_read(reader, b"x\n1\n2\n")[1]) == 2
 
 
-def _kill_children_of_host(reader: FileReader) -> None:
+def _children(reader: FileReader) -> list[int]:
+    """The processes that read for it now, or have ended and not been waited for."""
     host = reader._host
     assert host is not None
-    children = Path(f"/proc/{host.pid}/task/{host.pid}/children").read_text().split()
-    for child in children:
-        os.kill(int(child), signal.SIGKILL)
+    return [int(child) for child in Path(f"/proc/{host.pid}/task/{host.pid}/children").read_text().split()]
+
+
+def _kill_children_of_host(reader: FileReader) -> None:
+    for child in _children(reader):
+        os.kill(child, signal.SIGKILL)
 
 
 def test_a_host_that_died_is_begun_again(reader: FileReader) -> None:
@@ -123,11 +127,9 @@ def test_a_host_that_died_is_begun_again(reader: FileReader) -> None:
 def test_a_reading_that_is_left_ends_its_process(reader: FileReader) -> None:
     data = b"x\n" + b"12345.678\n" * 300_000
     with reader.reading([ImportFile("a.csv", io.BytesIO(data))], _description()):
-        pass
-    host = reader._host
-    assert host is not None
+        (left,) = _children(reader)
     for _ in range(500):
-        if not Path(f"/proc/{host.pid}/task/{host.pid}/children").read_text().split():
+        if left not in _children(reader):  # others may be there still: each reading has one, which ends after it
             break
         assert len(_read(reader, b"x\n1\n2\n")[1]) == 2
     else:

@@ -60,14 +60,14 @@ def test_a_message_does_not_repeat_the_file() -> None:
     [
         (b"PK\x03\x04" + bytes(100), "is a zip archive that is damaged or cut off"),
         (b"\x89HDF\r\n\x1a\n" + bytes(100), "cannot be read as HDF5"),
-        (b"ULog\x01\x12\x35" + bytes(100), "byte 16 begins no message of a ULog"),
+        (b"ULog\x01\x12\x35" + bytes(100), "byte 16 is not the start of a message of a ULog"),
         (
             gzip.compress(b"ULog\x01\x12\x35" + bytes(100), mtime=0),
             "a ULog of a flight controller: it is read as it is",
         ),
         (b"\x80\x04\x95" + bytes(100), "a Python pickle, which is never opened"),
         (b'{"a": [1, 2]}', "JSON: save it as CSV"),
-        (b"\x01\x00\x02\xff" * 500, "it has bytes of nought"),
+        (b"\x01\x00\x02\xff" * 500, "it contains zero bytes"),
     ],
 )
 def test_files_of_other_kinds_are_named(start: bytes, words: str) -> None:

@@ -92,7 +92,7 @@ def test_columnar_files(form: str) -> None:
     )
     with pytest.raises(UnreadableFile, match="'s' is of type string"):
         _read(sink.getvalue(), channels=[{**GYRO_X, "column": "s"}])
-    with pytest.raises(UnreadableFile, match="not one column 'z'"):
+    with pytest.raises(UnreadableFile, match="has no column 'z'"):
         _read(sink.getvalue(), channels=[{**GYRO_X, "column": "z"}])
     with pytest.raises(UnreadableFile, match=r"a\.csv: cannot be read"):
         _read(sink.getvalue()[:200])

@@ -156,7 +156,7 @@ def test_a_job_is_put_aside_and_taken_up_again_as_its_next_attempt(stores: Store
     stores.jobs.resume(late.id, now())  # while its bench is made safe
     back = stores.jobs.put_aside(late.id, now())
     assert (back.state, back.attempt) == (JobState.QUEUED, 2)
-    with pytest.raises(IllegalTransition, match="is running, and nobody asked it to pause"):
+    with pytest.raises(IllegalTransition, match="is running and no pause was requested"):
         stores.jobs.resume(stores.jobs.add(new_job(state=JobState.RUNNING)).id, now())
     for state in FINAL:
         ended = stores.jobs.add(new_job(state=state))

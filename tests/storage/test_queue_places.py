@@ -117,12 +117,12 @@ def test_the_front_knows_the_next_job_however_many_are_passed_over(stores: Store
     """Over the edges of all pages: equal priorities and moments are told apart by their ids."""
     assert stores.queue.front("sim", NOW) == BenchQueue("sim", NOW, ())
     put_off = NOW + 60 * SECOND
-    for number in (FIRST_PAGE - 1, 1, FIRST_PAGE * (LONGER - 1), 1):
+    for number in (FIRST_PAGE - 1, 1, FIRST_PAGE * (LONGER - 1), FIRST_PAGE * LONGER):
         queued(stores, new_job, number, queued_at=NOW, not_before=put_off)
         front = stores.queue.front("sim", NOW)
         assert front == stores.queue.look("sim", NOW), "nobody may start, so all were read"
         assert front.next() is None
-    free = queued(stores, new_job, FIRST_PAGE * LONGER**2)
+    free = queued(stores, new_job, FIRST_PAGE * LONGER * 2 + 1)  # one more than the third page ends with
     look, front = stores.queue.look("sim", NOW), stores.queue.front("sim", NOW)
     assert front.next() == look.next()
     assert front.entries == look.entries[: len(front.entries)]

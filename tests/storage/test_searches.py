@@ -11,6 +11,7 @@ from bench_service.campaigns.stores import Stores
 from bench_service.model.job import Job
 from bench_service.model.records import NewRecording, StoredResult
 from bench_service.model.search import LabelSought, Search
+from bench_service.persistence import text_search
 from bench_service.wall_clock import new_id
 from procedures.core.limits import Verdict
 from procedures.core.recording import RawArray, Station
@@ -91,13 +92,42 @@ def test_several_labels_must_all_hold(stores: Stores, jobs: list[Job]) -> None:
     assert [job.id for job in stores.jobs.list(search=both).items] == [jobs[6].id, jobs[0].id]
 
 
+@pytest.mark.parametrize("few", [False, True])
 @pytest.mark.parametrize("text", TEXTS)
-def test_jobs_are_found_by_text(stores: Stores, jobs: list[Job], text: str) -> None:
+def test_jobs_are_found_by_text(
+    stores: Stores, jobs: list[Job], text: str, few: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if few:  # more different values than are gone through one by one: found all the same
+        for bound in ("MOST", "LISTED", "LABEL_NAMES"):
+            monkeypatch.setattr(text_search, bound, 1)
+
     def texts(job: Job) -> list[str | None]:
         return [job.id, job.procedure, job.unit, job.bench, job.requested_by, *job.labels, *job.labels.values()]
 
     wanted = [job.id for job in jobs[::-1] if holds(text, texts(job))]
     assert [job.id for job in stores.jobs.list(search=Search(text=text)).items] == wanted
+
+
+def test_a_job_is_found_by_its_id_and_by_a_part_of_it(stores: Stores, jobs: list[Job]) -> None:
+    def found(text: str) -> list[str]:
+        return [job.id for job in stores.jobs.list(search=Search(text=text)).items]
+
+    for job in jobs:
+        for part in (job.id, job.id.upper(), job.id[-6:], job.id[14:23], job.id[:8]):
+            assert found(part) == [other.id for other in jobs[::-1] if part.lower() in other.id]
+    assert found(jobs[0].id + "0") == found("nothing") == []
+
+
+def test_a_text_goes_on_from_page_to_page(stores: Stores, jobs: list[Job]) -> None:
+    seen, cursor = [], None
+    while True:
+        page = stores.jobs.list(search=Search(text="ot"), bench="south", after=cursor, limit=2)
+        seen += [job.id for job in page.items]
+        if (cursor := page.next) is None:
+            break
+    labelled = [job for job in jobs if any("ot" in part.lower() for pair in job.labels.items() for part in pair)]
+    assert seen == [job.id for job in labelled[::-1] if job.bench == "south"]
+    assert len(seen) > 2
 
 
 def test_a_search_goes_on_from_page_to_page(stores: Stores, jobs: list[Job]) -> None:

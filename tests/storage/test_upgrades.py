@@ -16,6 +16,7 @@ from alembic.util import load_python_file
 
 from bench_service.model.job import Job
 from bench_service.model.records import NewRecording, StoredResult
+from bench_service.model.search import Search
 from bench_service.persistence import Database, open_stores
 from bench_service.persistence.database import connect
 from bench_service.persistence.migration import SCRIPTS, newest_revision, upgrade
@@ -88,6 +89,9 @@ def test_a_database_of_each_landed_form_is_upgraded_with_what_it_holds(
     samples = _samples()
     writer.write(samples)
     recording = writer.seal()
+    writer = today.recordings.open(new_recording(source={"files": [{"name": "Drive_2.csv"}, {"name": "b.csv"}]}))
+    writer.write(samples)
+    imported = writer.seal()
     result = today.results.add(new_result(job_id=job.id, recordings=((recording.id, recording.content_hash),)))
     early = connect(empty_database_url)
     with early.write_connection() as connection:
@@ -106,12 +110,14 @@ def test_a_database_of_each_landed_form_is_upgraded_with_what_it_holds(
     assert stores.recordings.get(recording.id).info == recording
     np.testing.assert_array_equal(np.concatenate(list(stores.recordings.load(recording.id).blocks())), samples)
     assert stores.results.get(result.id).document == result.document
+    for text, found in (("drive_2", imported), ("B.CSV", imported), (job.stations[0].label, recording)):
+        assert [one.info.id for one in stores.recordings.list(search=Search(text=text)).items] == [found.id]
     database.dispose()
     (copy,) = copies.iterdir()  # of the database as it was
     with sqlite3.connect(copy) as kept:
         assert kept.execute("SELECT version_num FROM alembic_version").fetchone() < (newest_revision(),)
-        assert kept.execute("SELECT id, content_hash FROM recordings").fetchall() == [
-            (recording.id, recording.content_hash)
+        assert kept.execute("SELECT id, content_hash FROM recordings ORDER BY id").fetchall() == [
+            (one.id, one.content_hash) for one in (recording, imported)
         ]
         assert kept.execute("PRAGMA integrity_check").fetchone() == ("ok",)
 

@@ -22,7 +22,7 @@ from procedures.core.limits import PlannedCheck
 from procedures.procedure import Context, PredictedUncertainty
 from simulators.truth import Array, BenchTruth, TriadTruth, UnitTruth
 from tests.kit.procedures import simulated_context
-from tests.validation.acceptance_rig import Fault
+from tests.validation.acceptance_rig import Fault, Samples
 
 POWER = 0.99
 """Probability with which a fault of the smallest size is to be found."""
@@ -62,7 +62,18 @@ def faults(campaign: Campaign) -> list[Fault]:
         _late("accelerometer bias step", bias, f"{step:.3g} m/s^2", "accelerometer", 2, 0.0, step),
         *_of_reference(campaign),
         Fault("noisy gyro", (walk,), truth=_noisy(noise), size=f"{noise:.3g} deg/√h"),
-        Fault("axes exchanged", ("gyro_x", "gyro_y"), samples=_exchanged, size="gyro x and y"),
+        Fault(
+            "gyro axes exchanged",
+            ("gyro_x and gyro_y are exchanged",),
+            samples=_exchanged("gyro", "x", "y"),
+            size="x, y",
+        ),
+        Fault(
+            "accelerometer axes exchanged",
+            ("accelerometer_y and accelerometer_z are exchanged",),
+            samples=_exchanged("accelerometer", "y", "z"),
+            size="y, z",
+        ),
         Fault("dead channel", ("gyro_z",), samples=_dead, size="gyro z, from the first launch"),
         Fault("stuck thermometer", ("temperature_case",), samples=_stuck, size="case"),
     ]
@@ -164,13 +175,16 @@ def _noisy(deg_sqrt_h: float):
     return truth
 
 
-def _exchanged(_step: str, channels: tuple[str, ...], raw: Array) -> Array:
-    if "gyro_x" not in channels:
-        return raw
-    x, y = channels.index("gyro_x"), channels.index("gyro_y")
-    changed = raw.copy()
-    changed[:, [x, y]] = raw[:, [y, x]]
-    return changed
+def _exchanged(triad: str, one: str, other: str) -> Samples:
+    def samples(_step: str, channels: tuple[str, ...], raw: Array) -> Array:
+        if f"{triad}_{one}" not in channels:
+            return raw
+        pair = [channels.index(f"{triad}_{axis}") for axis in (one, other)]
+        changed = raw.copy()
+        changed[:, pair] = raw[:, pair[::-1]]
+        return changed
+
+    return samples
 
 
 def _dead(_step: str, channels: tuple[str, ...], raw: Array) -> Array:

@@ -131,6 +131,7 @@ def main() -> int:
     kinds = {name: make for name, make in {**CLEAN, **FOREIGN}.items() if options.kind in name}
     if not kinds:
         parser.error(f"no kind's name contains {options.kind!r}; the kinds: {', '.join([*CLEAN, *FOREIGN])}")
+    console = Console(width=150)
     table = Table(
         title=f"Claims about foreign noise, {options.records} records a kind of 20 to 60 min", title_style="bold"
     )
@@ -156,8 +157,9 @@ def main() -> int:
         seeds = track(range(options.records), name, console=Console(stderr=True))
         claims = [claim(make(np.random.default_rng((options.seed, numbers[name], seed)))) for seed in seeds]
         table.add_row(*row(name, claims))
+        # A run of hours that is cut short has still shown the kinds that it has finished.
+        console.print(dict(zip(columns, row(name, claims), strict=True)), highlight=False)
         failed += failures(name, claims)
-    console = Console(width=150)
     console.print(table)
     console.print(
         "Q to R: share of records where the truth lies in the interval, or below the limit where no value is given.",

@@ -117,7 +117,7 @@ class Identification:
                 "log in first (POST /api/v1/session, or /log-in in a browser), or send a token as Authorization: Bearer"
             )
             return Refusal(401, "NotLoggedIn", text, client or "this host")
-        text = "requests from elsewhere than a loopback address need a token, as Authorization: Bearer"
+        text = "requests from an address other than a loopback one need a token, as Authorization: Bearer"
         return Refusal(401, "NoToken", text, client or "this host")
 
     def _by_token(self, headers: Headers, local: bool, client: str | None) -> Found:

@@ -136,7 +136,7 @@ def add_token(body: NewToken, service: Service, response: Response, me: Me) -> M
 
 @router.delete("/tokens/{token}", responses=problems(404, 507))
 def revoke_token(token: TokenName, service: Service) -> TokenView:
-    """Revoke a token by its id or name, within a second everywhere. Jobs that were submitted with it go on."""
+    """Revoke a token by its id or name, within a second everywhere. Jobs that were submitted with it continue."""
     return TokenView.of(service.access.revoke_token(token))
 
 

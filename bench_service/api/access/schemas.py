@@ -31,13 +31,15 @@ class LogIn(Request):
 class SessionView(BaseModel):
     """The sender of this request, its role and its rights."""
 
-    name: str | None = Field(description="The proved name; null: nobody has logged in, or nobody has to")
+    name: str | None = Field(description="Authenticated name; null: no log-in, or none is needed")
     role: Role | None = Field(description="null: log in first")
     team: str
-    proof: Proof = Field(description='How the name is proved; "none" for the one user of a service without accounts')
-    rights: list[Right] = Field(description="What this sender may do")
+    proof: Proof = Field(
+        description='How the name was authenticated; "none" for the one user of a service without accounts'
+    )
+    rights: list[Right] = Field(description="Rights of this sender")
     log_in_needed: bool = Field(description="Whether this service has accounts, so that people log in")
-    csrf: str | None = Field(description="To be repeated in X-CSRF-Token with every change, where it is not null")
+    csrf: str | None = Field(description="Value that every change repeats in X-CSRF-Token, unless it is null")
     expires_at: datetime | None = Field(description="When the session ends by itself, unless it is used before")
 
     @classmethod
@@ -98,7 +100,9 @@ class NewToken(Request):
     name: Name
     role: Role
     team: Team = ""
-    days: float = Field(90.0, gt=0, le=LONGEST_DAYS, allow_inf_nan=False, description="Time until it expires [d]")
+    days: float = Field(
+        90.0, gt=0, le=LONGEST_DAYS, allow_inf_nan=False, description="Time until the token expires [d]"
+    )
 
     @property
     def lasting(self) -> timedelta:
@@ -117,7 +121,7 @@ class TokenView(BaseModel):
     created_by: str
     expires_at: datetime
     revoked_at: datetime | None
-    last_used_at: datetime | None = Field(description="To the minute; null: never, as far as is stored")
+    last_used_at: datetime | None = Field(description="Last use, to the minute; null: no use is stored")
 
     @classmethod
     def of(cls, token: AccessToken) -> "TokenView":
@@ -128,7 +132,7 @@ class TokenView(BaseModel):
 class MadeToken(TokenView):
     """A new token with its secret, which is shown this once."""
 
-    token: str = Field(description="Send it as Authorization: Bearer …; it cannot be read again")
+    token: str = Field(description="The token, sent as Authorization: Bearer …; it is shown only here")
 
 
 class ApprovalView(BaseModel):

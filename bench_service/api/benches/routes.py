@@ -125,7 +125,7 @@ def release_stop(
     """Release one stop, the client's own or another's, once the bench is known to be safe.
 
     The person who releases it is the one who has logged in; without accounts, a name is given as `by` or in
-    `X-Requested-By`. The jobs in the bench's queue go on once
+    `X-Requested-By`. The jobs in the bench's queue continue once
     no stop stands.
     """
     by = sender.name(body.by) or requested_by
@@ -141,7 +141,7 @@ def release_stop(
 def release(bench_id: str, service: Service, client: ClientName) -> BenchView:
     """Release the only stop of a bench that stands; where several stand, 409 with their ids.
 
-    The bench must be known to be safe. The jobs that wait in its queue go on.
+    The bench must be known to be safe. The jobs that wait in its queue continue.
     """
     service.stops.release_only(bench_id, client, "")
     return view_of(service, bench_id)

@@ -21,7 +21,7 @@ class StopRequest(Request):
     reason: str = Field("stopped by an operator", min_length=1, max_length=500)
     wait: bool = Field(
         True,
-        description="Answer once the devices are safe and the database has it, at most a second later; false: at once",
+        description="Answer once the devices are safe and the stop is stored, at most a second later; false: at once",
     )
     by: By | None = None
 
@@ -29,7 +29,7 @@ class StopRequest(Request):
 class ReleaseRequest(Request):
     """Request to release a stop, with author and remark."""
 
-    remark: str = Field(min_length=1, max_length=500, description="What was looked at before the bench was released")
+    remark: str = Field(min_length=1, max_length=500, description="What was checked before the bench was released")
     by: By | None = None
 
 
@@ -39,14 +39,16 @@ class StopView(BaseModel):
     id: str
     bench: str
     at: datetime
-    by: str = Field(description="Who stopped it, as far as known; a process that could not make it safe names itself")
+    by: str = Field(description="Person or process that stopped the bench, as far as known")
     reason: str
-    safe_at: datetime | None = Field(description="When the bench's own host saw it safe since; null: not confirmed")
-    safe_by: str = Field(description="Who last commanded the devices then")
-    released_at: datetime | None = Field(description="null: it stands")
+    safe_at: datetime | None = Field(
+        description="When the bench's own host confirmed it safe after the stop; null: not confirmed"
+    )
+    safe_by: str = Field(description="Process that had last commanded the devices then")
+    released_at: datetime | None = Field(description="Time of the release; null: the stop is in force")
     released_by: str
     remark: str = Field(description="Remark of the person who released it")
-    entered_at: datetime | None = Field(description="When the database took it: later than `at` where it was away")
+    entered_at: datetime | None = Field(description="When it was stored; later than `at` if the database was away")
 
     @classmethod
     def of(cls, stop: BenchStop) -> "StopView":
@@ -65,22 +67,22 @@ class Releasing(BaseModel):
     """The answer to a release: the released stop, and those that still stand."""
 
     stop: StopView = Field(description="The stop that was released")
-    standing: list[StopView] = Field(description="Stops that still keep the bench from working, oldest first")
+    standing: list[StopView] = Field(description="Stops still in force, oldest first")
 
 
 class DevicesView(BaseModel):
     """The last state that a bench's devices reported, as the bench's own host has it."""
 
-    at: datetime | None = Field(description="When something was last asked of them; null: nothing ever was")
-    by: str = Field(description="Who asked")
-    job: str | None = Field(description="The job for which it was asked")
-    table: str = Field(description='"at rest", or "moving": a demand has not ended, whoever sent it')
+    at: datetime | None = Field(description="When the devices were last commanded; null: never")
+    by: str = Field(description="Person who asked for it")
+    job: str | None = Field(description="Job for which they were commanded")
+    table: str = Field(description='"at rest", or "moving": a demand has not ended, from any process')
     angles_deg: tuple[float, float, float] | None = Field(
         description="Outer, middle, inner axis where the table last came to rest; null: not known"
     )
     powered: bool = Field(description="Whether the unit has power")
-    chamber_target_c: float | None = Field(description="Where the chamber goes; null: nowhere, or there is none")
-    unsafe: list[str] = Field(description="What is not as it must be on a bench that is left alone")
+    chamber_target_c: float | None = Field(description="Target of the chamber [°C]; null: no target, or no chamber")
+    unsafe: list[str] = Field(description="Conditions that are not safe for an unattended bench")
 
     @classmethod
     def of(cls, state: DeviceState | None) -> "DevicesView | None":
@@ -103,10 +105,12 @@ class SafetyView(BaseModel):
     """The known safety of a bench. Software is not the emergency stop: that is a separate circuit at the table."""
 
     safe: bool | None = Field(description="Table at rest, unit off, chamber led to ambient; null: not known here")
-    explanation: str = Field(description="What is known, and who sees to it")
+    explanation: str = Field(description="State of the devices as a sentence, with the process that handles it")
     devices: DevicesView | None = Field(description="null: they are on another host")
     worker: str | None = Field(description="The process of this host that drives the bench")
-    supervisor: str | None = Field(description="The process of this host that makes it safe where the worker cannot")
+    supervisor: str | None = Field(
+        description="The process of this host that makes the bench safe if the worker cannot"
+    )
 
     @classmethod
     def of(cls, safety: Safety) -> "SafetyView":
@@ -126,15 +130,15 @@ class BenchView(BaseModel):
     id: str
     description: BenchDescription
     state: str = Field(description='"idle", "busy" with a job, in "manual" mode, or "stopped" until it is released')
-    stopped: str | None = Field(description="Why it is stopped")
-    stops: list[StopView] = Field(description="The stops that stand, oldest first; each is released by its id")
-    job: str | None = Field(description="The job that drives it")
-    units: list[str] = Field(description="Units that it can test")
-    live: BenchLive | None = Field(description="The last that its driver said; null: it never had one")
-    driver_seen_at: datetime | None = Field(description="When that was")
-    driver_there: bool = Field(description="Whether a driver is there now, as far as can be known from here")
+    stopped: str | None = Field(description="Reasons of the stops in force")
+    stops: list[StopView] = Field(description="Stops in force, oldest first; each is released by its id")
+    job: str | None = Field(description="Job that drives the bench")
+    units: list[str] = Field(description="Serials of the units that it can test")
+    live: BenchLive | None = Field(description="Last live state from the driver; null: it never had a driver")
+    driver_seen_at: datetime | None = Field(description="Time of `live`")
+    driver_there: bool = Field(description="Whether a driver is active now, judged by its heartbeat")
     safety: SafetyView
-    driven_by: str | None = Field(description="Who drives it now: a worker's process; null: nobody, its jobs wait")
+    driven_by: str | None = Field(description="Worker process that drives it now; null: none, its jobs wait")
     queued: int = Field(description="How many jobs wait in its queue")
 
 
@@ -144,12 +148,12 @@ class QueueEntryView(BaseModel):
     job: str
     number: int = Field(description="The job's short number")
     position: int = Field(description="From 1, in the order of the queue")
-    ahead: int = Field(description="Jobs that go before it as things stand, the running one included")
-    waiting: str = Field(description="Why it does not run yet")
+    ahead: int = Field(description="Number of jobs ahead of it now, the running one included")
+    waiting: str = Field(description="Reason why it does not run yet")
     priority: int
     unit: str
     queued_at: datetime
-    not_before: datetime | None = Field(description="It is not tried before this moment")
+    not_before: datetime | None = Field(description="Earliest time of the next attempt")
     reservation: str | None
 
     @classmethod
@@ -174,6 +178,6 @@ class Stopping(BaseModel):
     bench: str
     stop: str = Field(description="Id of this stop: a release names it")
     job: str | None = Field(description="The job that was running, which is being cancelled")
-    safety: SafetyView = Field(description="What was known within a second of the stop; ask the bench for later")
-    books: str | None = Field(description="Why the database does not have this stop yet; null: it has")
+    safety: SafetyView = Field(description="State within a second of the stop; the bench has the later state")
+    books: str | None = Field(description="Why this stop is not stored yet; null: it is stored")
     note: str = "This is a software stop. The emergency stop is a hardware circuit beside the table."

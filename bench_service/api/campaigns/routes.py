@@ -47,7 +47,7 @@ class RunSubmission(CampaignOn):
     parameters: dict[str, dict[str, Any]] = Field(
         default_factory=dict[str, dict[str, Any]],
         max_length=100,
-        description="Step -> parameters of its procedure that are other than the campaign's",
+        description="Step -> parameters that replace the campaign's",
     )
 
 

@@ -35,12 +35,12 @@ class ScheduleSubmission(Request):
     bench: Annotated[str, NAME] | None = None
     missed: Missed = Field(
         Missed.RUN_ONCE,
-        description="What becomes of a start that nothing was running to see: one run makes up for all, or skipped",
+        description="Missed starts: run_once makes up for all by one run, skip leaves them out",
     )
     start_within_s: float = Field(
-        300.0, ge=1.0, le=604_800.0, allow_inf_nan=False, description="A start that is later than this was missed"
+        300.0, ge=1.0, le=604_800.0, allow_inf_nan=False, description="Delay after which a start counts as missed [s]"
     )
-    overlap: Overlap = Field(Overlap.SKIP, description="What becomes of a start while its previous run is open")
+    overlap: Overlap = Field(Overlap.SKIP, description="Start while the previous run is open: skip or queue")
     enabled: bool = True
     labels: Labels = Field(default_factory=Labels, max_length=20)
 

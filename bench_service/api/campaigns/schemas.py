@@ -23,7 +23,7 @@ class CampaignView(BaseModel):
 
     name: str
     campaign: Campaign
-    shipped: bool = Field(description="It comes with the service and cannot be changed")
+    shipped: bool = Field(description="Whether it is part of the service, and cannot be changed")
 
     @classmethod
     def of(cls, campaign: Campaign) -> "CampaignView":
@@ -43,7 +43,7 @@ class CampaignMade(BaseModel):
     name: str
     campaign: Campaign
     shipped: bool = False
-    duration_s: float = Field(description="Bench time by the plans")
+    duration_s: float = Field(description="Bench time by the plans [s]")
     warnings: list[str] = Field(description="Steps left out, limits out of reach")
 
     @classmethod
@@ -57,10 +57,10 @@ class CampaignPreview(BaseModel):
     campaign: str
     unit: str
     steps: list[StepPlan]
-    duration_s: float = Field(description="Bench time by the plans")
+    duration_s: float = Field(description="Bench time by the plans [s]")
     data_bytes: int
     warnings: list[str]
-    decision: str = Field(description="Rule by which values are held to limits")
+    decision: str = Field(description="Decision rule for values and limits")
     false_alarm: float = Field(
         description="Probability that the unit as recorded fails a limit of known false alarm, were they independent"
     )
@@ -70,15 +70,15 @@ class StepRunView(BaseModel):
     """One step of a campaign run."""
 
     name: str
-    does: str = Field(description="Its procedure or method")
+    does: str = Field(description="Procedure or method of the step")
     state: StepState
     attempt: int = Field(description="0 before the first")
     job: str | None
     result: str | None
-    earlier_jobs: list[str] = Field(description="Of attempts that ended in error")
+    earlier_jobs: list[str] = Field(description="Jobs of attempts that ended in error")
     seed: int | None
     verdict: Verdict | None
-    checks: list[Check] = Field(description="The procedure's own, the campaign's limits, its trends")
+    checks: list[Check] = Field(description="Checks of the procedure, of the campaign's limits and of its trends")
     warnings: list[str]
     reason: str = Field(description="Why it failed, was cancelled or skipped")
     started_at: datetime | None
@@ -96,21 +96,21 @@ class CampaignRunView(BaseModel):
     verdict: Verdict | None
     steps: list[StepRunView]
     cancel_requested: bool
-    waiting: str = Field(description="What it waits for, where that is not its own job's work")
-    reason: str = Field(description="Why it ended as it did, where no step says it")
+    waiting: str = Field(description="What the run waits for, other than its own job; else empty")
+    reason: str = Field(description="Reason of the end, where no step gives it")
     warnings: list[str]
     simulated: bool
     seed: int | None = Field(description="Base: a step's seed is the base + its number + 1000 a retry")
     labels: Labels
     team: str = Field(description="Team whose members act on it and on its jobs; empty: everybody")
-    duration_s: float = Field(description="Bench time by the plans")
-    deadline_at: datetime | None = Field(description="When its window closes")
+    duration_s: float = Field(description="Bench time by the plans [s]")
+    deadline_at: datetime | None = Field(description="Latest end of the run: no step begins later")
     schedule: str | None
     planned_at: datetime | None
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None
-    page: str = Field(description="Path of the page for an eye")
+    page: str = Field(description="Path of the page in the browser")
 
     @classmethod
     def of(cls, run: CampaignRun) -> "CampaignRunView":
@@ -130,8 +130,8 @@ class CampaignReport(BaseModel):
     """Outcome of a run with everything that made it."""
 
     run: CampaignRunView
-    campaign: Campaign = Field(description="As it was when the run was asked for")
-    lineage: list[StepLineage] = Field(description="Of every attempt of a step that had a job or a result")
+    campaign: Campaign = Field(description="Campaign as it was at the request")
+    lineage: list[StepLineage] = Field(description="Lineage of every attempt of a step with a job or a result")
     code_versions: list[str]
 
     @classmethod
@@ -159,7 +159,7 @@ class ScheduleView(BaseModel):
     next_at: datetime | None = Field(description="UTC; null while disabled")
     last_at: datetime | None = Field(description="The last planned start that was seen")
     last_run: str | None
-    last_outcome: str = Field(description="What became of it")
+    last_outcome: str = Field(description="Outcome of that start")
 
     @classmethod
     def of(cls, schedule: Schedule) -> "ScheduleView":
@@ -179,7 +179,7 @@ class TrendView(BaseModel):
     serial: str
     procedure: str
     quantity: str
-    unit: str = Field(description="Of the values; empty where the result does not say")
+    unit: str = Field(description="Unit of the values; empty where the result does not state it")
     points: list[TrendPoint] = Field(description="Oldest first")
     limits: ControlLimits | None = Field(description="Null with fewer than two points")
     signals: list[Signal] = Field(description="Points at which a Western Electric rule is broken")

@@ -55,6 +55,6 @@ class AdmittedStream(StreamingResponse):
         try:
             await super().__call__(scope, receive, send_in_time)
         except TimeoutError:  # the server closes the connection of an answer that does not end
-            log.warning("%s: the client took no byte for %g s and is let go", scope["path"], STALLED_S)
+            log.warning("%s: the client read nothing for %g s; its stream is closed", scope["path"], STALLED_S)
         finally:
             self.give_back()

@@ -99,4 +99,4 @@ def _declared_bytes(scope: Scope) -> int:
 
 def _refuse_longer(size: int, most: int) -> None:
     if size > most:  # of FastAPI's reading of a body, this kind of error alone comes out as it is
-        raise HTTPException(413, f"the body has {size} bytes or more: at most {most} bytes are taken")
+        raise HTTPException(413, f"the body has {size} bytes or more: at most {most} bytes are accepted")

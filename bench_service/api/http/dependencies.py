@@ -31,7 +31,7 @@ IdempotencyKey = Annotated[
         min_length=1,
         max_length=200,
         pattern=NO_CONTROL_CHARACTERS.pattern,
-        description="A create that is repeated with the same key and body gives what the first one made",
+        description="A create repeated with the same key and body returns the result of the first one",
     ),
 ]
 NOBODY = Identity("", Role.VIEWER, Proof.NONE, proven=False)
@@ -44,7 +44,7 @@ By = Annotated[
         min_length=1,
         max_length=WHO_LENGTH,
         pattern=NO_CONTROL_CHARACTERS.pattern,
-        description=f"Who does it; without it, `{REQUESTED_BY}` counts",
+        description=f"Name of the person who acts; default: `{REQUESTED_BY}`",
     ),
 ]
 
@@ -66,8 +66,8 @@ _Claimed = Annotated[
         max_length=WHO_LENGTH,
         pattern=NO_CONTROL_CHARACTERS.pattern,
         description=(
-            "Who asks, for the job and the audit trail, where nobody logs in; else the proved name counts. Without "
-            "both, the trail has the client's address"
+            "Name of the person who sends it, for the job and the audit trail; used only without a log-in. Without "
+            "either, the trail has the client's address"
         ),
     ),
 ]

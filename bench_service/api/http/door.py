@@ -62,14 +62,16 @@ class Door:
         """Return why a request is refused; None where it is let in. `query`: what follows its path."""
         hosts = headers.getlist("host")
         if len(hosts) != 1 or not self._ours(hosts[0]):
-            text = "the name that this request speaks to is not one of this service: BENCH_HOSTS lists further names"
+            text = "the host name in this request is not one of this service: BENCH_HOSTS lists further names"
             return Refusal(421, "ForeignHost", text, ", ".join(hosts) or "none")
         for origin in headers.getlist("origin"):
             if not _same_origin(origin, hosts[0]):
-                return Refusal(403, "ForeignOrigin", "a page of another site may not ask this service", origin)
+                return Refusal(
+                    403, "ForeignOrigin", "a page of another site may not send requests to this service", origin
+                )
         site = headers.get("sec-fetch-site", "none")
         if site not in ("same-origin", "none") and not _follows_link(headers, method):
-            return Refusal(403, "ForeignSite", "a page of another site may not ask this service", site)
+            return Refusal(403, "ForeignSite", "a page of another site may not send requests to this service", site)
         if names_token(f"{query} {headers.get('referer', '')}"):
             text = "a token in an address stands in logs and histories: revoke it, and send it as Authorization: Bearer"
             return Refusal(400, "TokenInAddress", text, "a token")
@@ -122,7 +124,11 @@ class Doorkeeper:
         self._logged_s[refusal.kind] = now_s
         given, path = refusal.given[:200], without_tokens(scope["path"])[:200]
         log.warning(
-            "refused %s %s, %s: %s; the next minute's are not logged", scope["method"], path, refusal.kind, given
+            "refused %s %s, %s: %s; further ones of this kind are not logged for a minute",
+            scope["method"],
+            path,
+            refusal.kind,
+            given,
         )
 
 

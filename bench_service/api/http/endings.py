@@ -37,7 +37,7 @@ class AnswerAtTheEnd:
                 raise
             if begun:  # a stream, cut here: the server closes its connection, and the client sees that it is not whole
                 return
-            text = "the service is ending, and this request had not ended: ask again, with the same Idempotency-Key"
+            text = "the service is shutting down: send this request again, with the same Idempotency-Key"
             await respond(Request(scope), 503, text, "Ending")(scope, receive, send)
 
 

@@ -14,8 +14,8 @@ class FieldError(BaseModel):
     """A faulty field of a request."""
 
     field: Shown = Field(description="Path of the field, for example parameters.dwell_s")
-    message: Shown = Field(description="What is wrong, with the allowed range")
-    value: Any = Field(default=None, description="What was given; text where JSON has no such number")
+    message: Shown = Field(description="What is wrong, with the allowed range and the way out")
+    value: Any = Field(default=None, description="Value that was given; text where JSON has no such number")
 
 
 class Problem(BaseModel):

@@ -27,7 +27,7 @@ async def only_known_names(request: Request) -> None:
     known = _query_names(route)
     unknown = [name for name in request.query_params if name not in known]
     if unknown:
-        allowed = f"one of {', '.join(known)}" if known else "none: this address takes no query"
+        allowed = f"one of {', '.join(known)}" if known else "none: this address takes no query parameters"
         raise RequestValidationError(
             [{"type": "extra_forbidden", "loc": ("query", name), "msg": allowed, "input": name} for name in unknown]
         )
@@ -39,9 +39,9 @@ def _query_names(route: APIRoute) -> tuple[str, ...]:
 
 
 async def _search(
-    verdict: Annotated[Verdict | None, Query(description="Of a recording: its job's")] = None,
-    since: Annotated[AwareDatetime | None, Query(description="Made at this moment or later; with its zone")] = None,
-    until: Annotated[AwareDatetime | None, Query(description="Made before this moment; with its zone")] = None,
+    verdict: Annotated[Verdict | None, Query(description="Verdict; of a recording, that of its job")] = None,
+    since: Annotated[AwareDatetime | None, Query(description="Created at this time or later, with time zone")] = None,
+    until: Annotated[AwareDatetime | None, Query(description="Created before this time, with time zone")] = None,
     label: Annotated[
         list[LABEL] | None,
         Query(max_length=20, description="`name` or `name=value` of the job; several must all hold"),

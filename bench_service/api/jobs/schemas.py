@@ -24,8 +24,8 @@ class JobSubmission(PreviewRequest):
     procedure: str = NAME
     priority: int = Field(10, ge=1, le=1000, description="Smaller runs first")
     labels: Labels = Field(default_factory=Labels, max_length=50)
-    seed: int | None = Field(None, ge=0, lt=2**48, description="Of a simulated bench: same seed, same bytes")
-    retries: int = Field(0, ge=0, le=5, description="How often a fault of the bench is answered by trying again")
+    seed: int | None = Field(None, ge=0, lt=2**48, description="Seed of a simulated bench: same seed, same bytes")
+    retries: int = Field(0, ge=0, le=5, description="Number of retries after a fault of the bench")
     reservation: str | None = Field(None, max_length=100, description="The reservation under which it runs")
     mounting: str | None = Field(
         None, max_length=100, description="Id of the unit's mounting; null: the one that stands on its bench, if any"
@@ -44,7 +44,7 @@ class PromptAnswer(Request):
     """The answer of the person at the bench to a job's prompt."""
 
     prompt: str = Field(max_length=100, description="Id of the prompt that is answered: an older one's is refused")
-    done: bool = Field(description="It is done; false: it will not be, and the job ends cancelled")
+    done: bool = Field(description="true: it is done; false: it will not be done, and the job ends cancelled")
     remark: str = Field("", max_length=500, pattern=NO_NUL)
 
 
@@ -81,7 +81,7 @@ class Progress(BaseModel):
     station: int = Field(description="Stations finished")
     stations: int
     fraction: float
-    eta_s: float | None = Field(description="Bench time left, by the plan")
+    eta_s: float | None = Field(description="Bench time left, by the plan [s]")
     eta_wall_s: float | None = Field(
         description="Real time left at the rate so far, without the analysis; null where it does not run, or its "
         "driver is silent"
@@ -94,13 +94,13 @@ class PlaceView(BaseModel):
     """Place of a queued job in its bench's queue."""
 
     position: int = Field(description="From 1, in the order of its bench's queue")
-    ahead: int = Field(description="Jobs that go before it as things stand, the running one included")
+    ahead: int = Field(description="Number of jobs ahead of it now, the running one included")
 
 
 class PromptView(BaseModel):
     """A prompt for a person at the bench; the job waits for the answer."""
 
-    id: str = Field("", description="The answer names it")
+    id: str = Field("", description="Id of the prompt, which the answer names")
     text: str
     asked_at: datetime
     angles_deg: tuple[float, float, float] | None = Field(
@@ -122,20 +122,20 @@ class JobView(BaseModel):
     progress: Progress
     priority: int
     attempt: int = Field(description="How often it was queued: once, and again at each resume")
-    prompt: PromptView | None = Field(description="What a person at the bench is asked; see `answer`")
-    pause_requested: bool = Field(description="It pauses before its next station")
+    prompt: PromptView | None = Field(description="Open prompt for a person at the bench; see `answer`")
+    pause_requested: bool = Field(description="Whether it pauses before its next station")
     queue: PlaceView | None = Field(description="Its place while it is queued")
-    waiting: str | None = Field(description="Why it does not run now, as a sentence")
+    waiting: str | None = Field(description="Reason why it does not run now, as a sentence")
     resumable: bool = Field(description="Whether it can be queued again to go on where it ended")
-    retries: int = Field(description="How often a fault of the bench is answered by trying again")
+    retries: int = Field(description="Number of retries after a fault of the bench")
     retries_left: int
-    not_before: datetime | None = Field(description="It is not tried before this moment")
+    not_before: datetime | None = Field(description="Earliest time of the next attempt")
     reservation: str | None = Field(description="The reservation under which it runs")
     mounting: str | None = Field(description="The unit's mounting whose azimuth counts; null: the bench's declared one")
-    queued_at: datetime | None = Field(description="When it came into its bench's queue")
+    queued_at: datetime | None = Field(description="When it entered the queue of its bench")
     deadline_at: datetime | None = Field(description="No station begins later")
     labels: Labels
-    requested_by: str = Field(description="Who asked for it, as far as the client said")
+    requested_by: str = Field(description="Name of the person who submitted it, as far as the client gave it")
     team: str = Field(description="Team of its campaign run, whose members act on it; empty: its reservation's counts")
     requested_parameters: dict[str, Any]
     parameters: dict[str, Any]
@@ -145,10 +145,10 @@ class JobView(BaseModel):
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None
-    duration_s: float = Field(description="Predicted bench time")
+    duration_s: float = Field(description="Predicted bench time [s]")
     error: Failure | None
     result: str | None = Field(description="Id of the result that gave the verdict")
-    page: str = Field(description="Path of the page for an eye")
+    page: str = Field(description="Path of the page in the browser")
 
     @classmethod
     def of(cls, job: Job, standing: Standing | None = None, live: LiveJob | None = None) -> "JobView":
@@ -192,7 +192,7 @@ class ForeignJob(BaseModel):
 
     id: str
     state: JobState
-    waiting: str = Field(description="What is not understood, as a sentence")
+    waiting: str = Field(description="What this service does not understand, as a sentence")
 
 
 class EventView(BaseModel):

@@ -93,7 +93,7 @@ def end_manual(
     proven: ProvenName,
     body: LeaseEnd | None = None,
 ) -> LeaseView:
-    """End a lease: the bench is made safe, and its queue goes on. `ended_at` is set once that is done."""
+    """End a lease: the bench is made safe, and its queue continues. `ended_at` is set once that is done."""
     by = proven or (body.by if body is not None else None) or client
     return LeaseView.of(service.manual.end(bench_id, lease_id, by))
 

@@ -20,7 +20,7 @@ class ManualSubmission(Request):
     """Request for manual mode on an idle bench."""
 
     reason: str = Field(min_length=1, max_length=500, description="Why the bench is driven by hand")
-    minutes: Minutes = Field(10.0, description="For so long; renewing gives more")
+    minutes: Minutes = Field(10.0, description="Duration of the lease [min]; renewing extends it")
     unit: Annotated[str, NAME] | None = Field(None, description="Unit on the table; null: the bench's first one")
     by: By | None = Field(None, description="Holder, where nobody logs in; without it, the client's name")
     reservation: Annotated[str, NAME] | None = Field(None, description="Own reservation of the bench or the unit")
@@ -29,7 +29,7 @@ class ManualSubmission(Request):
 class Renewal(Request):
     """Request to move the end of a lease."""
 
-    minutes: Minutes = Field(10.0, description="From now on")
+    minutes: Minutes = Field(10.0, description="Duration from now [min]")
     by: By | None = None
 
 
@@ -65,7 +65,9 @@ class Rate(_Demand):
     axis: Literal["outer", "middle", "inner"]
     rate_deg_s: Number
     duration_s: Number
-    ramp_s: Number | None = Field(None, description="Of beginning and end; null: half of the axis' acceleration")
+    ramp_s: Number | None = Field(
+        None, description="Ramp at begin and end [s]; null: at half of the axis' acceleration"
+    )
 
 
 class Halt(_Demand):
@@ -106,7 +108,7 @@ class LeaseView(BaseModel):
     bench: str
     unit: str
     holder: str
-    proven: bool = Field(description="Whether the service knows the holder by a log-in; else the name was declared")
+    proven: bool = Field(description="Whether the holder was authenticated; else the name was declared")
     reason: str
     reservation: str | None
     created_at: datetime
@@ -140,7 +142,7 @@ class DemandView(BaseModel):
     by: str
     at: datetime
     state: str = Field(description='"accepted", "doing", "done", "refused", "failed" or "stopped"')
-    over: bool = Field(description="Whether nothing more becomes of it")
+    over: bool = Field(description="Whether the demand has ended, with any outcome")
     text: str
     field: str | None = Field(description="The field that was refused")
     value: Any

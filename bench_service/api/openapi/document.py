@@ -7,6 +7,7 @@ from fastapi import FastAPI
 
 from bench_service.api.http.errors import Problem
 from bench_service.api.openapi.access import SCHEMES, declare_security
+from bench_service.api.openapi.field_words import describe
 from bench_service.api.openapi.result_schemas import REFERENCE, add_results
 from bench_service.api.openapi.schemas import PREFIX, Schema, component, plain_name, renamed, tidy
 from bench_service.evidence.catalogue import Catalogue
@@ -62,6 +63,7 @@ def completed(document: Schema, catalogue: Catalogue) -> Schema:
     add_results(schemas, catalogue)
     paths = renamed(_tidy_paths(document["paths"]), names)
     _describe_upload(paths, schemas)
+    describe(schemas)
     declare_security(paths)
     return {
         **document,

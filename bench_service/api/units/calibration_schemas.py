@@ -28,13 +28,13 @@ class CoefficientEntry(Request):
     unit: str = Field(
         min_length=1,
         max_length=30,
-        description="of b rad/s, deg/h, m/s^2, µg or count; of K 1 or ppm, or count/(rad/s), count/(m/s^2)",
+        description="unit of b: rad/s, deg/h, m/s^2, µg or count; of K 1 or ppm, or count/(rad/s), count/(m/s^2)",
     )
     standard_uncertainty: float = Field(
         ge=0.0,
         le=1e12,
         allow_inf_nan=False,
-        description="in the same unit; 0 for a coefficient that is fixed by definition",
+        description="standard uncertainty in the same unit; 0 for a coefficient that is fixed by definition",
     )
 
 
@@ -47,11 +47,11 @@ class CalibrationEntry(Request):
     correlations: list[Annotated[list[Finite], Field(min_length=12, max_length=12)]] | None = Field(
         None, min_length=12, max_length=12, description="In the order b_x, K11, K12, K13, b_y, …; null: uncorrelated"
     )
-    measured_at: AwareDatetime | None = Field(None, description="When they were measured; null: not known")
+    measured_at: AwareDatetime | None = Field(None, description="When the coefficients were measured; null: not known")
     valid_from: AwareDatetime | None = None
     valid_until: AwareDatetime | None = Field(None, description="End of their validity; null: they have none")
-    choose: bool = Field(False, description="Make it the triad's current calibration at once")
-    by: Annotated[str, NAME] | None = Field(None, description="Who enters it; null: the client's name")
+    choose: bool = Field(False, description="Whether it becomes the triad's current calibration at once")
+    by: Annotated[str, NAME] | None = Field(None, description="Person who enters it; null: the client's name")
     remark: Remark = ""
 
     def entry(self) -> Entry:
@@ -67,7 +67,7 @@ class CalibrationEntry(Request):
 class CalibrationChoice(Request):
     """Request to make a calibration the one that counts."""
 
-    by: Annotated[str, NAME] | None = Field(None, description="Who decides; null: the client's name")
+    by: Annotated[str, NAME] | None = Field(None, description="Person who decides; null: the client's name")
     remark: Remark = Field("", description="Needed for a calibration of a result that did not pass")
 
 
@@ -80,15 +80,15 @@ class RuleChoice(CalibrationChoice):
 class CalibrationApproval(Request):
     """Approval of a calibration, with the end of its validity where one is given."""
 
-    by: Annotated[str, NAME] | None = Field(None, description="Who decides; null: the client's name")
+    by: Annotated[str, NAME] | None = Field(None, description="Person who decides; null: the client's name")
     remark: Remark = ""
-    valid_until: AwareDatetime | None = Field(None, description="null: its validity stays as it is")
+    valid_until: AwareDatetime | None = Field(None, description="End of the validity; null: unchanged")
 
 
 class CalibrationRejection(Request):
     """Rejection of a calibration, with the reason."""
 
-    by: Annotated[str, NAME] | None = Field(None, description="Who decides; null: the client's name")
+    by: Annotated[str, NAME] | None = Field(None, description="Person who decides; null: the client's name")
     remark: str = Field(min_length=1, max_length=500, description="Why it may not be used")
 
 
@@ -112,7 +112,7 @@ class DecisionView(BaseModel):
     act: Act
     at: datetime
     by: str = Field(description="Name of the person; empty: the rule")
-    proven: bool = Field(description="Whether the service knows the person by a log-in; else the name was declared")
+    proven: bool = Field(description="Whether the person was authenticated; else the name was declared")
     remark: str
 
     @classmethod
@@ -132,7 +132,7 @@ class CalibrationView(BaseModel):
     verdict: Verdict | None = Field(description="Verdict of that result; null for an entered one")
     made_at: datetime
     simulated: bool
-    current: bool = Field(description="Whether it is the one of its triad that counts")
+    current: bool = Field(description="Whether it is the current one of its triad")
     by_rule: bool = Field(description="Whether the rule made it current; else a person chose it")
     approval: Approval
     valid_from: datetime | None
@@ -159,7 +159,7 @@ class CalibrationView(BaseModel):
 class CalibrationDetail(CalibrationView):
     """A calibration with its lineage and its use."""
 
-    lineage: Lineage | None = Field(description="Of the result that gave it; null for an entered one")
+    lineage: Lineage | None = Field(description="Lineage of the result that gave it; null for an entered one")
     results: list[str] = Field(description="Results that rest on it, newest first")
 
     @classmethod

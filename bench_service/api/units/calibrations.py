@@ -37,7 +37,7 @@ Serial = Annotated[str, Path(pattern=SERIAL)]
 def list_calibrations(
     serial: str,
     service: Service,
-    triad: Annotated[Triad | None, Query(description="Only those of this triad")] = None,
+    triad: Annotated[Triad | None, Query(description="Only calibrations of this triad")] = None,
     after: After = None,
     limit: Limit = 50,
 ) -> CalibrationPage:
@@ -109,7 +109,7 @@ def read_calibration(serial: str, calibration_id: str, service: Service) -> Cali
     """Read one calibration with its lineage, and the results that rest on it."""
     stored = service.stores.calibrations.get(calibration_id)
     if stored.unit != serial:
-        raise NotFound("calibration", calibration_id, f"unit {serial} has none of that id")
+        raise NotFound("calibration", calibration_id, f"unit {serial} has none with this id")
     made_by = None if stored.result_id is None else service.stores.results.get(stored.result_id)
     return CalibrationDetail.of_use(stored, made_by, service.stores.calibrations.used_by(calibration_id))
 

@@ -23,7 +23,7 @@ class UnitRemark(Request):
     """A remark of a person about a unit."""
 
     text: str = Field(min_length=1, max_length=2000, pattern=r"^[^\x00]*\S[^\x00]*$")
-    by: Annotated[str, NAME] | None = Field(None, description="Who says it; null: the client's name")
+    by: Annotated[str, NAME] | None = Field(None, description="Author of the note; null: the client's name")
 
 
 class UnitNoteView(BaseModel):
@@ -33,7 +33,7 @@ class UnitNoteView(BaseModel):
     unit: str
     at: datetime
     by: str
-    proven: bool = Field(description="Whether the service knows the person by a log-in; else the name was declared")
+    proven: bool = Field(description="Whether the person was authenticated; else the name was declared")
     text: str
 
 

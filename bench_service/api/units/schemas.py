@@ -39,7 +39,9 @@ class UnitView(BaseModel):
     accelerometer: TriadRecord | None
     averaging_time_s: float
     gyro_calibration: str | None = Field(description="Id of the gyros' current calibration, where it may be used")
-    accelerometer_calibration: str | None = Field(description="The same of the accelerometers")
+    accelerometer_calibration: str | None = Field(
+        description="Id of the accelerometers' current calibration, where it may be used"
+    )
     withheld: list[str] = Field(description="Why a current calibration may not be used, and the way out")
     thermal_correction: str | None = Field(description="Id of the current correction of the kind `thermal`")
     converter: str | None = Field(description="Id of the current correction of the kind `converter`")

@@ -56,7 +56,7 @@ class LiveDevices:
     status: tuple[LiveStatus, ...] = ()
     """Status words of all devices, as they were last read."""
     rates_deg_s: tuple[float, float, float] | None = None
-    """Rates of outer, middle and inner axis; None: the controller tells none."""
+    """Rates of outer, middle and inner axis; None: the controller reports none."""
     voltage_v: float | None = None
     """Measured voltage of the unit's supply."""
     current_a: float | None = None
@@ -257,5 +257,5 @@ class Heartbeat:
             self._silent = False
         except ServiceError as error:
             if not self._silent:  # once: a full disk lasts
-                log.warning("what bench %s does cannot be told to other processes: %s", live.bench, error)
+                log.warning("the state of bench %s cannot be published to other processes: %s", live.bench, error)
             self._silent = True

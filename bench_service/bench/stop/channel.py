@@ -141,7 +141,7 @@ class StopChannel:
         try:
             return bound(self._folder, self._names[role])
         except OSError as error:
-            log.warning("bench %s has no socket for a stop, its file must do: %s", self.bench_id, error)
+            log.warning("bench %s has no socket for a stop, only the file is used: %s", self.bench_id, error)
             return None
 
     def receive(self, listening: socket.socket) -> bool:
@@ -156,7 +156,7 @@ class StopChannel:
             except BlockingIOError:
                 return woken
             except (ValueError, TypeError, KeyError, AttributeError) as error:
-                log.warning("bench %s was sent what is no stop: %s", self.bench_id, error)
+                log.warning("bench %s received a message that is not a stop: %s", self.bench_id, error)
             except OSError as error:
                 log.warning("the stop socket of bench %s: %s", self.bench_id, error)
                 return woken
@@ -182,7 +182,7 @@ class StopChannel:
 
     @contextmanager
     def _locked(self) -> Generator[int]:
-        """Lock the file; after `LOCK_S` go on without the lock: at worst a reason is lost, never a stop."""
+        """Lock the file; after `LOCK_S` continue without the lock: at worst a reason is lost, never a stop."""
         file, deadline = self._open(), monotonic_s() + LOCK_S
         mine = self._mutex.acquire(timeout=LOCK_S)
         try:

@@ -39,7 +39,7 @@ class StopKeeper:
                 self._said = ""
             except ServiceError as error:
                 if str(error) != self._said:
-                    log.warning("the stops of bench %s are not compared with the books: %s", self._bench_id, error)
+                    log.warning("the stops of bench %s are not compared with the database: %s", self._bench_id, error)
                 self._said = str(error)
             except Exception:  # a stop's entry into the database may be late, but is never given up
                 log.exception("the stop keeper of bench %s", self._bench_id)

@@ -76,12 +76,12 @@ class StopListener:
             try:
                 with socket.create_server(self._wanted, backlog=64) as made:
                     self._socket, said = made, False
-                    log.info("stops of bench %s are taken at %s", self._channel.bench_id, made.getsockname())
+                    log.info("stops of bench %s are accepted at %s", self._channel.bench_id, made.getsockname())
                     self._accept(made)
             except OSError as error:
                 if not said and not self._ending.is_set():
                     log.warning(
-                        "stops of bench %s are not taken at %s: %s", self._channel.bench_id, self._wanted, error
+                        "stops of bench %s are not accepted at %s: %s", self._channel.bench_id, self._wanted, error
                     )
                 said = True
             self._socket = None
@@ -100,7 +100,7 @@ class StopListener:
         try:
             self._answer(connection)
         except (BadMessage, OSError, ValueError, TypeError, KeyError) as error:
-            log.warning("a stop of bench %s was not taken: %s", self._channel.bench_id, error)
+            log.warning("a stop of bench %s was not accepted: %s", self._channel.bench_id, error)
         finally:
             with self._mutex:
                 if connection in self._open:
@@ -115,7 +115,7 @@ class StopListener:
         numbers = (own, str(message.get("number", ""))[:64])
         asked = json.loads(check(self._secret, "stop", numbers, message))
         if asked.pop("bench") != self._channel.bench_id:
-            raise BadMessage("it is meant for another bench")
+            raise BadMessage("the message is meant for another bench")
         word = StopWord.of({**asked, "at": now().isoformat(), "via": "listener", "booked": False})
         taken = self._channel.ask(word)
         deadline = monotonic_s() + SAFE_S

@@ -74,9 +74,9 @@ def check(secret: bytes, what: str, numbers: tuple[str, str], message: dict[str,
     """The text of a message whose proof holds. Raises `BadMessage`."""
     text, given = message.get("text"), message.get("proof")
     if not isinstance(text, str) or not isinstance(given, str):
-        raise BadMessage("a text and its proof are expected")
+        raise BadMessage("a message needs the fields text and proof")
     if not hmac.compare_digest(given.encode(), proof(secret, what, numbers, text).encode()):
-        raise BadMessage("its proof does not hold: the secret is another one")
+        raise BadMessage("the proof does not match: the sender has another secret")
     return text
 
 
@@ -91,18 +91,18 @@ def receive_line(connection: socket.socket, by_s: float) -> dict[str, Any]:
     while not found.endswith(b"\n"):
         left_s = by_s - monotonic_s()
         if left_s <= 0.0:
-            raise BadMessage("no whole message came in time")
+            raise BadMessage("no complete message came in time")
         connection.settimeout(left_s)
         piece = connection.recv(4096)
         found += piece
         if not piece or len(found) > LINE_BYTES:
-            raise BadMessage("the connection ended, or its line does not")
+            raise BadMessage("the connection was closed before the end of the line, or the line is too long")
     try:
         message = json.loads(found)
     except ValueError as error:
-        raise BadMessage("it is no JSON") from error
+        raise BadMessage("the message is not JSON") from error
     if not isinstance(message, dict):
-        raise BadMessage("it is no JSON object")
+        raise BadMessage("the message is not a JSON object")
     return message
 
 
@@ -110,5 +110,5 @@ def split_address(address: str) -> tuple[str, int]:
     """Host and port of `host:port`. Raises `ValueError`."""
     host, separator, port = address.rpartition(":")
     if not separator or not host or not port.isdecimal() or int(port) > 65_535:
-        raise ValueError(f"{address!r} is no host:port")
+        raise ValueError(f"{address!r} is not of the form host:port")
     return host.strip("[]"), int(port)

@@ -25,7 +25,7 @@ RESULT = ("id", "verdict", "document")
 
 @contextmanager
 def connect(settings: Settings, server: str | None, drive: bool) -> Generator["httpx.Client"]:
-    """Open a client to `server`, or to an application in this process that lives as long as the block.
+    """Open a client to `server`, or to an application in this process that is open as long as the block.
 
     `drive`: true where the embedded application is to run jobs, for which it must have the bench to itself.
     Raises `Refused` where no service answers a request made in the block.
@@ -58,7 +58,7 @@ def _address(server: str) -> "httpx.URL":
     try:
         url.host.encode("idna")
     except UnicodeError as error:
-        raise Refused(f"--server {server}: {url.host!r} is no name of a host") from error
+        raise Refused(f"--server {server}: {url.host!r} is not a host name") from error
     return url
 
 
@@ -101,7 +101,7 @@ def answer(client: "httpx.Client", method: str, path: str, **options: Any) -> "h
     try:
         request = client.build_request(method, path, **options)
     except ValueError as error:  # a number or a letter that JSON cannot hold
-        raise Refused(f"what was given cannot be sent: {error}") from error
+        raise Refused(f"the request cannot be sent: {error}") from error
     try:
         response = client.send(request)
     except httpx.RequestError as error:
@@ -147,7 +147,7 @@ def _field(one: dict[str, Any]) -> str:
 
 
 def _no_service(response: "httpx.Response") -> str:
-    return f"{response.url} is no bench service: it answered {_beginning(response)}"
+    return f"{response.url} is not a bench service: it answered {_beginning(response)}"
 
 
 def _beginning(response: "httpx.Response") -> str:

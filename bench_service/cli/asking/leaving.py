@@ -1,6 +1,6 @@
-"""Ctrl-C while a command watches a job: what becomes of the job, and how to go on.
+"""Ctrl-C while a command watches a job: what becomes of the job, and how to continue.
 
-A job of a service goes on there. A job that the command's own process drives is asked to pause, so that no later
+A job of a service continues there. A job that the command's own process drives is asked to pause, so that no later
 process takes it up by itself: the request stays with the job if this process ends before the bench comes to it.
 """
 
@@ -28,23 +28,23 @@ def leave(client: "httpx.Client", job: dict[str, Any], server: str | None, say: 
     if server is not None:
         at = f" --server {server}" if "://" in server else ""
         say(
-            f"job {name} goes on without this command: `bench job wait {name}{at}` waits for it again, "
+            f"job {name} continues without this command: `bench job wait {name}{at}` waits for it, "
             f"`bench job cancel {name}{at}` ends it"
         )
         return
-    say(f"job {name} is to pause before its next station; Ctrl-C again gives the present station up")
+    say(f"job {name} is to pause before its next station; Ctrl-C again abandons the present station")
     try:
         job = _paused(client, name)
     except KeyboardInterrupt:
         job = {"state": "given up"}
-    go_on = f"`bench job resume {name}` goes on with the stations that remain, `bench job cancel {name}` ends it"
+    go_on = f"`bench job resume {name}` continues with the stations that remain, `bench job cancel {name}` ends it"
     if job["state"] == "paused":
         done = job["progress"]
         say(f"job {name} is paused after {done['station']} of {done['stations']} stations. {go_on}")
     elif job["state"] in ENDED:
         say(f"job {name} has ended: {job['state']}, verdict {job['verdict']}. `bench job show {name}` shows it")
     else:
-        say(f"job {name} is left in its station, which will be repeated. Nothing goes on with it by itself: {go_on}")
+        say(f"job {name} is left in its station, which will be repeated. It does not continue by itself: {go_on}")
 
 
 def leave_campaign(
@@ -52,13 +52,13 @@ def leave_campaign(
 ) -> None:
     """Leave a campaign's run in order and say what becomes of it; where this process drives it, its job is paused."""
     if server is not None:
-        say(f"campaign run {run_id} goes on in the service: {again}")
+        say(f"campaign run {run_id} continues in the service: {again}")
         return
     run = call(client, "GET", f"/api/v1/campaign-runs/{segment(run_id)}", ("state", "steps"))
     jobs = [step["job"] for step in run["steps"] if step["job"] and step["state"] in ("queued", "running", "paused")]
     if jobs:
         leave(client, {"id": jobs[-1]}, None, say)
-        say(f"campaign run {run_id} waits for that job: once it goes on, {again}")
+        say(f"campaign run {run_id} waits for that job: once it continues, {again}")
     else:
         say(f"campaign run {run_id} is {run['state']}: {again}")
 

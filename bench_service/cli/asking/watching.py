@@ -1,4 +1,4 @@
-"""Progress of a job until its end, with a progress bar for a person."""
+"""Progress of a job, a campaign's run or a batch of analyses until its end, with a progress bar for a person."""
 
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -22,22 +22,22 @@ LOOK_TIMEOUT_S = 15.0
 JOB = ("id", "procedure", "unit", "state", "verdict", "progress", "page", "result", "error")
 CAMPAIGN_RUN = ("id", "campaign", "unit", "state", "verdict", "steps", "waiting", "reason", "warnings")
 """Fields of a job and of a campaign's run that commands read."""
+UNENDED = ("waiting", "running")
+"""States of a batch's tasks that have not ended."""
 
 
 def watch(client: "httpx.Client", job: dict[str, Any], console: Console) -> dict[str, Any]:
     """Follow a job until it has ended; return its last state. Raises `Refused` where the service is away for long."""
     page = f"{str(client.base_url).rstrip('/')}{job['page']}"
-    goes_on = f"The service has job {job['id']} and goes on with it: {page} shows it, `bench jobs` lists it"
+    goes_on = f"The service has job {job['id']} and continues it: {page} shows it, `bench jobs` lists it"
     with _progress(console) as progress:
         bar = progress.add_task(f"{job['procedure']} {job['unit']}", total=job["progress"]["stations"] or 1, doing="")
         paused = False
         while job["state"] not in ENDED:
             if (job["state"] == "paused") > paused:
-                notice(f"job {job['id']} is paused: `bench job resume {job['id']}` goes on with it")
+                notice(f"job {job['id']} is paused: `bench job resume {job['id']}` continues it")
             paused = job["state"] == "paused"
-            pause(LOOK_S)
-            ask = partial(call, client, "GET", f"/api/v1/jobs/{job['id']}", JOB, timeout=LOOK_TIMEOUT_S)
-            job = with_retries(ask, notice, goes_on)
+            job = _looked_at(client, f"/api/v1/jobs/{job['id']}", JOB, goes_on)
             progress.update(bar, completed=job["progress"]["station"])
         if job["state"] == "succeeded":
             progress.update(bar, completed=job["progress"]["stations"] or 1)
@@ -62,10 +62,31 @@ def watch_campaign(client: "httpx.Client", run: dict[str, Any], console: Console
             progress.update(bar, completed=len(ended), doing=run["waiting"] or now)
             if run["state"] in ENDED:
                 return run
-            pause(LOOK_S)
-            path = f"/api/v1/campaign-runs/{run['id']}"
-            ask = partial(call, client, "GET", path, CAMPAIGN_RUN, timeout=LOOK_TIMEOUT_S)
-            run = with_retries(ask, notice, goes_on)
+            run = _looked_at(client, f"/api/v1/campaign-runs/{run['id']}", CAMPAIGN_RUN, goes_on)
+
+
+def watch_batch(
+    client: "httpx.Client", batch: dict[str, Any], path: str, fields: tuple[str, ...], console: Console
+) -> dict[str, Any]:
+    """Follow a batch of analyses, at `path`, until all have ended; return the `fields` of its last state.
+
+    Raises `Refused` where the service is away for long.
+    """
+    goes_on = f"The service has batch {batch['id']} and continues it: `bench batch watch {batch['id']}` shows it"
+    with _progress(console) as progress:
+        bar = progress.add_task(f"batch {batch['id']}", total=batch["total"], doing="")
+        while True:
+            counts = batch["counts"]
+            progress.update(bar, completed=batch["total"] - sum(counts[state] for state in UNENDED))
+            if batch["ended_at"] is not None:
+                return batch
+            batch = _looked_at(client, path, fields, goes_on)
+
+
+def _looked_at(client: "httpx.Client", path: str, fields: tuple[str, ...], goes_on: str) -> dict[str, Any]:
+    """State of what is followed after the next interval. Raises `Refused` where the service is away for long."""
+    pause(LOOK_S)
+    return with_retries(partial(call, client, "GET", path, fields, timeout=LOOK_TIMEOUT_S), notice, goes_on)
 
 
 def _progress(console: Console) -> Progress:

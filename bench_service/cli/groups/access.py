@@ -21,7 +21,7 @@ users = typer.Typer(no_args_is_help=True, help="Accounts of people: the first on
 tokens = typer.Typer(no_args_is_help=True, help="Named tokens of programs.")
 trail = typer.Typer(no_args_is_help=True, help="The audit trail as a chain.")
 
-RoleOption = Annotated[Role, typer.Option(help="What he or it may do")]
+RoleOption = Annotated[Role, typer.Option(help="Role of the account or token")]
 TeamOption = Annotated[str, typer.Option(help="Team whose reservations count for it")]
 PasswordFile = Annotated[
     Path | None, typer.Option(help="File with the password, - for standard input; without it, it is asked for")
@@ -36,7 +36,9 @@ def add_user(
     role: RoleOption,
     team: TeamOption = "",
     password_file: PasswordFile = None,
-    no_password: Annotated[bool, typer.Option("--no-password", help="Only a trusted proxy authenticates him")] = False,
+    no_password: Annotated[
+        bool, typer.Option("--no-password", help="This person logs in only through a trusted proxy")
+    ] = False,
     server: Server = None,
 ) -> None:
     """Add an account of a person. The first one is an admin's, and switches log-in on."""
@@ -114,7 +116,7 @@ def list_tokens(context: typer.Context, server: Server = None, as_json: AsJson =
 
 @tokens.command("revoke")
 def revoke_token(context: typer.Context, token: str, server: Server = None) -> None:
-    """Revoke a token by its name or id. Jobs that were submitted with it go on."""
+    """Revoke a token by its name or id. Jobs that were submitted with it continue."""
     with connect(context.obj, server, drive=False) as client:
         gone = call(client, "DELETE", f"/api/v1/tokens/{segment(token)}", TOKEN)
     console.print(f"token {gone['name']} ({gone['id']}) is revoked")
@@ -124,7 +126,7 @@ def revoke_token(context: typer.Context, token: str, server: Server = None) -> N
 def verify(
     context: typer.Context,
     expect: Annotated[
-        str | None, typer.Option(help="Digest that an earlier check printed: it must still be there")
+        str | None, typer.Option(help="Digest that an earlier check printed; it must still be in the chain")
     ] = None,
     server: Server = None,
     as_json: AsJson = False,
@@ -148,7 +150,7 @@ def verify(
 @trail.command("close")
 def close(
     context: typer.Context,
-    before: Annotated[str, typer.Option(help="Moment with its time zone, such as 2026-01-01T00:00:00Z")],
+    before: Annotated[str, typer.Option(help="Time with its zone, such as 2026-01-01T00:00:00Z")],
     server: Server = None,
 ) -> None:
     """Remove the entries before a moment, whose retention has ended; a checkpoint stays in their place."""
@@ -157,7 +159,7 @@ def close(
     for one in made:
         console.print(f"entries {one['first']} … {one['last']} are closed: digest {one['digest']}", soft_wrap=True)
     if not made:
-        console.print("no entry is as old as that")
+        console.print("no entry is that old")
 
 
 def _of_team(made: dict[str, Any]) -> str:

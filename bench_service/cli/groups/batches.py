@@ -15,11 +15,10 @@ if TYPE_CHECKING:
 
 batches = typer.Typer(no_args_is_help=True, help="Batches of analyses: a method over many recordings.")
 BATCH = ("id", "state", "total", "counts", "ended_at")
+"""Fields of a batch that commands read."""
+BATCHES = "/api/v1/analyses/batches"
 CONDITIONS = ("unit", "procedure", "job", "verdict", "since", "until", "text", "simulated")
 """Conditions that may be given once; `label` and `id` may be repeated."""
-PATH = "/api/v1/analyses/batches"
-LOOK_S = 0.5
-"""Interval between two polls of a batch [s]."""
 
 
 def selection_of(where: list[str]) -> dict[str, Any]:
@@ -32,7 +31,7 @@ def selection_of(where: list[str]) -> dict[str, Any]:
         if name in ("label", "id"):
             selection.setdefault("labels" if name == "label" else "ids", []).append(value)
         elif name not in CONDITIONS:
-            raise Refused(f"--where {text}: known are {', '.join((*CONDITIONS, 'label', 'id'))}")
+            raise Refused(f"--where {text}: the conditions are {', '.join((*CONDITIONS, 'label', 'id'))}")
         elif name in selection:
             raise Refused(f"--where {name}: given twice; label and id may be repeated")
         else:
@@ -55,7 +54,7 @@ def list_(context: typer.Context, limit: Limit = 20, server: Server = None, as_j
     from bench_service.cli.printing.tables import batch_table
 
     with connect(context.obj, server, drive=False) as client:
-        page = newest(client, PATH, limit, {})
+        page = newest(client, BATCHES, limit, {})
     show(page if as_json else page["items"], as_json, batch_table)
 
 
@@ -63,7 +62,7 @@ def list_(context: typer.Context, limit: Limit = 20, server: Server = None, as_j
 def watch(context: typer.Context, batch: str, server: Server = None, as_json: AsJson = False) -> int:
     """Follow a batch until it has ended. Exit code: 0 all analysed, 1 some failed, 2 cancelled."""
     with connect(context.obj, server, drive=False) as client:
-        found = _watch(client, call(client, "GET", f"{PATH}/{segment(batch)}", BATCH))
+        found = _watch(client, call(client, "GET", f"{BATCHES}/{segment(batch)}", BATCH))
     _print(found, as_json)
     return {"succeeded": 0, "failed": 1}.get(found["state"], 2)
 
@@ -74,7 +73,7 @@ def failures(
 ) -> None:
     """List the failed tasks of a batch: their recordings, and why."""
     with connect(context.obj, server, drive=False) as client:
-        path = f"{PATH}/{segment(batch)}/tasks"
+        path = f"{BATCHES}/{segment(batch)}/tasks"
         found = call(client, "GET", path, ("items",), params={"state": "failed", "limit": min(500, limit)})
     if as_json:
         print(json.dumps(found, indent=2))
@@ -100,16 +99,16 @@ def retry(context: typer.Context, batch: str, server: Server = None, as_json: As
 
 def _act(context: typer.Context, batch: str, act: str, server: str | None, as_json: bool) -> None:
     with connect(context.obj, server, drive=False) as client:
-        found = call(client, "POST", f"{PATH}/{segment(batch)}/{act}", BATCH)
+        found = call(client, "POST", f"{BATCHES}/{segment(batch)}/{act}", BATCH)
         if server is None and act == "retry":  # without a server nobody else runs it
             found = _watch(client, found)
     _print(found, as_json)
 
 
 def _watch(client: "httpx.Client", batch: dict[str, Any]) -> dict[str, Any]:
-    from bench_service.cli.printing.batch_progress import follow
+    from bench_service.cli.asking.watching import watch_batch
 
-    return follow(batch, lambda: call(client, "GET", f"{PATH}/{segment(batch['id'])}", BATCH), console, LOOK_S)
+    return watch_batch(client, batch, f"{BATCHES}/{segment(batch['id'])}", BATCH, console)
 
 
 def _print(batch: dict[str, Any], as_json: bool) -> None:

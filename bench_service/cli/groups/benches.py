@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def worker(
     context: typer.Context,
-    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
+    bench: Annotated[str | None, typer.Option(help="Bench; default: the one in the settings")] = None,
     bench_file: BenchFile = None,
     analyse: Annotated[
         bool, typer.Option("--analyse", help="Drive no bench: run batches of analyses, on any machine")
@@ -29,7 +29,7 @@ def worker(
         from bench_service.cli.processes.analysing import analyse_until_ended
 
         if bench is not None or bench_file is not None:
-            raise Refused("--analyse: such a worker drives no bench; leave --bench and --bench-file out")
+            raise Refused("--analyse: a worker that analyses drives no bench; leave --bench and --bench-file out")
         analyse_until_ended(context.obj, at_once, announce)
         return
     from bench_service.cli.processes.working import work
@@ -40,7 +40,7 @@ def worker(
 
 def supervise(
     context: typer.Context,
-    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
+    bench: Annotated[str | None, typer.Option(help="Bench; default: the one in the settings")] = None,
     companion: Annotated[bool, typer.Option(help="End with the process that drives the bench")] = False,
     bench_file: BenchFile = None,
 ) -> int:
@@ -56,8 +56,8 @@ def supervise(
 
 def stop(
     context: typer.Context,
-    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings")] = None,
-    reason: Annotated[str, typer.Option(help="Why, for whoever releases it")] = "stopped by an operator",
+    bench: Annotated[str | None, typer.Option(help="Bench; default: the one in the settings")] = None,
+    reason: Annotated[str, typer.Option(help="Reason, for the person who releases it")] = "stopped by an operator",
     wait: Annotated[float, typer.Option(help="How long to wait until it is safe [s]")] = 15.0,
 ) -> int:
     """Stop a bench on its own host, also without API, database and free disk. Not the hardware emergency stop.
@@ -71,8 +71,8 @@ def stop(
 
 
 def check_file(
-    bench_file: Annotated[Path, typer.Argument(dir_okay=False, help="The bench file")],
-    ask: Annotated[bool, typer.Option("--connect", help="Ask the devices; nothing is commanded")] = False,
+    bench_file: Annotated[Path, typer.Argument(dir_okay=False, help="Path of the bench file")],
+    ask: Annotated[bool, typer.Option("--connect", help="Query the devices; nothing is commanded")] = False,
 ) -> int:
     """Check a bench file, its units and drivers; with --connect the devices too. Exit code 1: something is refused."""
     from bench_service.cli.processes.checking import check_bench_file
@@ -82,7 +82,7 @@ def check_file(
 
 def queue(
     context: typer.Context,
-    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings, or the only one")] = None,
+    bench: Annotated[str | None, typer.Option(help="Bench; default: the one in the settings, or the only one")] = None,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
@@ -96,7 +96,7 @@ def queue(
         print(json.dumps(found, indent=2))
         return
     running = "nothing runs" if found["running"] is None else f"job {found['running']} runs"
-    driver = "nobody drives it" if found["driven_by"] is None else f"driven by {found['driven_by']}"
+    driver = "no process drives it" if found["driven_by"] is None else f"driven by {found['driven_by']}"
     console.print(f"bench {found['bench']}: {running}; {driver}", soft_wrap=True)
     if found["entries"]:
         wide().print(queue_table(found["entries"]))
@@ -104,13 +104,15 @@ def queue(
 
 def release(
     context: typer.Context,
-    remark: Annotated[str, typer.Option(help="What was looked at before the bench was released")],
+    remark: Annotated[str, typer.Option(help="What was checked before the bench was released")],
     by: Annotated[str, typer.Option(help="Your name")],
-    stop_id: Annotated[str | None, typer.Argument(metavar="[STOP]", help="The stop, where several stand")] = None,
-    bench: Annotated[str | None, typer.Option(help="The bench; else that of the settings, or the only one")] = None,
+    stop_id: Annotated[
+        str | None, typer.Argument(metavar="[STOP]", help="Id of the stop, where there are several")
+    ] = None,
+    bench: Annotated[str | None, typer.Option(help="Bench; default: the one in the settings, or the only one")] = None,
     server: Server = None,
 ) -> None:
-    """Release a stop of a bench, once the bench is known to be safe; its jobs go on when no stop stands."""
+    """Release a stop of a bench, once the bench is known to be safe; its jobs continue when no stop stands."""
     with connect(context.obj, server, drive=False) as client:
         name = bench_of(client, context.obj, bench)
         path = f"/api/v1/benches/{segment(name)}"
@@ -119,7 +121,7 @@ def release(
         body = {"remark": remark, "by": by}
         done = call(client, "POST", f"{path}/stops/{segment(stop_id)}/release", ("standing",), json=body)
     standing = [f"{one['id']}: {one['reason']}" for one in done["standing"]]
-    left = f"; still standing: {'; '.join(standing)}" if standing else ": the bench goes on"
+    left = f"; still standing: {'; '.join(standing)}" if standing else ": the bench takes jobs again"
     console.print(f"stop {stop_id} of bench {name} is released{left}", soft_wrap=True)
 
 
@@ -139,9 +141,9 @@ def _only_stop(stops: list[dict[str, Any]], bench: str) -> str:
     if len(stops) == 1:
         return stops[0]["id"]
     if not stops:
-        raise Refused(f"bench {bench} is not stopped: nothing is to be released")
+        raise Refused(f"bench {bench} is not stopped: there is nothing to release")
     named = "; ".join(f"{stop['id']}: {stop['reason']}" for stop in stops)
-    raise Refused(f"several stops of bench {bench} stand; the one that is meant is to be named: {named}")
+    raise Refused(f"bench {bench} has several stops; name the one to release: {named}")
 
 
 def simulate(

@@ -11,10 +11,10 @@ from bench_service.cli.files import check_folder, text_of, whole_file
 from bench_service.cli.options import AsJson, Server, console, wide
 from bench_service.cli.refusal import Refused
 
-calibration = typer.Typer(no_args_is_help=True, help="A triad's calibration that counts: chosen, approved, rejected.")
+calibration = typer.Typer(no_args_is_help=True, help="The current calibration of a triad: choose, approve, reject.")
 
 SHOWN = ("id", "triad", "current", "approval", "coefficients")
-By = Annotated[str | None, typer.Option(help="Who decides; without it, this client")]
+By = Annotated[str | None, typer.Option(help="Person who decides; default: this client")]
 Remark = Annotated[str, typer.Option(help="Remark that is kept with the decision")]
 
 
@@ -22,7 +22,7 @@ def calibrations(
     context: typer.Context,
     unit: str,
     triad: Annotated[str | None, typer.Option(help="gyro or accelerometer; without it, both")] = None,
-    limit: Annotated[int, typer.Option(min=1, max=500, help="The newest so many")] = 50,
+    limit: Annotated[int, typer.Option(min=1, max=500, help="Number of the newest ones")] = 50,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:

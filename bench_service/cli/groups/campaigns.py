@@ -65,7 +65,7 @@ def run_campaign(
         headers = {"Idempotency-Key": key}
         run = call(client, "POST", f"/api/v1/campaigns/{segment(name)}/runs", CAMPAIGN_RUN, json=body, headers=headers)
         again = f"the same command with --key {quote(key)} waits for it again"
-        goes_on = f"The service has run {run['id']} and goes on with it: {again}"
+        goes_on = f"The service has run {run['id']} and continues it: {again}"
         try:
             run = watch_campaign(client, run, errors, goes_on)
         except KeyboardInterrupt:
@@ -155,9 +155,9 @@ def add_schedule(
     cron: Annotated[str, typer.Option(help="minute hour day month weekday, such as '0 1 * * *'")],
     time_zone: Annotated[str, typer.Option(help="IANA name, such as Europe/Kyiv")],
     bench: Bench = None,
-    missed: Annotated[str, typer.Option(help="run_once or skip: a start that nothing was running to see")] = "run_once",
-    start_within_s: Annotated[float, typer.Option(help="A start that is later than this was missed")] = 300.0,
-    overlap: Annotated[str, typer.Option(help="skip or queue: a start while the previous run is open")] = "skip",
+    missed: Annotated[str, typer.Option(help="Missed starts: run_once or skip")] = "run_once",
+    start_within_s: Annotated[float, typer.Option(help="Delay after which a start counts as missed [s]")] = 300.0,
+    overlap: Annotated[str, typer.Option(help="Starts while the previous run is open: skip or queue")] = "skip",
     server: Server = None,
 ) -> None:
     """Start a campaign by itself, again and again."""

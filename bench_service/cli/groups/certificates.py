@@ -1,6 +1,6 @@
 """``bench certificate``: keys of the laboratory, certificates of calibrations, and their check.
 
-The key stays with whoever signs: it is read by this command and never sent to a service.
+The key stays with the signer: it is read by this command and never sent to a service.
 """
 
 import json
@@ -31,16 +31,18 @@ PRINTED_XML = "certificate.xml"
 @certificate.command("key")
 def key(
     name: Annotated[str, typer.Argument(help="Name of the laboratory, as the certificate of the key states it")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Begin of the names: lab gives lab.key.pem, …")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Beginning of the file names: lab gives lab.key.pem, …")
+    ],
 ) -> None:
-    """Make a key for signatures, and its certificate, which is given to whoever checks."""
+    """Make a key for signatures, and its certificate, which is given to those who check."""
     from bench_service.formats.certificate.signature import new_key
 
     private, public = (output.with_name(output.name + ending) for ending in (KEY_ENDING, CERTIFICATE_ENDING))
     check_folder(private)
     for file in (private, public):
         if file.exists():
-            raise Refused(f"{file} exists: a key is never written over, name another one")
+            raise Refused(f"{file} exists: a key is never overwritten; choose another name")
     pair = new_key(name)
     try:
         with os.fdopen(os.open(private, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as sink:
@@ -50,7 +52,7 @@ def key(
     with whole_file(public) as sink:
         sink.write(pair.certificate)
     console.print(f"{private}: the key, for its owner alone, without a password", soft_wrap=True)
-    console.print(f"{public}: its certificate, for whoever checks", soft_wrap=True)
+    console.print(f"{public}: its certificate, for those who check", soft_wrap=True)
 
 
 @certificate.command("make")
@@ -110,7 +112,7 @@ def _signed(text: str, facts: "Laboratory", pair: "KeyPair", failed: bool) -> by
     root = made(document, text, facts, code_version())
     wrong = faults(root)
     if wrong:
-        raise Refused(f"this calibration gives no certificate: {'; '.join(wrong)}")
+        raise Refused(f"no certificate can be made of this calibration: {'; '.join(wrong)}")
     return signed(root, pair)
 
 
@@ -161,7 +163,7 @@ def check(
     else:
         _say(file, facts)
     if same is False:
-        raise Refused(f"{file} is signed by {signer} and unchanged, but its raw data do not give its numbers any more")
+        raise Refused(f"{file} is signed by {signer} and unchanged, but its raw data no longer give its numbers")
 
 
 def _xml_of(file: Path) -> bytes:
@@ -176,14 +178,15 @@ def _xml_of(file: Path) -> bytes:
     except UnreadablePdf as error:
         raise Refused(f"{file}: {error}") from error
     if found is None:
-        raise Refused(f"{file}: the PDF has no {PRINTED_XML} inside, so it is no printed certificate")
+        raise Refused(f"{file}: the PDF has no {PRINTED_XML} inside, so it is not a printed certificate")
     return found
 
 
 def _here(settings: Settings, server: str | None) -> bool:
     """Whether a service is named, or a database is here: a check makes none."""
-    kind, separator, path = settings.database_url.partition("sqlite:///")
-    return server is not None or not separator or bool(kind) or Path(path).is_file()
+    from bench_service.persistence.database import missing_file
+
+    return server is not None or missing_file(settings.database_url) is None
 
 
 def _repeated(

@@ -68,7 +68,7 @@ def backup(
 ) -> int:
     """Copy the whole database to one file while services use it, and check the copy.
 
-    Everything that was acknowledged before the command began is in it. A job that runs goes on, once restored, with the
+    Everything that was acknowledged before the command began is in it. A running job continues, once restored, with the
     stations that it has not recorded. Exit code: 0 made and good, 1 made, and damage was found in it, 2 not made.
     """
     from bench_service.bench.processes import ProcessIdentity
@@ -125,9 +125,11 @@ def restore(
 
 def _require_database(settings: Settings) -> None:
     """Check that an SQLite database is there: opening one that is not would make it. Raises `Refused`."""
-    scheme, _, rest = settings.database_url.partition(":///")
-    if scheme.startswith("sqlite") and not Path(rest.partition("?")[0]).is_file():
-        raise Refused(f"there is no database {rest}: BENCH_DATABASE_URL names another")
+    from bench_service.persistence.database import missing_file
+
+    missing = missing_file(settings.database_url)
+    if missing is not None:
+        raise Refused(f"there is no database {missing}: BENCH_DATABASE_URL names another")
 
 
 def _digest(file: Path) -> str:

@@ -15,8 +15,8 @@ from bench_service.cli.options import NO_ITEMS, AsJson, Limit, Server, Set, cons
 
 Labelled = Annotated[list[str], typer.Option("--label", help="Only of jobs with name or name=text; may be repeated")]
 Verdict = Annotated[str | None, typer.Option(help="pass, fail or error")]
-Since = Annotated[str | None, typer.Option(help="Made at this moment or later: 2026-11-30T08:00:00Z")]
-Until = Annotated[str | None, typer.Option(help="Made before this moment")]
+Since = Annotated[str | None, typer.Option(help="Created at this time or later: 2026-11-30T08:00:00Z")]
+Until = Annotated[str | None, typer.Option(help="Created before this time")]
 Text = Annotated[str | None, typer.Option(help="In an id, a name, a label or the name of an imported file")]
 
 
@@ -64,11 +64,11 @@ def export(
     context: typer.Context,
     recording: Annotated[str, typer.Argument(help="Id of a recording; of a job, where the file is a .zip")],
     output: Annotated[
-        Path, typer.Option("--output", "-o", dir_okay=False, help="File to write; its ending is the format")
+        Path, typer.Option("--output", "-o", dir_okay=False, help="File to write; its suffix is the format")
     ],
     channels: Annotated[str | None, typer.Option(help="Names, separated by commas; all without it")] = None,
-    start_s: Annotated[float | None, typer.Option(help="From this second of the recording")] = None,
-    stop_s: Annotated[float | None, typer.Option(help="Up to this second of the recording")] = None,
+    start_s: Annotated[float | None, typer.Option(help="Begin, in seconds of the recording")] = None,
+    stop_s: Annotated[float | None, typer.Option(help="End, in seconds of the recording")] = None,
     values: Annotated[
         str | None, typer.Option(help="physical (SI, units in the names) or raw; without it, as stored")
     ] = None,

@@ -38,7 +38,7 @@ def import_(
     Without --description one is proposed from the file, shown, and used once it is confirmed.
     """
     if description is not None and (describe or unit or form or table or yes):
-        raise Refused("--description says everything: give no --describe, --unit, --format, --table or --yes beside it")
+        raise Refused("--description is complete: leave out --describe, --unit, --format, --table and --yes")
     with connect(context.obj, server, drive=False) as client:
         if description is not None:
             text = text_of(description)
@@ -58,7 +58,7 @@ def import_(
 
 def _proposed(client: "httpx.Client", files: list[Path], unit: str | None, form: str | None, table: str | None) -> Any:
     if len(files) != 1:
-        raise Refused("a description is proposed of one file alone: files that are joined need --description")
+        raise Refused("a description is proposed for a single file only: joined files need --description")
     known = {k: v for k, v in {"unit": unit, "format": form, "table": table}.items() if v is not None}
     with files[0].open("rb") as file:
         part = {"file": (files[0].name, file, "application/octet-stream")}

@@ -44,7 +44,7 @@ def run(
     label: Label = NO_ITEMS,
     retries: Annotated[int, typer.Option(min=0, max=5, help="After faults of the bench")] = 0,
     reservation: Annotated[str | None, typer.Option(help="The reservation under which it runs")] = None,
-    mounting: Annotated[str | None, typer.Option(help="The unit's mounting; without it, the one that stands")] = None,
+    mounting: Annotated[str | None, typer.Option(help="The unit's mounting; default: the one in place")] = None,
     key: Key = None,
     by: By = None,
     no_wait: Annotated[bool, typer.Option("--no-wait", help="Queue it and end; a service or worker runs it")] = False,
@@ -88,7 +88,7 @@ def _queued(job: dict[str, Any], server: str | None, as_json: bool) -> None:
 def follow(client: "httpx.Client", job: dict[str, Any], server: str | None, as_json: bool) -> int:
     """Watch a job to its end, print what came out, and return the exit code of its verdict.
 
-    Ctrl-C: a job of a service goes on there; one that this process drives is paused.
+    Ctrl-C: a job of a service continues there; one that this process drives is paused.
     """
     from bench_service.cli.asking.leaving import INTERRUPTED, leave
     from bench_service.cli.asking.watching import watch
@@ -124,8 +124,8 @@ def jobs(
     unit: Annotated[str | None, typer.Option(help="Only jobs of this unit")] = None,
     bench: Annotated[str | None, typer.Option(help="Only jobs of this bench")] = None,
     verdict: Annotated[str | None, typer.Option(help="pass, fail or error")] = None,
-    since: Annotated[str | None, typer.Option(help="Made at this moment or later: 2026-11-30T08:00:00Z")] = None,
-    until: Annotated[str | None, typer.Option(help="Made before this moment")] = None,
+    since: Annotated[str | None, typer.Option(help="Created at this time or later: 2026-11-30T08:00:00Z")] = None,
+    until: Annotated[str | None, typer.Option(help="Created before this time")] = None,
     label: Annotated[list[str], typer.Option(help="name or name=text; may be repeated")] = NO_ITEMS,
     text: Annotated[str | None, typer.Option(help="In an id, a name or a label")] = None,
     limit: Limit = 20,

@@ -19,9 +19,9 @@ LEASE = ("id", "bench", "holder", "until", "ended_at", "ended_because", "safe")
 DEMAND = ("key", "kind", "state", "over", "text")
 LOOK_S = 0.1
 """Interval between two looks at what became of a demand [s]."""
-Bench = Annotated[str | None, typer.Option(help="The bench; else that of the settings, or the only one")]
-By = Annotated[str | None, typer.Option(help="Holder of the lease; without it, this client")]
-Minutes = Annotated[float, typer.Option(help="For so long, from now on; the lease ends by itself [min]")]
+Bench = Annotated[str | None, typer.Option(help="Bench; default: the one in the settings, or the only one")]
+By = Annotated[str | None, typer.Option(help="Holder of the lease; default: this client")]
+Minutes = Annotated[float, typer.Option(help="Duration from now [min]; then the lease ends by itself")]
 NoWait = Annotated[bool, typer.Option("--no-wait", help="Return once the demand is accepted")]
 
 
@@ -108,8 +108,10 @@ def rate(
     context: typer.Context,
     axis: Annotated[str, typer.Argument(help="outer, middle or inner")],
     rate_deg_s: Annotated[float, typer.Argument(help="Rate, signed: write -- before a negative one")],
-    duration_s: Annotated[float, typer.Option(help="From rest to rest")],
-    ramp_s: Annotated[float | None, typer.Option(help="Of beginning and end; else by the axis' acceleration")] = None,
+    duration_s: Annotated[float, typer.Option(help="Duration from rest to rest")],
+    ramp_s: Annotated[
+        float | None, typer.Option(help="Ramp at begin and end [s]; default: by the axis' acceleration")
+    ] = None,
     bench: Bench = None,
     by: By = None,
     no_wait: NoWait = False,
@@ -176,7 +178,7 @@ def read(context: typer.Context, bench: Bench = None, server: Server = None, as_
     if as_json:
         print(json.dumps(live, indent=2))
     elif live is None or live["devices"] is None:
-        console.print(f"bench {name}: nobody has its devices open; `bench manual start` does", soft_wrap=True)
+        console.print(f"bench {name}: no process has its devices open; `bench manual start` does", soft_wrap=True)
     else:
         wide().print(live_table(name, live))
 

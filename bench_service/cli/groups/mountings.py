@@ -12,7 +12,7 @@ from bench_service.cli.options import AsJson, Key, Limit, Server, console, key_o
 mounting = typer.Typer(no_args_is_help=True, help="Mountings of units on plates: enter one, list them, end one.")
 PATH = "/api/v1/mountings"
 SHOWN = ("id", "unit", "bench", "plate", "azimuth_deg", "azimuth_sd_arcsec")
-By = Annotated[str | None, typer.Option(help="Who does it; without it, this client")]
+By = Annotated[str | None, typer.Option(help="Name of the person who acts; default: this client")]
 STEPS = (
     "1. Mount the unit on its plate, and the plate on the table; tighten by the passport.",
     "2. Connect supply and data, and wait until the unit has the room's temperature.",
@@ -33,9 +33,9 @@ def enter(
     ] = None,
     azimuth_sd_arcsec: Annotated[float | None, typer.Option(help="Standard uncertainty of that reading")] = None,
     mounted_at: Annotated[str | None, typer.Option(help="When; without it, now: 2026-11-30T08:00:00Z")] = None,
-    instrument: Annotated[str, typer.Option(help="Theodolite and prism")] = "",
+    instrument: Annotated[str, typer.Option(help="Instrument of the reading: theodolite and prism")] = "",
     by: By = None,
-    remark: Annotated[str, typer.Option(help="Remark that is kept with it")] = "",
+    remark: Annotated[str, typer.Option(help="Remark that is stored with the mounting")] = "",
     key: Key = None,
     server: Server = None,
     as_json: AsJson = False,
@@ -71,9 +71,9 @@ def enter(
 @mounting.command("list")
 def list_(
     context: typer.Context,
-    unit: Annotated[str | None, typer.Option(help="Only those of this unit")] = None,
-    bench: Annotated[str | None, typer.Option(help="Only those on this bench")] = None,
-    standing: Annotated[bool, typer.Option(help="Only those that stand")] = False,
+    unit: Annotated[str | None, typer.Option(help="Only mountings of this unit")] = None,
+    bench: Annotated[str | None, typer.Option(help="Only mountings on this bench")] = None,
+    standing: Annotated[bool, typer.Option(help="Only mountings that are in place")] = False,
     limit: Limit = 20,
     server: Server = None,
     as_json: AsJson = False,

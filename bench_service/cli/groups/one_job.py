@@ -75,9 +75,11 @@ def resume_job(
 def answer_job(
     context: typer.Context,
     job_id: Job,
-    done: Annotated[bool, typer.Option("--done/--declined", help="What was asked is done, or will not be")],
+    done: Annotated[
+        bool, typer.Option("--done/--declined", help="Whether the task of the prompt is done, or will not be done")
+    ],
     remark: Annotated[str, typer.Option(help="Remark on it")] = "",
-    prompt: Annotated[str | None, typer.Option(help="Id of the prompt; without it, the one that is asked now")] = None,
+    prompt: Annotated[str | None, typer.Option(help="Id of the prompt; default: the open one")] = None,
     by: By = None,
     server: Server = None,
 ) -> None:
@@ -120,7 +122,7 @@ def _post(
 def _read(client: "httpx.Client", job_id: str) -> dict[str, Any]:
     found = answer(client, "GET", f"/api/v1/jobs/{segment(job_id)}").json()
     if not isinstance(found, dict) or "state" not in found:
-        raise Refused(f"{client.base_url} is no bench service: it answered something else than a job")
+        raise Refused(f"{client.base_url} is not a bench service: its answer is not a job")
     return found
 
 

@@ -47,7 +47,7 @@ def _catalogue(context: typer.Context, what: str, name: str | None, server: str 
     found = next((entry for entry in entries if entry["name"] == name), None)
     if found is None:
         known = ", ".join(entry["name"] for entry in entries)
-        raise Refused(f"there is none of the {what} with the name {name!r}; there are {known}")
+        raise Refused(f"{what} has no entry {name!r}; there are {known}")
     show(found, as_json, parameter_table)
 
 

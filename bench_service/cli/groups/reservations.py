@@ -15,7 +15,7 @@ RESERVATION = ("id", "until", "holder")
 
 def reservations(
     context: typer.Context,
-    active: Annotated[bool, typer.Option(help="Only those that hold now")] = False,
+    active: Annotated[bool, typer.Option(help="Only reservations that are active now")] = False,
     limit: Limit = 20,
     server: Server = None,
     as_json: AsJson = False,
@@ -31,10 +31,10 @@ def reservations(
 def reserve(
     context: typer.Context,
     holder: Annotated[str, typer.Option(help="For whom")],
-    bench: Annotated[str | None, typer.Option(help="Either this, or --unit")] = None,
+    bench: Annotated[str | None, typer.Option(help="Bench to reserve; give either this or --unit")] = None,
     unit: Annotated[str | None, typer.Option(help="Serial of the unit")] = None,
-    minutes: Annotated[float | None, typer.Option(help="For so long; either this, or --until")] = None,
-    until: Annotated[str | None, typer.Option(help="Until this moment: 2026-11-30T08:00:00Z")] = None,
+    minutes: Annotated[float | None, typer.Option(help="Duration [min]; give either this or --until")] = None,
+    until: Annotated[str | None, typer.Option(help="End of the reservation: 2026-11-30T08:00:00Z")] = None,
     note: Annotated[str, typer.Option(help="Remark for others")] = "",
     key: Key = None,
     server: Server = None,

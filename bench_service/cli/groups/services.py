@@ -15,7 +15,9 @@ def serve(
     context: typer.Context,
     host: Annotated[str | None, typer.Option(help="Address to listen on")] = None,
     port: Annotated[int | None, typer.Option(help="Port to listen on")] = None,
-    no_worker: Annotated[bool, typer.Option("--no-worker", help="Drive no bench: workers of the database do")] = False,
+    no_worker: Annotated[
+        bool, typer.Option("--no-worker", help="Drive no bench; workers on the same database do")
+    ] = False,
     bench_file: BenchFile = None,
 ) -> None:
     """Serve the API and the pages, and run jobs on the bench, until interrupted."""
@@ -41,7 +43,7 @@ def serve(
 def demo(
     context: typer.Context,
     port: Annotated[int | None, typer.Option(help="Port to listen on")] = None,
-    once: Annotated[bool, typer.Option(help="End after the verdict, with it as exit code")] = False,
+    once: Annotated[bool, typer.Option(help="End after the verdict, which is the exit code")] = False,
     unit: Annotated[str, typer.Option(help="Serial of a simulated unit, SIM-0001 or RANDOM-<number>")] = "SIM-0001",
     seed: Annotated[int, typer.Option(help="Seed of the calibration's world; the verification takes the next")] = 2,
 ) -> int:

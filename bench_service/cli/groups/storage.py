@@ -13,7 +13,7 @@ storage = typer.Typer(
 )
 PLAN = ("recordings", "stored_bytes", "kept", "done")
 Days = Annotated[float | None, typer.Option(help="Age in days; without it as the settings say")]
-DoIt = Annotated[bool, typer.Option("--do-it", help="Not only say what would go")]
+DoIt = Annotated[bool, typer.Option("--do-it", help="Do it; without this option only report what would be removed")]
 
 
 @storage.callback()
@@ -80,7 +80,7 @@ def release(context: typer.Context, hold: str, server: Server = None) -> None:
     """Release a hold on raw data."""
     with connect(context.obj, server, drive=False) as client:
         found = call(client, "POST", f"/api/v1/storage/holds/{segment(hold)}/release", ("recording",))
-    console.print(f"recording {found['recording']} is not held by {hold} any more", soft_wrap=True)
+    console.print(f"recording {found['recording']} is no longer held by {hold}", soft_wrap=True)
 
 
 def _apply(
@@ -96,7 +96,7 @@ def _apply(
     kept = ", ".join(f"{number} by {reason}" for reason, number in plan["kept"].items()) or "none"
     size = plan["done_bytes"] if do_it else plan["stored_bytes"]
     number = plan["done"] if do_it else f"{len(plan['recordings'])}{'+' if len(plan['recordings']) == 200 else ''}"
-    tense = f"were {word}" if do_it else f"would be {word} (--do-it does it)"
+    tense = f"were {word}" if do_it else f"would be {word} (only with --do-it)"
     console.print(
         f"raw data of {number} recordings, {size / 1e6:.1f} MB, older than {plan['days']:g} days {tense}; kept: {kept}",
         soft_wrap=True,

@@ -21,7 +21,7 @@ from bench_service.settings import Settings
 from bench_service.wall_clock import monotonic_s
 
 LOOK_S = 0.25
-"""Interval between checks that the companion lives [s]."""
+"""Interval between checks that the companion is alive [s]."""
 AGAIN_S = 1.0
 """Shortest time from one start to the next [s], doubled after each companion that did not last."""
 SLOWEST_S = 60.0
@@ -62,7 +62,7 @@ class Companion:
             self._start(now_s)
 
     def leave(self) -> None:
-        """Wait a moment for the companion's end; if it has work left, it goes on alone."""
+        """Wait a moment for the companion's end; if it has work left, it continues alone."""
         if self._process is None:
             return
         try:

@@ -120,9 +120,9 @@ def check_address(settings: Settings) -> None:
     """Check the address of the server. Raises `Refused` if anyone could reach it, with the settings it needs."""
     if not may_listen(settings) and not has_credentials(settings.database_url):
         raise Refused(
-            f"BENCH_HOST = {settings.host}: this service listens on another address than a loopback one only with "
-            "accounts (`bench user add`) or a token (`bench token add`, or BENCH_TOKEN_FILE) for those who ask from "
-            "there, or where that address is reached through a loopback one alone, BENCH_PUBLISHED=loopback"
+            f"BENCH_HOST = {settings.host}: the service listens on an address other than a loopback one only with "
+            "accounts (`bench user add`) or a token (`bench token add`, or BENCH_TOKEN_FILE) , or where that "
+            "address can be reached only through a loopback one, BENCH_PUBLISHED=loopback"
         )
 
 
@@ -134,7 +134,7 @@ def check_port(settings: Settings) -> None:
         try:
             probe.bind((settings.host, settings.port))
         except OSError as error:
-            why = "is taken" if error.errno == errno.EADDRINUSE else f"cannot be had: {error.strerror}"
+            why = "is taken" if error.errno == errno.EADDRINUSE else f"cannot be opened: {error.strerror}"
             raise Refused(
                 f"port {settings.port} of {settings.host} {why}; "
                 "choose others with PORT=…, BENCH_PORT=… and BENCH_HOST=…"

@@ -77,8 +77,8 @@ def stop_command(arguments: Sequence[str], environ: Mapping[str, str]) -> int:
     Of the environment it reads what it needs: a setting that another command would refuse does not keep a stop out.
     """
     parser = argparse.ArgumentParser(prog="bench stop", description=HELP)
-    parser.add_argument("--bench", default=_own(environ), help="else that of the settings")
-    parser.add_argument("--reason", default=REASON, help="for whoever releases it")
+    parser.add_argument("--bench", default=_own(environ), help="default: the one in the settings")
+    parser.add_argument("--reason", default=REASON, help="for the person who releases it")
     parser.add_argument("--wait", type=float, default=WAIT_S, metavar="SECONDS", help="until it is safe")
     try:
         given = parser.parse_args(list(arguments))
@@ -100,7 +100,7 @@ def _own(environ: Mapping[str, str]) -> str:
 
 
 def _say(line: str) -> None:
-    with suppress(OSError):  # the output is closed, or its disk is full: the stop goes on
+    with suppress(OSError):  # the output is closed, or its disk is full: the stop continues
         print(line, flush=True)
 
 

@@ -78,7 +78,7 @@ def _listener(settings: Settings, channel: StopChannel, devices: BenchDevices) -
         return None
     secret = made_secret(settings.stop_secret_in())
     if secret is None:
-        log.warning("no stop is taken from other hosts: %s holds no secret", settings.stop_secret_in())
+        log.warning("no stop is accepted from other hosts: %s holds no secret", settings.stop_secret_in())
         return None
 
     def is_safe() -> bool:

@@ -21,7 +21,7 @@ def text_of(path: Path) -> str:
     """Read a file as text. Raises `Misconfigured` naming it."""
     try:
         if path.stat().st_size > LARGEST:
-            raise Misconfigured(f"{path} is larger than {LARGEST} bytes: no file of a bench is")
+            raise Misconfigured(f"{path} is larger than {LARGEST} bytes, the most that a bench file may have")
         return path.read_text(encoding="utf-8")
     except OSError as error:
         raise Misconfigured(f"{path} cannot be read: {error.strerror}") from error

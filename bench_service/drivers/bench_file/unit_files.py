@@ -1,4 +1,4 @@
-"""Declared units of a laboratory: one file ``units/<serial>.toml`` each, beside the bench file."""
+"""Declared units of a laboratory: one file ``units/<serial>.toml`` each, next to the bench file."""
 
 from datetime import date
 from pathlib import Path
@@ -114,7 +114,7 @@ class UnitFile(Section):
     def _names_each_channel_once(self) -> "UnitFile":
         names = [channel.name for channel in self.channels]
         if twice := next((name for name in names if names.count(name) > 1), None):
-            raise ValueError(f"channel {twice!r} is there twice")
+            raise ValueError(f"channel {twice!r} is listed twice")
         return self
 
 

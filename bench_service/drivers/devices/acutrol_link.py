@@ -54,7 +54,7 @@ class AcutrolSection(WireTurntable):
 
 
 class AcutrolLink:
-    """Controller of three axes as typed questions; knows its language, and no motion."""
+    """Controller of three axes as typed requests; knows its language, and no motion."""
 
     def __init__(self, section: AcutrolSection, note: Note) -> None:
         self.axes = (section.outer.number, section.middle.number, section.inner.number)
@@ -76,7 +76,7 @@ class AcutrolLink:
         return await self._ask(acutrol.IDENTITY_QUERY, self._identity)
 
     async def states(self) -> tuple[AxisState, ...]:
-        """Position and rate of outer, middle and inner axis, by one question."""
+        """Position and rate of outer, middle and inner axis, by one request."""
         return await self._ask(
             acutrol.states_query(self.axes), lambda a: acutrol.states(self._dialect, a, len(self.axes))
         )
@@ -97,7 +97,7 @@ class AcutrolLink:
         for word in status:
             if word.name.startswith("interlock") and word.raw != "closed":
                 raise DeviceFault(
-                    f"{word.name} of the turntable is {word.raw}: a person looks why, resets and closes it at the "
+                    f"{word.name} of the turntable is {word.raw}: find out why, then reset and close it at the "
                     "controller"
                 )
         if "interlock fault" in status[0].bits:

@@ -25,7 +25,7 @@ MOST_LEFT_DEG = 170.0
 
 
 class AcutrolTurntable(SwingingTable):
-    """Table whose every motion is watched by its encoders. A motion that is cancelled goes on to its end by itself."""
+    """Table whose every motion is watched by its encoders. A cancelled motion continues to its end by itself."""
 
     async def connect(self) -> Found:
         """Make the line, identify, read status and factory limits; see `WireDevice`."""
@@ -112,7 +112,7 @@ class AcutrolTurntable(SwingingTable):
                 raise Stopped(STOPPED)
             turning.result()
         elif not await self._rests():
-            raise NotSettled("the table moves, and no motion of it was commanded here")
+            raise NotSettled("the table moves although this service commanded no motion")
 
     async def make_safe(self) -> None:
         """Ramp down to rest and hold, or with the servo off as `on_safe` says; see the port."""
@@ -134,7 +134,7 @@ class AcutrolTurntable(SwingingTable):
             await self._link.mode("off")
             return
         for index, state in enumerate(await self._link.states()):
-            if index in braked or await self._link.mode_of(index) != "position":  # an axis that holds goes on holding
+            if index in braked or await self._link.mode_of(index) != "position":  # an axis that holds keeps holding
                 await self._link.demand("position", index, state.position_deg)
                 await self._link.mode("position", [index])
 

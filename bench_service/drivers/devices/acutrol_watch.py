@@ -45,7 +45,7 @@ class WatchedTable:
     def _begin(self) -> int:
         """Begin a demand. Raises `DeviceFault` while another is under way."""
         if self._under_way():
-            raise DeviceFault("the table is moving: one demand at a time")
+            raise DeviceFault("the table is moving: wait for the end of its motion")
         self._busy, self._turning = True, None
         self._demand += 1
         return self._demand

@@ -73,7 +73,7 @@ class Ascii2Chamber:
 
     @property
     def limits(self) -> ChamberLimits:
-        """Limits of demands: the section's, for the protocol tells none."""
+        """Limits of demands: the section's, for the protocol reports none."""
         return limits_of(self._section.limits)
 
     async def connect(self) -> Found:

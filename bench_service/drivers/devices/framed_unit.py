@@ -17,7 +17,7 @@ class FramedSection(WireUnitLink):
     """Section of a framed unit link."""
 
     frame: Path
-    """File that describes the frames; a relative one is sought beside the bench file."""
+    """File that describes the frames; a relative one is sought next to the bench file."""
 
 
 class FramedUnit(UnitRecordings):
@@ -46,7 +46,7 @@ class FramedUnit(UnitRecordings):
         return await self.found(await self.identify())
 
     async def identify(self) -> DeviceIdentity:
-        """Name of the frame's format: the unit tells nothing else."""
+        """Name of the frame's format: the unit reports nothing else."""
         return DeviceIdentity(model=self._form.name)
 
     def close(self) -> None:

@@ -34,7 +34,7 @@ class IxcomUnit(UnitRecordings):
         if unit is None:
             raise Misconfigured("driver = 'ixcom': the unit on the bench must be declared, for its scales")
         if section.address.scheme == "udp":
-            raise Misconfigured(f"address {section.address}: iXCOM is asked over tcp or serial")
+            raise Misconfigured(f"address {section.address}: iXCOM needs tcp or serial")
         self._channels = self._in_order(unit.channels)
         self._identity = DeviceIdentity()
         self._frames = FrameStream(section.address, self._opening, section.connect_s, context.note)
@@ -46,7 +46,7 @@ class IxcomUnit(UnitRecordings):
         return Found(self._identity, found.status)
 
     async def identify(self) -> DeviceIdentity:
-        """Identity that the unit told when its line was opened; see the port."""
+        """Identity that the unit reported when its line was opened; see the port."""
         await self.found(self._identity)
         return self._identity
 
@@ -84,7 +84,7 @@ class IxcomUnit(UnitRecordings):
         prescaler = max(1, int.from_bytes(talk.parameter(Parameter.PRESCALER)[:2], "little"))
         divider = timing / prescaler / rate
         if divider < 1.0 or abs(divider - round(divider)) > 1e-9:
-            raise Refusal(f"{rate:g} Hz is no whole part of the unit's {timing / prescaler:g} Hz")
+            raise Refusal(f"{rate:g} Hz is not an integer fraction of the unit's {timing / prescaler:g} Hz")
         talk.command(ixcom.log(talk.counter(), LogCommand.CLEAR_ALL, 3, 1))
         talk.command(ixcom.log(talk.counter(), LogCommand.ADD, Message.IMURAW, round(divider)))
         decoder = IxcomDecoder(scales)

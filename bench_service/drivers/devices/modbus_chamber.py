@@ -28,7 +28,7 @@ class ModbusSection(WireChamber):
     @model_validator(mode="after")
     def _is_no_udp(self) -> "ModbusSection":
         if self.address.scheme == "udp":
-            raise ValueError(f"address {self.address}: a Modbus device is asked over tcp or serial")
+            raise ValueError(f"address {self.address}: a Modbus device needs tcp or serial")
         return self
 
 
@@ -99,7 +99,7 @@ class ModbusChamber:
     async def _run(self, on: bool) -> None:
         await self._line.write_bit(self._map.running, on)
         if await self._line.read_bit(self._map.running) != on:
-            raise DeviceFault(f"the chamber was switched {'on' if on else 'off'} and does not read back so")
+            raise DeviceFault(f"the chamber was switched {'on' if on else 'off'} and its read-back does not confirm it")
 
 
 DRIVER = DeviceDriver("chamber", "modbus", ModbusSection, ModbusChamber)

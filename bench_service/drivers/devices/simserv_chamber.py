@@ -36,7 +36,7 @@ class SimservSection(WireChamber):
     variable: int = Field(default=1, ge=1, le=9)
     """Index of the temperature among the control variables."""
     door_input: str = Field(default="", max_length=64)
-    """Name of the digital input that is 1 while the door is open, as the controller tells it; empty: there is none."""
+    """Name of the digital input that is 1 while the door is open, as the controller names it; empty: none."""
     after_set_s: NonNegative = 1.0
     """Pause between a set and its read-back [s]."""
     readback_c: Positive = 0.051
@@ -134,7 +134,7 @@ class SimservChamber:
         name = "its start" if on else "its end"
         await self._set(Command.SET_DIGITAL, [RUN, str(int(on))], name)
         if bool(await self._ask(Command.GET_DIGITAL, [RUN], simserv.whole_of)) != on:
-            raise DeviceFault(f"the chamber was given {name} and does not read back so")
+            raise DeviceFault(f"the chamber was given {name} and its read-back does not confirm it")
 
     async def _status(self) -> ChamberStatus:
         return await self._ask(Command.STATUS, [], simserv.status_of)

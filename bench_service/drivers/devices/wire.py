@@ -38,11 +38,11 @@ class Greeting:
         try:
             self._status(ask)
         except Refusal as refusal:
-            raise DeviceFault(f"the {self._device} does not tell its status: {refusal}") from None
+            raise DeviceFault(f"the {self._device} does not report its status: {refusal}") from None
 
 
 def line_times(section: Wire, after_demand_s: float = 0.0) -> LineTimes:
-    """Times of a line by its section: a verb's question may take a new connection and a second try."""
+    """Times of a line by its section: a verb's request may take a new connection and a second try."""
     deadline = section.connect_s + 2.0 * section.answer_s + after_demand_s
     return LineTimes(section.answer_s, deadline, section.connect_s, after_demand_s)
 

@@ -35,7 +35,7 @@ class Address:
         if parts.scheme in ("tcp", "udp"):
             return cls._on_network(text, parts.scheme)
         if parts.scheme != "serial" or parts.netloc or not parts.path.startswith("/"):
-            raise ValueError(f"{text!r} is no address: give {FORM}")
+            raise ValueError(f"{text!r} is not an address: give {FORM}")
         given = dict(parse_qsl(parts.query, strict_parsing=True)) if parts.query else {}
         if unknown := sorted(set(given) - {"baud", "format"}):
             raise ValueError(f"{text!r}: a serial line has no {unknown[0]!r}: give {FORM}")
@@ -55,7 +55,7 @@ class Address:
             port = None
         bare = parts.path in ("", "/") and not parts.query and parts.username is None
         if not parts.hostname or not port or not bare:
-            raise ValueError(f"{text!r} is no address: give {FORM}, the port from 1 to 65535")
+            raise ValueError(f"{text!r} is not an address: give {FORM}, the port from 1 to 65535")
         return cls(scheme, parts.hostname, port)
 
     def __str__(self) -> str:

@@ -7,7 +7,7 @@ Rules of a driver (docs/add-a-device.md has them all):
 * A device is used from one event loop, that of its first verb. `close` may be called from any thread, at any time.
 * A demand is held to the narrower of the section's limits and the device's own (`narrowest`), read back after it was
   sent, and never sent again after a lost answer. A read may be repeated over a new link.
-* A late answer never answers a later question: where an answer did not come within `answer_s`, the link is dropped.
+* A late answer never answers a later request: where an answer did not come within `answer_s`, the link is dropped.
 * `make_safe` obeys the section's `on_safe`, starts nothing that stands still, and returns once the device reads back as
   safe; the caller sets its deadline (`safe_s`).
 """
@@ -69,7 +69,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class Found:
-    """Findings of a new link: the device's identity, status, and its own limits as far as it tells them."""
+    """Findings of a new link: the device's identity, status, and its own limits as far as it reports them."""
 
     identity: DeviceIdentity
     status: Status = ()
@@ -105,7 +105,7 @@ class DeviceDriver(Generic[S]):
 
 
 def narrowest(declared: float, own: float | None, lower: bool) -> float:
-    """The narrower of a declared limit and the device's own; None: the device does not tell it."""
+    """The narrower of a declared limit and the device's own; None: the device does not report it."""
     if own is None:
         return declared
     return max(declared, own) if lower else min(declared, own)

@@ -60,5 +60,5 @@ def _loaded(entry: EntryPoint) -> Sequence[DeviceDriver[Any]]:
         raise Misconfigured(f"driver = {entry.name!r}: {entry.value} cannot be loaded: {error}") from error
     drivers = (made,) if isinstance(made, DeviceDriver) else tuple(made) if isinstance(made, Iterable) else ()
     if not drivers or not all(isinstance(one, DeviceDriver) and one.name == entry.name for one in drivers):
-        raise Misconfigured(f"driver = {entry.name!r}: {entry.value} is no DeviceDriver of that name")
+        raise Misconfigured(f"driver = {entry.name!r}: {entry.value} is not a DeviceDriver of that name")
     return drivers

@@ -46,7 +46,7 @@ class Wire(Section):
 
     address: AddressText
     answer_s: Seconds = 2.0
-    """Time within which the device must answer a question; a later answer is dropped with its link."""
+    """Time within which the device must answer a request; a later answer is dropped with its link."""
     connect_s: Seconds = 3.0
     """Time within which a link must be made."""
     safe_s: Seconds = 10.0

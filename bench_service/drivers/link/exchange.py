@@ -1,6 +1,6 @@
 """Questions and answers over one line, and what happens when the line is lost in between. Blocking; knows no thread.
 
-Rules: a question goes out on a line that is in step, which means that every earlier answer was read or the connection
+Rules: a request goes out on a line that is in step, which means that every earlier answer was read or the connection
 was given up. A read may be repeated over a new connection, a demand never. After a reconnect the device's identity and
 status are asked first.
 """
@@ -29,11 +29,11 @@ class Question(Generic[T]):
 
     data: bytes
     name: str
-    """Name of the question in messages, as in "the set point"."""
+    """Name of the request in messages, as in "the set point"."""
     read: Callable[[bytes], T]
-    """Value of an answer. Raises `BadAnswer` where it is none to this question, `Refusal` where the device says no."""
+    """Value of an answer. Raises `BadAnswer` where it is none to this request, `Refusal` where the device says no."""
     demand: bool = False
-    """True if it changes the device: such a question is never sent twice."""
+    """True if it changes the device: such a request is never sent twice."""
     answered: bool = True
     """False where the device sends no answer; `read` then gets empty bytes at once."""
 
@@ -43,9 +43,9 @@ class LineTimes:
     """Times of a line [s]."""
 
     answer_s: float = 2.0
-    """Longest time from a question to its whole answer."""
+    """Longest time from a request to its whole answer."""
     deadline_s: float = 6.0
-    """Longest time of a verb's question, with waiting for its turn, a new connection and a second try."""
+    """Longest time of a verb's request, with waiting for its turn, a new connection and a second try."""
     connect_s: float = 2.0
     after_demand_s: float = 0.0
     """Pause after a demand, for controllers that lose a command that comes too soon."""
@@ -62,16 +62,16 @@ class Greeting(Protocol):
 
     @property
     def identity(self) -> Question[Any]:
-        """Question of the identity; its `read` refuses the answer to any other question."""
+        """Request of the identity; its `read` refuses the answer to any other request."""
         ...
 
     def check(self, identity: Any, ask: "Ask") -> None:
-        """Ask for status, compare the identity with the former one. Raises `BenchError` where it may not go on."""
+        """Ask for status, compare the identity with the former one. Raises `BenchError` where it may not continue."""
         ...
 
 
 class Ask(Protocol):
-    """Ask a question on the new connection, without a second try."""
+    """Send a request on the new connection, without a second try."""
 
     def __call__(self, question: Question[T]) -> T: ...
 
@@ -118,23 +118,23 @@ class Exchange:
                     f"{self._named()}: {lost}; whether {question.name} was carried out is not known, and it is not "
                     "sent again"
                 ) from None
-            log.warning("%s: %s; %s is asked again over a new line", self._named(), lost, question.name)
+            log.warning("%s: %s; %s is sent again over a new connection", self._named(), lost, question.name)
         self._connect(until)
         try:
             return self._once(question, until)
         except _Lost as lost:
             self._give_up()
-            raise Disconnected(f"{self._named()} does not answer, asked twice: {lost}") from None
+            raise Disconnected(f"{self._named()} does not answer, also not to a second request: {lost}") from None
 
     def close(self) -> None:
-        """Close the line; the next question opens it again."""
+        """Close the line; the next request opens it again."""
         if self._transport is not None:
             self._transport.close()
         self._transport = None
         self._buffer.clear()
 
     def stop(self) -> None:
-        """End the question under way, from another thread: it raises `Disconnected`, and no new line is opened."""
+        """End the request under way, from another thread: it raises `Disconnected`, and no new line is opened."""
         self._closing = True
         transport = self._transport
         if transport is not None:
@@ -173,7 +173,7 @@ class Exchange:
     def _open(self, until: float) -> None:
         left = until - wall_clock.monotonic_s()
         if self._closing:
-            raise Disconnected(f"the line of {self._named()} was closed by its bench")
+            raise Disconnected(f"the line of {self._named()} was closed by the service")
         if left <= 0.0:
             raise Disconnected(f"{self._named()} does not answer in time")
         if self._transport is None:
@@ -184,24 +184,24 @@ class Exchange:
             self.counts.connections += 1
 
     def _in_step(self) -> bool:
-        """Check that nothing stands in the line before a question; else leave it."""
+        """Check that nothing stands in the line before a request; else leave it."""
         assert self._transport is not None
         try:
             rest = bytes(self._buffer) + self._transport.receive(0.0)
         except LineCut as cut:
             self.counts.cuts += 1
-            log.warning("%s: the line was cut between two questions: %s", self._named(), cut)
+            log.warning("%s: the connection was lost between two requests: %s", self._named(), cut)
             self.close()
             return False
         if not rest:
             return True
         self.counts.surplus += 1
-        log.warning("%s: an answer came that nobody asked for: %s; the line is given up", self._named(), shown(rest))
+        log.warning("%s: an unexpected answer came: %s; the connection is closed", self._named(), shown(rest))
         self._give_up()
         return False
 
     def _greet(self, until: float) -> None:
-        """Ask identity and status; on a line that cannot be dropped leave out what answers earlier questions."""
+        """Ask identity and status; on a line that cannot be dropped leave out what answers earlier requests."""
         stale, self._stale = self._stale, False
         try:
             identity = self._once(self._greeting.identity, until, leave_out_others=stale)
@@ -210,7 +210,7 @@ class Exchange:
             self._stale = stale
             self._give_up()
             raise DeviceBusy(
-                f"{self._named()} takes the line and does not say who it is ({lost}): another master may have it, or "
+                f"{self._named()} connects but does not identify itself ({lost}): another master may hold it, or "
                 "it speaks another dialect"
             ) from None
         except BaseException:
@@ -218,7 +218,7 @@ class Exchange:
             raise
 
     def _once(self, question: Question[T], until: float, leave_out_others: bool = False) -> T:
-        """Send a question and read its answer. Raises `_Lost`."""
+        """Send a request and read its answer. Raises `_Lost`."""
         transport = self._transport
         if transport is None:
             raise _Lost("the line is closed")
@@ -238,7 +238,7 @@ class Exchange:
                         raise _Lost(f"the answer to {question.name} is none: {bad}") from None
         except LineCut as cut:
             self.counts.cuts += 1
-            raise _Lost(f"the line was cut at {question.name}: {cut}") from None
+            raise _Lost(f"the connection was lost at {question.name}: {cut}") from None
         finally:
             if question.demand and self.times.after_demand_s > 0.0:
                 self._not_before = wall_clock.monotonic_s() + self.times.after_demand_s

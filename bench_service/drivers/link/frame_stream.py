@@ -73,7 +73,7 @@ class FrameStream:
         self._closing = threading.Event()
         self._decoder: StreamDecoder | None = None
         self._line: Transport | None = None
-        self._problem = "nothing was heard yet"
+        self._problem = "no frame has come yet"
         self._spoiled = 0
         self.frames = 0
         """Number of frames that have come over all lines."""
@@ -88,13 +88,13 @@ class FrameStream:
 
     @property
     def problem(self) -> str:
-        """Reason for which no frames come, in words; empty while the line is open."""
+        """Reason for which no frames come, as a sentence; empty while the line is open."""
         return self._problem
 
     def begin(self) -> None:
         """Begin to listen; idempotent. Raises `Disconnected` after `close`."""
         if self._closing.is_set():
-            raise Disconnected(f"{self.named} was closed by its bench")
+            raise Disconnected(f"{self.named} was closed by the service")
         with self._lock:
             if self._thread is None:
                 self._thread = threading.Thread(target=self._run, name=self.named, daemon=True)
@@ -121,7 +121,7 @@ class FrameStream:
         line = self._line
         if line is not None:
             line.cut()
-        self._fail(Disconnected(f"{self.named} was closed by its bench"))
+        self._fail(Disconnected(f"{self.named} was closed by the service"))
 
     def ended(self, within_s: float) -> bool:
         """Wait for the thread after `close`; True if it has ended."""
@@ -164,7 +164,7 @@ class FrameStream:
         self.last_frame_s = wall_clock.monotonic_s()
         self._newest = decoder.words(decoded.status[-1])
         if gap is not None:
-            why = f"{gap} (a frame in between was spoiled)" if self._spoiled else str(gap)
+            why = f"{gap} (a frame in between was damaged)" if self._spoiled else str(gap)
             self._note("imu.frames_lost", {"why": why})
             self._fail(Disconnected(f"{self.named}: {why}"), begun_only=gap.at == 0)
         self._spoiled = 0

@@ -1,4 +1,4 @@
-"""The line of one device as the bench's loop sees it: one thread, one queue, a deadline for each question."""
+"""The line of one device as the bench's loop sees it: one thread, one queue, a deadline for each request."""
 
 import asyncio
 import queue
@@ -13,7 +13,7 @@ from procedures.bench.errors import Disconnected
 
 T = TypeVar("T")
 WAITING = 64
-"""Number of questions that may wait for a line."""
+"""Number of requests that may wait for a line."""
 
 
 class _Asked(NamedTuple):
@@ -25,7 +25,7 @@ class _Asked(NamedTuple):
 class DeviceLine:
     """Line whose waiting is done by a thread of its own, so that no verb holds the bench's loop.
 
-    A question that was cancelled while it waited is not sent. One that is under way is read to its end, so that its
+    A request that was cancelled while it waited is not sent. One that is under way is read to its end, so that its
     answer is never taken for another's.
     """
 
@@ -52,14 +52,14 @@ class DeviceLine:
         answer: Future[T] = Future()
         with self._begin:
             if self._closed:
-                raise Disconnected(f"the line of {self._named} was closed by its bench")
+                raise Disconnected(f"the line of {self._named} was closed by the service")
             if self._thread is None:
                 self._thread = threading.Thread(target=self._run, name=f"line {self._named}", daemon=True)
                 self._thread.start()
             try:
                 self._queue.put_nowait(_Asked(question, until, answer))
             except queue.Full:
-                raise Disconnected(f"{self._named} does not answer: {WAITING} questions wait for it") from None
+                raise Disconnected(f"{self._named} does not answer: {WAITING} requests wait for its answer") from None
         return answer
 
     def _run(self) -> None:
@@ -78,7 +78,7 @@ class DeviceLine:
         self._exchange.close()
 
     def close(self) -> None:
-        """Close the line without waiting; idempotent. The question under way and those that wait raise."""
+        """Close the line without waiting; idempotent. The request under way and those that wait raise."""
         with self._begin:
             if self._closed:
                 return
@@ -89,7 +89,7 @@ class DeviceLine:
                 except queue.Empty:
                     break
                 if waiting is not None and waiting.answer.set_running_or_notify_cancel():
-                    waiting.answer.set_exception(Disconnected(f"the line of {self._named} was closed by its bench"))
+                    waiting.answer.set_exception(Disconnected(f"the line of {self._named} was closed by the service"))
             self._queue.put_nowait(None)
         self._exchange.stop()
 

@@ -16,7 +16,7 @@ T = TypeVar("T")
 class ModbusLine:
     """Reads may be asked twice, over a new connection; a write is never sent twice.
 
-    After a lost answer the connection is given up, for the frames of a serial line do not say which question they
+    After a lost answer the connection is given up, for the frames of a serial line do not say which request they
     answer.
     """
 
@@ -86,7 +86,7 @@ class ModbusLine:
                 raise Disconnected(f"{self._named}: the answer to {name} is none: {bad}{more}") from None
 
         if self._closed:
-            raise Disconnected(f"the line of {self._named} was closed by its bench")
+            raise Disconnected(f"the line of {self._named} was closed by the service")
         return await asyncio.wrap_future(self._thread.submit(guarded))
 
     def _read_once(self, table: str, address: int, count: int) -> list[int]:
@@ -97,7 +97,7 @@ class ModbusLine:
         answer = self._checked(self._asked(ask), f"register {address}")
         words = cast("list[int]", answer.registers)
         if len(words) != count:
-            raise BadAnswer(f"{len(words)} registers came where {count} were asked for")
+            raise BadAnswer(f"{len(words)} registers came where {count} were requested")
         return words
 
     def _asked(self, ask: Callable[[Any], Any]) -> Any:

@@ -55,7 +55,7 @@ class SocketTransport:
         except OSError as error:
             raise LineCut(reason(error)) from error
         if not data and self._stream:
-            raise LineCut("the other end closed it")
+            raise LineCut("the other end closed the connection")
         return data
 
     def cut(self) -> None:
@@ -145,5 +145,5 @@ def _serial_port(address: Address, timeout_s: float) -> Any:
 def reason(error: OSError) -> str:
     """Say an error of the operating system in words, without numbers and class names."""
     if isinstance(error, TimeoutError):
-        return "nobody answers there"
+        return "no device answers there"
     return (error.strerror or str(error) or type(error).__name__).lower()

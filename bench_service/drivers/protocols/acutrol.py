@@ -66,7 +66,7 @@ def line(dialect: Dialect, statement: str) -> bytes:
 def number(value: float) -> str:
     """Text of a number in a demand. Raises `ValueError` where it is not finite."""
     if not isfinite(value):
-        raise ValueError(f"{value!r} is no number of a demand")
+        raise ValueError(f"{value!r} is not a number that can be commanded")
     return f"{value:.{DECIMALS}f}"
 
 
@@ -153,7 +153,7 @@ def acknowledged(dialect: Dialect, answer: bytes) -> None:
     found = text(dialect, answer)
     if found.casefold() != dialect.acknowledgement.casefold():
         if _is_number(found.split(";")[0]):
-            raise BadAnswer(f"{found!r} answers a query, and none was asked")
+            raise BadAnswer(f"{found!r} answers a query, but none was sent")
         raise Refusal(found)
 
 
@@ -162,7 +162,7 @@ def identity(dialect: Dialect, answer: bytes) -> tuple[str, str, str, str]:
     parts = [part.strip() for part in text(dialect, answer).split(",")]
     if len(parts) != 4 or not parts[0]:
         raise BadAnswer(
-            f"{shown(answer)} is no identity of four fields after {dialect.reply_prefix_bytes} bytes: "
+            f"{shown(answer)} is not an identity of four fields after {dialect.reply_prefix_bytes} bytes: "
             "look at reply_prefix_bytes"
         )
     return parts[0], parts[1], parts[2], parts[3]
@@ -173,9 +173,9 @@ def numbers(dialect: Dialect, answer: bytes, count: int, separator: str = ";") -
     found = text(dialect, answer)
     parts = found.split(separator)
     if len(parts) != count:
-        raise BadAnswer(f"{found!r} holds {len(parts)} values where {count} were asked for")
+        raise BadAnswer(f"{found!r} holds {len(parts)} values where {count} were requested")
     if not all(_is_number(part) for part in parts):
-        raise BadAnswer(f"{found!r} holds what is no finite number")
+        raise BadAnswer(f"{found!r} holds a value that is not a finite number")
     return tuple(float(part) for part in parts)
 
 
@@ -202,7 +202,7 @@ def status_byte(dialect: Dialect, answer: bytes) -> int:
     """Status byte, 0 … 255. Raises `BadAnswer`."""
     found = text(dialect, answer)
     if not (found.isascii() and found.isdigit() and len(found) <= 3 and int(found) <= 255):
-        raise BadAnswer(f"{found!r} is no status byte")
+        raise BadAnswer(f"{found!r} is not a status byte")
     return int(found)
 
 

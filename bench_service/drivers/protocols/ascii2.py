@@ -114,7 +114,7 @@ def state(layout: Layout, answer: bytes) -> State:
 def acknowledged(answer: bytes) -> None:
     """Check that an answer is none to a read: what follows a write is not established. Raises `BadAnswer`."""
     if len(answer) > 16 or len(answer.split()) > 1:
-        raise BadAnswer(f"{shown(answer)} is no acknowledgement of a write")
+        raise BadAnswer(f"{shown(answer)} is not an acknowledgement of a write")
 
 
 def _number(part: str) -> float:
@@ -123,5 +123,5 @@ def _number(part: str) -> float:
     except ValueError:
         raise BadAnswer(f"{part!r} is no number") from None
     if not isfinite(value) or "_" in part:
-        raise BadAnswer(f"{part!r} is no finite number")
+        raise BadAnswer(f"{part!r} is not a finite number")
     return value

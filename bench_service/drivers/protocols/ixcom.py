@@ -99,7 +99,7 @@ def frame_length(data: bytes) -> int | None:
         return None
     length = int.from_bytes(data[4:6], "little")
     if data[0] != SYNC or not SHORTEST <= length <= LONGEST:
-        raise BadAnswer("no frame of iXCOM begins here")
+        raise BadAnswer("no iXCOM frame begins here")
     return length
 
 
@@ -107,7 +107,7 @@ def frame(data: bytes) -> Frame:
     """Decode one whole frame. Raises `BadAnswer`."""
     length = frame_length(data)
     if length is None or len(data) != length:
-        raise BadAnswer(f"{len(data)} bytes are no whole frame")
+        raise BadAnswer(f"{len(data)} bytes are not a whole frame")
     _, message, counter, _, _, week, second, microsecond = HEADER.unpack_from(data)
     status, crc = FOOTER.unpack_from(data, length - FOOTER.size)
     if crc16_xmodem(data[: length - 2]) != crc:
@@ -143,7 +143,7 @@ def request_parameter(counter: int, parameter: int) -> bytes:
 def response(found: Frame) -> None:
     """Check a response. Raises `Refusal` with its words, `BadAnswer` where the frame is none."""
     if found.message != Message.RESPONSE or len(found.payload) < 2:
-        raise BadAnswer(f"message 0x{found.message:02X} is no response")
+        raise BadAnswer(f"message 0x{found.message:02X} is not a response")
     code = int.from_bytes(found.payload[:2], "little")
     if code != 0:
         words = RESPONSES[code] if code < len(RESPONSES) else "refused"
@@ -153,7 +153,7 @@ def response(found: Frame) -> None:
 def parameter(found: Frame, number: int) -> bytes:
     """Value of a parameter frame. Raises `BadAnswer` where it is another's."""
     if found.message != Message.PARAMETER or len(found.payload) < 4:
-        raise BadAnswer(f"message 0x{found.message:02X} is no parameter")
+        raise BadAnswer(f"message 0x{found.message:02X} is not a parameter")
     which = int.from_bytes(found.payload[:2], "little")
     if which != number:
         raise BadAnswer(f"parameter {which} came where {number} was asked for")
@@ -168,5 +168,5 @@ def text_of(value: bytes) -> str:
 def inertial(payload: bytes) -> tuple[float, ...]:
     """Specific force and angular rate of IMURAW, six numbers. Raises `BadAnswer`."""
     if len(payload) != IMURAW.size:
-        raise BadAnswer(f"a payload of {len(payload)} bytes is no IMURAW")
+        raise BadAnswer(f"a payload of {len(payload)} bytes is not an IMURAW message")
     return IMURAW.unpack(payload)

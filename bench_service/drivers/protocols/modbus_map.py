@@ -46,7 +46,7 @@ class Register(BaseModel):
     def encode(self, value: float) -> list[int]:
         """Registers of a value. Raises `ValueError` where they cannot hold it."""
         if not isfinite(value):
-            raise ValueError(f"{value!r} is no number for a register")
+            raise ValueError(f"{value!r} is not a number that a register can hold")
         counts: float = value / self.scale
         try:
             data = struct.pack(self._form, counts if self.type == "float32" else round(counts))
@@ -70,7 +70,7 @@ class Bit(BaseModel):
     table: Literal["holding", "input"] = "holding"
 
     def of(self, word: int) -> bool:
-        """Its state in the register's word."""
+        """State of the bit in its register's word."""
         return bool(word >> self.bit & 1)
 
     def changed(self, word: int, on: bool) -> int:

@@ -59,7 +59,7 @@ def set_output(dialect: Dialect, on: bool) -> str:
 def number(value: float) -> str:
     """Text of a number in a statement, four decimals. Raises `ValueError` where it is not finite."""
     if not isfinite(value):
-        raise ValueError(f"{value!r} is no number of a demand")
+        raise ValueError(f"{value!r} is not a number that can be commanded")
     return f"{value:.4f}"
 
 
@@ -78,7 +78,7 @@ def identity(answer: bytes) -> tuple[str, str, str, str]:
     """Maker, model, serial and firmware. Raises `BadAnswer`."""
     parts = [part.strip() for part in text(answer).split(",")]
     if len(parts) != 4:
-        raise BadAnswer(f"{shown(answer)} is no identity of four fields")
+        raise BadAnswer(f"{shown(answer)} is not an identity of four fields")
     return parts[0], parts[1], parts[2], parts[3]
 
 
@@ -90,7 +90,7 @@ def value(answer: bytes) -> float:
     except ValueError:
         raise BadAnswer(f"{found!r} is no number") from None
     if not isfinite(number_found) or abs(number_found) > 1e37 or "_" in found:
-        raise BadAnswer(f"{found!r} is no finite number")
+        raise BadAnswer(f"{found!r} is not a finite number")
     return number_found
 
 
@@ -98,7 +98,7 @@ def switch(answer: bytes) -> bool:
     """State of a switch. Raises `BadAnswer`."""
     found = text(answer).upper()
     if found not in ("0", "1", "ON", "OFF"):
-        raise BadAnswer(f"{found!r} is no state of a switch")
+        raise BadAnswer(f"{found!r} is not the state of a switch")
     return found in ("1", "ON")
 
 
@@ -106,7 +106,7 @@ def mode(answer: bytes) -> str:
     """Mode of the output: "CV", "CC" or "OFF". Raises `BadAnswer`."""
     found = text(answer).upper()
     if found not in ("CV", "CC", "OFF"):
-        raise BadAnswer(f"{found!r} is no mode of an output")
+        raise BadAnswer(f"{found!r} is not the mode of an output")
     return found
 
 
@@ -115,7 +115,7 @@ def error(answer: bytes) -> tuple[int, str]:
     found = text(answer)
     code, comma, words = found.partition(",")
     if not comma or not ERROR_CODE.fullmatch(code.strip()):
-        raise BadAnswer(f"{found!r} is no entry of an error queue")
+        raise BadAnswer(f"{found!r} is not an entry of an error queue")
     return int(code), words.strip().strip('"')
 
 

@@ -74,7 +74,7 @@ def request(command: int, arguments: Sequence[str] = ()) -> bytes:
 def number(value: float) -> str:
     """Text of a number in a request, at most three decimals. Raises `ValueError` where it is not finite."""
     if not isfinite(value):
-        raise ValueError(f"{value!r} is no number of a request")
+        raise ValueError(f"{value!r} is not a number that can be sent")
     return f"{value:.3f}".rstrip("0").removesuffix(".")
 
 
@@ -88,7 +88,7 @@ def reply(answer: bytes, values: int) -> tuple[str, ...]:
     if int(code) != ACCEPTED:
         raise Refusal(f"{WORDS.get(int(code), 'refused')} (code {int(code)})")
     if len(rest) != values:
-        raise BadAnswer(f"{shown(answer)} holds {len(rest)} values where {values} were asked for")
+        raise BadAnswer(f"{shown(answer)} holds {len(rest)} values where {values} were requested")
     return tuple(part.decode("latin-1").strip() for part in rest)
 
 
@@ -102,7 +102,7 @@ def number_of(answer: bytes) -> float:
     except ValueError:
         raise BadAnswer(f"{text!r} is no number") from None
     if not isfinite(value) or "_" in text:
-        raise BadAnswer(f"{text!r} is no finite number")
+        raise BadAnswer(f"{text!r} is not a finite number")
     return value
 
 
@@ -110,7 +110,7 @@ def whole_of(answer: bytes, least: int = 0, most: int = 65535) -> int:
     """One whole number of a reply within a range. Raises `Refusal`, `BadAnswer`."""
     value = number_of(answer)
     if value != int(value) or not least <= value <= most:
-        raise BadAnswer(f"{value:g} is no whole number within {least} … {most}")
+        raise BadAnswer(f"{value:g} is not a whole number within {least} … {most}")
     return int(value)
 
 
@@ -118,7 +118,7 @@ def text_of(answer: bytes) -> str:
     """One text of a reply. Raises `Refusal`, `BadAnswer`."""
     (text,) = reply(answer, 1)
     if not text.isprintable():
-        raise BadAnswer(f"{shown(answer)} holds what is not printable")
+        raise BadAnswer(f"{shown(answer)} holds characters that are not printable")
     return text
 
 

@@ -70,7 +70,7 @@ class Gap:
 
 
 class Continuity:
-    """Checks that a counter goes on, over its wrap-around, from one piece of a stream to the next."""
+    """Checks that a counter continues, over its wrap-around, from one piece of a stream to the next."""
 
     def __init__(self, modulus: int, step: int = 1) -> None:
         self._modulus, self._step = modulus, step

@@ -93,7 +93,7 @@ class BenchFileDriver:
         needs: BenchNeeds,
         job: str | None = None,
     ) -> Bench:
-        """Open the bench for a job. Real time goes on while a service is down: there is nothing to go on from.
+        """Open the bench for a job. Real time continues while a service is down: there is nothing to continue from.
 
         Raises `NotMounted`, `DeviceBusy`, `Disconnected` naming the devices that do not answer, and `DeviceFault` where
         a job needs what this bench cannot do, or where another device than before answers.
@@ -131,7 +131,7 @@ class BenchFileDriver:
                 )
 
     def _look(self) -> Mapping[Kind, Exception]:
-        """Ask the devices for identity and limits; returns the failures, and describes the bench anew."""
+        """Ask the devices for identity and limits; returns the failures, and describes the bench again."""
         found = survey(self._file)
         self._found |= found.found
         for sentence in found.limits_said(self._file):

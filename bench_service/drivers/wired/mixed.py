@@ -30,7 +30,7 @@ class FollowingClock(Protocol):
         ...
 
     async def sleep(self, seconds: float) -> None:
-        """Let the world go on, keeping pace with the clock that it follows."""
+        """Let the world continue, keeping pace with the clock that it follows."""
         ...
 
 
@@ -54,7 +54,7 @@ class CatchUp:
 
 
 class MixedClock:
-    """Implements `procedures.bench.clock.Clock` by real time; the world goes on while it sleeps."""
+    """Implements `procedures.bench.clock.Clock` by real time; the world continues while it sleeps."""
 
     def __init__(self, wall: Any, world: FollowingClock) -> None:
         self._wall = wall

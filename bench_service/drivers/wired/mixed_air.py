@@ -57,7 +57,7 @@ class AiredClock:
 
 
 class AiredUnit:
-    """A simulated unit whose recordings go on in real air; every other verb is its own."""
+    """A simulated unit whose recordings continue in real air; every other verb is its own."""
 
     def __init__(self, unit: Any, air: RealAir) -> None:
         self._unit, self._air = unit, air

@@ -150,7 +150,7 @@ class BatchRunner:
                     self._wake.wait(self._look_s)
                     self._wake.clear()
             except ServiceError as error:
-                log.warning("no task of an analysis can be claimed yet: %s", error)
+                log.warning("no task can be claimed yet: %s", error)
                 self._ending.wait(self._look_s)
             except Exception:  # a thread that ended would leave its place empty for good
                 log.exception("the runner of analyses")
@@ -209,7 +209,7 @@ class BatchRunner:
         while True:
             try:
                 if not note():
-                    log.warning("a task was taken from this worker meanwhile: its result stands, its end is another's")
+                    log.warning("another worker has claimed a task of this worker meanwhile: the result is kept")
                 return
             except ServiceError as error:
                 log.warning("the end of a task cannot be written yet: %s", error)

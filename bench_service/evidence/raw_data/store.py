@@ -85,7 +85,7 @@ class RawDataStore(Protocol):
 
 
 class Archive(Protocol):
-    """An archive of chunks and of the tables beside them, a Parquet dataset."""
+    """An archive of chunks and of the tables with them, a Parquet dataset."""
 
     place: str
     """Its address, as it is kept with each recording."""

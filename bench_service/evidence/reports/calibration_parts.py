@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from bench_service.evidence.reports.people_parts import moment
 from bench_service.formats.printed.digits import to_uncertainty, two_digits
 from bench_service.formats.printed.document import Block, Facts, PrintedTable
 from bench_service.model.calibrations import StoredCalibration
@@ -55,13 +56,13 @@ def facts(one: StoredCalibration) -> Iterator[tuple[str, str]]:
     yield "origin", one.origin or (f"result {one.result_id}" if one.result_id else "not known")
     yield "in use", ("yes, by rule" if one.by_rule else "yes, chosen") if one.current else "no"
     yield "approval", one.approval.value
-    ends = one.valid_until.isoformat(timespec="seconds") if one.valid_until else "no end is set"
+    ends = moment(one.valid_until) if one.valid_until else "no end is set"
     yield "valid until", ends
     for decision in one.decisions:
         who = decision.by or "the rule"
         known = "" if decision.proven or not decision.by else " (name as given)"
         remark = f": {decision.remark}" if decision.remark else ""
-        yield decision.act.value, f"{decision.at.isoformat(timespec='seconds')} by {who}{known}{remark}"
+        yield decision.act.value, f"{moment(decision.at)}, by {who}{known}{remark}"
 
 
 def trends(history: Sequence[StoredCalibration], triad: str) -> Iterator[Figure]:

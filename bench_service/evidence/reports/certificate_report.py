@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from bench_service.evidence.catalogue import Catalogue
-from bench_service.evidence.reports import calibration_parts, context_parts
+from bench_service.evidence.reports import calibration_parts, condition_parts, context_parts, record_parts
 from bench_service.evidence.reports.result_report import SIMULATED, gathered, verdict_blocks
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.formats.certificate.document import DCC, SPACES
@@ -38,8 +38,14 @@ def certificate_report(stores: EvidenceStores, catalogue: Catalogue, serial: str
     for result in results.values():
         recordings = [stores.recordings.get(known) for known, _ in result.recordings]
         blocks += context_parts.identity(result.context, result.unit or "none")
-        blocks += [*context_parts.mounting(result.context), *context_parts.instruments(result.context)]
-        blocks += context_parts.conditions(result.context, recordings)
+        given = [c for c in calibrations if c.result_id == result.id]
+        found = gathered(stores, result, None).found
+        blocks += record_parts.found_and_left(stores, catalogue, result, found, given, None)
+        blocks += [
+            *context_parts.mounting(result.context),
+            *context_parts.instruments(result.context, result.created_at),
+        ]
+        blocks += condition_parts.conditions(result.context, recordings)
     blocks += _calibrations(stores, calibrations, list(results.values()))
     for result in results.values():
         blocks += [*verdict_blocks(result), Heading("Results in detail"), *blocks_of(catalogue.report(result))]

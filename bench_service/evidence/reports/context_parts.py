@@ -1,10 +1,10 @@
-"""Parts of a printed report that a job's context gives: the unit as it was, mounting, instruments, conditions."""
+"""Parts of a printed report that a job's context gives: the unit as it was, mounting, instruments, raw data."""
 
 from collections.abc import Iterator, Sequence
+from datetime import date, datetime
 from typing import Any
 
 from bench_service.formats.printed.document import Block, Facts, Heading, Paragraph, PrintedTable
-from bench_service.model.records import StoredRecording
 
 NOT_RECORDED = "not recorded"
 
@@ -20,8 +20,6 @@ def identity(context: dict[str, Any], serial: str) -> Iterator[Block]:
     rate = unit.get("sample_rate_hz")
     rows.append(("channels", channels or NOT_RECORDED))
     rows.append(("sample rate", NOT_RECORDED if rate is None else f"{rate:g} Hz"))
-    known = ", ".join(unit.get("calibration_ids", ())) or "none"
-    rows.append(("calibrations in use when the job began", known))
     yield Facts(tuple(rows))
     stated = [
         (c["state"], c["day"], c["certificate"], c["triad"], ", ".join(f"{b:.6g}" for b in c["bias"]))
@@ -51,8 +49,8 @@ def mounting(context: dict[str, Any]) -> Iterator[Block]:
     yield Paragraph(f"No mounting was entered; the azimuth is the one that the bench declares{said}.")
 
 
-def instruments(context: dict[str, Any]) -> Iterator[Block]:
-    """Devices of the bench with their certificates and due days, and the table's declared accuracy."""
+def instruments(context: dict[str, Any], at: datetime) -> Iterator[Block]:
+    """Devices of the bench with their certificates, those overdue `at` the result marked, and the table's accuracy."""
     bench = context.get("bench") or {}
     yield Heading("Instruments")
     rows: list[tuple[str, ...]] = []
@@ -61,7 +59,8 @@ def instruments(context: dict[str, Any]) -> Iterator[Block]:
         named = " ".join(filter(None, (found.get("maker"), found.get("model"))))
         kind = "simulated" if device["simulated"] else named or device["driver"] or NOT_RECORDED
         number = " ".join(filter(None, (certificate.get("number"), certificate.get("laboratory"))))
-        rows.append((device["name"], kind, found.get("serial") or "–", number or "none", certificate.get("due") or "–"))
+        due = _due(certificate.get("due"), at)
+        rows.append((device["name"], kind, found.get("serial") or "–", number or "none", due))
     if rows:
         columns = ("instrument", "device", "serial", "certificate", "due")
         yield PrintedTable("", columns, tuple(rows))
@@ -78,30 +77,11 @@ def instruments(context: dict[str, Any]) -> Iterator[Block]:
         yield Facts((("table, standard uncertainties", said),))
 
 
-def conditions(context: dict[str, Any], recordings: Sequence[StoredRecording]) -> Iterator[Block]:
-    """Site, temperatures, rate and time of the recordings."""
-    yield Heading("Conditions")
-    site = (context.get("bench") or {}).get("site")
-    rows: list[tuple[str, str]] = []
-    if site is not None:
-        rows.append(("latitude", f"{site['latitude_deg']:g}°"))
-        rows.append(("gravity", f"{site['gravity_m_s2']!r} ± {site['gravity_sd_m_s2']:g} m/s²"))
-    stations = [r.info.station for r in recordings if r.info.station is not None]
-    temperatures = sorted({s.temperature_c for s in stations if s.temperature_c is not None})
-    ends = f"{temperatures[0]:g} … {temperatures[-1]:g} °C" if temperatures else "not set"
-    rows.append(("temperature of the chamber", ends))
-    volts = sorted({s.supply_voltage_v for s in stations if s.supply_voltage_v is not None})
-    if volts:
-        rows.append(("supply voltage", ", ".join(f"{v:g} V" for v in volts)))
-    rows.append(("humidity and pressure", NOT_RECORDED))
-    if recordings:
-        rates = sorted({r.info.rate_hz for r in recordings})
-        rows.append(("sample rate", ", ".join(f"{r:g} Hz" for r in rates)))
-        rows.append(("recorded", f"{len(recordings)} recordings, {sum(r.info.duration_s for r in recordings):g} s"))
-        since = [r.info.since_launch_s for r in recordings if r.info.launched_s is not None]
-        if since:
-            rows.append(("time from switching on to the first sample", f"{min(since):g} … {max(since):g} s"))
-    yield Facts(tuple(rows))
+def _due(day: str | None, at: datetime) -> str:
+    """The due day of a certificate, marked where it was over already."""
+    if not day:
+        return "–"
+    return f"{day}, OVERDUE" if date.fromisoformat(day) < at.date() else day
 
 
 def hashes(recordings: Sequence[tuple[str, str]]) -> Iterator[Block]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from bench_service.evidence.work_processes import Run
 from bench_service.formats.printed.document import PrintedDocument
-from bench_service.formats.printed.typesetting import typeset
+from bench_service.formats.printed.typesetting import remove_orphaned_folders, typeset
 
 MEMORY_BYTES = 2_000_000_000
 """Address space of the process: the libraries take half of it, and most of that is never touched."""
@@ -21,6 +21,7 @@ def open_printing() -> Run:
     most = MEMORY_BYTES if hard == resource.RLIM_INFINITY else min(hard, MEMORY_BYTES)
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    remove_orphaned_folders()
 
     def run(_: str, arguments: tuple[Any, ...]) -> str:
         document: PrintedDocument = arguments[0]

@@ -1,14 +1,25 @@
 """The printed report of a result, whatever its procedure or method."""
 
+import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from pydantic_core import to_json
+
 from bench_service.evidence.catalogue import Catalogue
-from bench_service.evidence.reports import calibration_parts, context_parts
+from bench_service.evidence.reports import (
+    calibration_parts,
+    condition_parts,
+    context_parts,
+    noise_parts,
+    people_parts,
+    record_parts,
+)
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.formats.printed.digits import to_uncertainty, two_digits
 from bench_service.formats.printed.document import (
+    Attachment,
     Block,
     Facts,
     Heading,
@@ -18,10 +29,14 @@ from bench_service.formats.printed.document import (
     blocks_of,
 )
 from bench_service.model.calibrations import StoredCalibration
+from bench_service.model.errors import NotFound
 from bench_service.model.job import Job
 from bench_service.model.records import StoredResult
 
 SIMULATED = "SIMULATED: the data come from a simulated bench and no real unit."
+RESULT = "result.json"
+REMARKS = 50
+"""Newest remarks about the unit that a report has."""
 SIMPLE = "simple acceptance, the uncertainty of a value is not taken off"
 
 
@@ -47,26 +62,59 @@ def gathered(stores: EvidenceStores, result: StoredResult, job: Job | None) -> R
 
 def result_report(stores: EvidenceStores, catalogue: Catalogue, of: ResultReport) -> PrintedDocument:
     """The report of a result: identity, mounting, instruments, conditions, results, plots, verdict, people, hashes."""
-    result = of.result
+    result, attached = of.result, _attached(of.result)
     blocks = [*_head(of), *context_parts.identity(result.context, result.unit or "none")]
+    blocks += record_parts.found_and_left(stores, catalogue, result, of.found, of.calibrations, of.job)
+    if result.unit:
+        blocks += people_parts.remarks(stores.unit_notes.list(result.unit, limit=REMARKS).items)
     if result.context:
-        blocks += [*context_parts.mounting(result.context), *context_parts.instruments(result.context)]
+        blocks += [
+            *context_parts.mounting(result.context),
+            *context_parts.instruments(result.context, result.created_at),
+        ]
     recordings = [stores.recordings.get(known) for known, _ in result.recordings]
-    blocks += context_parts.conditions(result.context, recordings)
+    blocks += condition_parts.conditions(result.context, recordings)
     blocks += _calibrations(stores, of)
     report = catalogue.report(result)
     sections = blocks_of(report)
     if sections:
         blocks += [Heading("Results in detail"), *([Paragraph(report.summary)] if report.summary else []), *sections]
-    blocks += [*_people(of), *context_parts.hashes(result.recordings), *_lineage(result)]
+    if result.unit and result.name == noise_parts.LAUNCHES:
+        trends = tuple(noise_parts.noise_trends(stores, result.unit, result.simulated, result.id))
+        blocks += [Heading("Noise of the unit from one static run to the next"), *trends] if trends else []
+    blocks += [
+        *people_parts.people(result, of.job),
+        *context_parts.hashes(result.recordings),
+        *_lineage(result, attached),
+    ]
     return PrintedDocument(
-        title=result.name.replace("_", " "),
-        subject=f"unit {result.unit}" if result.unit else "without a unit",
+        title=_title(catalogue, result),
+        subject=", ".join(filter(None, (f"unit {result.unit}" if result.unit else "without a unit", _job(of.job)))),
         verdict=result.verdict.value.upper(),
         identifier=f"result {result.id}",
         at=result.created_at,
         blocks=tuple(blocks),
+        attachments=(attached,),
     )
+
+
+def _attached(result: StoredResult) -> Attachment:
+    """The whole stored result as a file."""
+    data = to_json(result, indent=1) + b"\n"
+    return Attachment(RESULT, "application/json", data, "Data", "the result with every number unrounded")
+
+
+def _title(catalogue: Catalogue, result: StoredResult) -> str:
+    """Title of the procedure or method; its name where the catalogue has it no longer."""
+    try:
+        found = catalogue.procedure if result.kind == "procedure" else catalogue.method
+        return found(result.name).title
+    except NotFound:
+        return result.name.replace("_", " ")
+
+
+def _job(job: Job | None) -> str:
+    return "" if job is None else f"job {job.number}"
 
 
 def _head(of: ResultReport) -> Iterator[Block]:
@@ -139,23 +187,7 @@ def _calibrations(stores: EvidenceStores, of: ResultReport) -> Iterator[Block]:
             yield Facts((("triad", one.triad), *calibration_parts.facts(one)))
 
 
-def _people(of: ResultReport) -> Iterator[Block]:
-    yield Heading("Who and when")
-    job, rows = of.job, [("result", of.result.created_at.isoformat(timespec="seconds"))]
-    if job is not None:
-        rows = [
-            ("requested by", job.requested_by or "no name was given"),
-            ("requested", job.created_at.isoformat(timespec="seconds")),
-            ("begun", job.started_at.isoformat(timespec="seconds") if job.started_at else "–"),
-            ("ended", job.finished_at.isoformat(timespec="seconds") if job.finished_at else "–"),
-            ("job", f"#{job.number}, {job.id}"),
-            ("bench", job.bench),
-            *rows,
-        ]
-    yield Facts(tuple(rows))
-
-
-def _lineage(result: StoredResult) -> Iterator[Block]:
+def _lineage(result: StoredResult, attached: Attachment) -> Iterator[Block]:
     yield Heading("Lineage")
     rows = [
         ("result", result.id),
@@ -166,5 +198,6 @@ def _lineage(result: StoredResult) -> Iterator[Block]:
     ]
     if result.seed is not None:
         rows.append(("seed", str(result.seed)))
+    rows.append((f"SHA-256 of {RESULT}", hashlib.sha256(attached.data).hexdigest()))
     yield Facts(tuple(rows))
-    yield Paragraph("Parameters, and every number unrounded, are in the attached result.json.")
+    yield Paragraph(f"Parameters, and every number unrounded, are in the attached {RESULT}.")

@@ -1,21 +1,15 @@
-"""Printed reports for whoever asks: of a result, of a unit, of a certificate, each as the bytes of a PDF/A-3."""
+"""Printed reports for those who ask: of a result, of a unit, of a certificate, each as the bytes of a PDF/A-3."""
 
 import base64
 from collections.abc import Callable
-from dataclasses import replace
-
-from pydantic_core import to_json
 
 from bench_service.evidence.catalogue import Catalogue
 from bench_service.evidence.reports.result_report import gathered, result_report
 from bench_service.evidence.reports.unit_report import unit_report
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.evidence.work_processes import WorkProcesses
-from bench_service.formats.printed.document import Attachment, PrintedDocument
+from bench_service.formats.printed.document import PrintedDocument
 from bench_service.model.job import Job
-from bench_service.model.records import StoredResult
-
-RESULT = "result.json"
 
 
 class ReportService:
@@ -38,8 +32,7 @@ class ReportService:
         """The report of a result, with its document attached. Raises `NotFound`."""
         result = self._stores.results.get(result_id)
         job = None if result.job_id is None else self._read_job(result.job_id)
-        document = result_report(self._stores, self._catalogue, gathered(self._stores, result, job))
-        return self._typeset(replace(document, attachments=(_attached(result),)))
+        return self._typeset(result_report(self._stores, self._catalogue, gathered(self._stores, result, job)))
 
     def of_unit(self, serial: str) -> bytes:
         """The report of a unit. Raises `NotFound`."""
@@ -57,9 +50,3 @@ class ReportService:
         from bench_service.formats.printed.typesetting import typeset
 
         return typeset(document)
-
-
-def _attached(result: StoredResult) -> Attachment:
-    """The whole stored result as a file."""
-    data = to_json(result, indent=1) + b"\n"
-    return Attachment(RESULT, "application/json", data, "Data", "the result with every number unrounded")

@@ -3,14 +3,15 @@
 from collections.abc import Iterator
 from datetime import datetime
 
-from bench_service.evidence.reports import calibration_parts
+from bench_service.evidence.corrections import StoredCorrection
+from bench_service.evidence.reports import calibration_parts, noise_parts, people_parts
+from bench_service.evidence.reports.result_report import REMARKS
 from bench_service.evidence.stores import EvidenceStores
 from bench_service.formats.printed.document import Block, Facts, Heading, Paragraph, PrintedDocument, PrintedTable
 from bench_service.model.calibrations import StoredCalibration
 from bench_service.model.records import StoredResult
 from procedures.core.recording import TRIADS
 from procedures.core.unit import Unit
-from procedures.core.units import NOISE_DISPLAY
 
 RESULTS = 20
 """Newest results that the report lists."""
@@ -21,10 +22,12 @@ def unit_report(stores: EvidenceStores, serial: str) -> PrintedDocument:
     unit = stores.units.unit(serial)
     history = stores.calibrations.list(serial, limit=200).items
     results = stores.results.list(unit=serial, limit=RESULTS).items
-    blocks: list[Block] = [*_identity(unit), *_noise(unit), *_calibrations(history), *_results(results)]
-    moments = (
-        [c.made_at for c in history] + [d.at for c in history for d in c.decisions] + [r.created_at for r in results]
-    )
+    corrections = stores.corrections.list(serial, limit=200).items
+    notes = stores.unit_notes.list(serial, limit=REMARKS).items
+    blocks: list[Block] = [*_identity(unit), *people_parts.remarks(notes), *_noise(stores, unit, results)]
+    blocks += [*_calibrations(history), *_corrections(corrections), *_results(results)]
+    moments = [c.made_at for c in (*history, *corrections)] + [r.created_at for r in results] + [n.at for n in notes]
+    moments += [d.at for c in (*history, *corrections) for d in c.decisions]
     newest = max(moments, default=datetime.fromisoformat("1970-01-01T00:00:00+00:00"))
     return PrintedDocument("Unit", f"unit {serial}", "", f"unit {serial}", newest, tuple(blocks))
 
@@ -53,25 +56,13 @@ def _identity(unit: Unit) -> Iterator[Block]:
         yield PrintedTable("Coefficients by former certificates", columns, tuple(stated))
 
 
-def _noise(unit: Unit) -> Iterator[Block]:
+def _noise(stores: EvidenceStores, unit: Unit, results: tuple[StoredResult, ...]) -> Iterator[Block]:
+    """Noise in the unit's record, and its trend over static launches of the kind of the newest result."""
     yield Heading("Noise")
-    rows: list[tuple[str, ...]] = []
-    columns: tuple[str, ...] = ()
-    for triad, rate_unit in (("gyro", "rad/s"), ("accelerometer", "m/s^2")):
-        record = unit.triad(triad)
-        if record is None:
-            continue
-        columns = ("channel", *(name.replace("_", " ") for name in NOISE_DISPLAY[rate_unit]), "origin")
-        for name, noise in zip(TRIADS[triad], record.noise, strict=True):
-            cells = [
-                f"{getattr(noise, process) / size:.4g} {label}"
-                for process, (label, size) in NOISE_DISPLAY[rate_unit].items()
-            ]
-            rows.append((name, *cells, record.noise_origin))
-    if rows:
-        yield PrintedTable("", columns, tuple(rows))
-    else:
-        yield Paragraph("Nothing is known of the unit's noise.")
+    known = list(noise_parts.noise(unit))
+    yield from known or [Paragraph("Nothing is known of the unit's noise.")]
+    if results:
+        yield from noise_parts.noise_trends(stores, unit.serial, results[0].simulated)
 
 
 def _calibrations(history: tuple[StoredCalibration, ...]) -> Iterator[Block]:
@@ -105,11 +96,28 @@ def _calibrations(history: tuple[StoredCalibration, ...]) -> Iterator[Block]:
         yield PrintedTable("History, newest first", columns, rows)
 
 
+def _corrections(corrections: tuple[StoredCorrection, ...]) -> Iterator[Block]:
+    """Temperature corrections of the unit, newest first; nothing where there are none."""
+    if not corrections:
+        return
+    yield Heading("Temperature corrections")
+    rows = tuple(
+        (
+            c.made_at.date().isoformat(),
+            c.correction.kind,
+            c.id,
+            c.result_id,
+            "in use" if c.current else "",
+            c.approval.value,
+        )
+        for c in corrections
+    )
+    yield PrintedTable("", ("day", "kind", "correction", "result", "", "approval"), rows)
+
+
 def _results(results: tuple[StoredResult, ...]) -> Iterator[Block]:
     yield Heading("Latest results")
-    rows = tuple(
-        (r.created_at.isoformat(timespec="seconds"), f"{r.name} {r.version}", r.id, r.verdict.value) for r in results
-    )
+    rows = tuple((people_parts.moment(r.created_at), f"{r.name} {r.version}", r.id, r.verdict.value) for r in results)
     if rows:
         yield PrintedTable("", ("at", "procedure or method", "result", "verdict"), rows)
     else:

@@ -46,7 +46,7 @@ class CoefficientSoFar(BaseModel):
     name: str
     unit: str
     values: list[float]
-    standard_uncertainties: list[float] = Field(description="Of noise, the table's declared flaws and a weak prior")
+    standard_uncertainties: list[float] = Field(description="From noise, the table's declared flaws and a weak prior")
     determined: bool = Field(description="False: the stations so far do not give it, the prior does")
 
 
@@ -64,5 +64,7 @@ class JobEstimates(BaseModel):
     job: str
     stations_done: int
     dwell: DwellEstimates | None = Field(description="null: nothing is stored yet")
-    coefficients: list[TriadEstimates] = Field(description="Of stations at rest with known angles, from the second on")
+    coefficients: list[TriadEstimates] = Field(
+        description="From stations at rest with known angles, after each from the second on"
+    )
     not_estimated: dict[str, str] = Field(description="Triad -> why it has no coefficients yet")

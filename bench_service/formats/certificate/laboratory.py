@@ -61,7 +61,7 @@ def laboratory_of(text: str) -> Laboratory:
     try:
         return Laboratory.model_validate(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
-        raise CertificateRefused(f"laboratory file: no TOML: {error}") from error
+        raise CertificateRefused(f"laboratory file: not TOML: {error}") from error
     except ValidationError as error:
         faults = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()[:5])
         raise CertificateRefused(f"laboratory file: {faults}") from error

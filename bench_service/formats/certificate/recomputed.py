@@ -70,9 +70,9 @@ def require_issuable(document: Mapping[str, Any], failed: bool) -> None:
     for triad in document["triads"]:
         validity = triad["validity"]
         if validity["unusable"]:
-            raise CertificateRefused(f"no certificate is made of it: {validity['unusable']}")
+            raise CertificateRefused(f"no certificate can be made of it: {validity['unusable']}")
         if validity["verdict"] not in (None, "pass") and not failed:
             raise CertificateRefused(
-                f"no certificate is made of it: the verdict on calibration {triad['calibration']} of the "
+                f"no certificate can be made of it: the verdict on calibration {triad['calibration']} of the "
                 f"{triad['triad']} triad is {validity['verdict']}; with --failed a certificate states that"
             )

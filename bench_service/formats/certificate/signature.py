@@ -74,9 +74,9 @@ def parsed(data: bytes) -> Element:
     try:
         root = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False))
     except etree.XMLSyntaxError as error:
-        raise CertificateRefused(f"no XML: {error}") from error
+        raise CertificateRefused(f"not XML: {error}") from error
     if root.getroottree().docinfo.doctype:
-        raise CertificateRefused("the certificate has a document type, which none may have")
+        raise CertificateRefused("the certificate has a DOCTYPE, which is not allowed")
     return root
 
 
@@ -90,7 +90,7 @@ def verified(data: bytes, certificate: bytes) -> tuple[Element, str]:
         pinned = x509.load_pem_x509_certificate(certificate)
         result = XMLVerifier().verify(data, x509_cert=certificate.decode(), expect_config=EXPECTED)
     except (SignXMLException, InvalidInput, ValueError) as error:
-        raise CertificateRefused(f"the signature does not hold: {error}") from error
+        raise CertificateRefused(f"the signature is not valid: {error}") from error
     covered = (result if not isinstance(result, list) else result[0]).signed_xml
     if covered is None or covered.tag != root.tag:
         raise CertificateRefused("the signature covers a part only, not the whole certificate")

@@ -100,8 +100,8 @@ def _require_growing(name: str, column: ClockColumn, description: ImportDescript
         raise UnfitRecording(f"{name}: the time does not grow: {where}{more}{way}")
     if column.duration_s == 0.0:
         raise UnfitRecording(
-            f"{name}: all {column.count} rows have the time {column.first!r}: digits were lost when it was printed, or "
-            f"it is no time; {NO_TIME}"
+            f"{name}: all {column.count} rows have the time {column.first!r}: digits were lost in printing, or it is "
+            f"not a time; {NO_TIME}"
         )
 
 

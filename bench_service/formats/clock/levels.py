@@ -69,7 +69,7 @@ def changes(
 ) -> Places:
     """Rises and falls of the level of ``t_i − i·P`` by half a period and more at the steps before row `stop`.
 
-    `time_s` has shape (n,) and may go on beyond `stop`, to be looked at ahead. `tolerances`: of a step that is never
+    `time_s` has shape (n,) and may continue beyond `stop`, to be looked at ahead. `tolerances`: of a step that is never
     looked at, and of the level beyond half a period, both in periods. `begins`: the first row is the first of all, and
     on time.
     """

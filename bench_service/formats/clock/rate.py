@@ -141,7 +141,7 @@ def _means(time_s: Array, stretch: int) -> Array:
 
 
 def _pauses(rows: KeptRows, places: Places) -> tuple[NDArray[np.int64], Array]:
-    """Rows before long gaps, from 0, and the durations of those steps [s]: a pause is no whole number of periods."""
+    """Rows before long gaps, from 0, and the durations of those steps [s]: a pause is not a whole number of periods."""
     long = places.rows[places.samples > PAUSE]
     durations = [np.empty(0)]
     for start in range(0, rows.count, WINDOW) if len(long) else ():

@@ -82,7 +82,7 @@ class IxcomLog:
                     self._rows[message[1]] = self._rows.get(message[1], 0) + 1
                 else:
                     others += 1
-        require_frames(counted, name, "iXCOM messages", "the file is no dump of iXCOM, or its bytes were changed")
+        require_frames(counted, name, "iXCOM messages", "the file is not a dump of iXCOM, or its bytes were changed")
         self.warnings += counted.warnings("messages")
         if others and not self._rows:
             self.warnings.append(f"{others} messages are of other kinds than {', '.join(MESSAGES.values())}")

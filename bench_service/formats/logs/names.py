@@ -79,7 +79,7 @@ class Hint:
     unit: str | None = None
     """Unit that the name gives; None: none."""
     doubt: str = ""
-    """A sentence where the name tells of processed values."""
+    """A sentence where the name says processed values."""
 
 
 def unit_of(text: str, quantity: Quantity | Accumulated | None) -> str | None:

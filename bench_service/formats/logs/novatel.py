@@ -3,6 +3,7 @@
 Layout: NovAtel's OEM7 manual (headers, CRC-32, messages). Raw counts come in the order Z, −Y, X.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 from typing import BinaryIO
 from zlib import crc32
@@ -16,6 +17,7 @@ from bench_service.formats.logs.table import LogTable, Numbers
 NAME = "novatel"
 TITLE = "NovAtel logs (SPAN), ASCII or binary"
 _SYNCS = (b"\xaa\x44\x12", b"\xaa\x44\x13")
+_BEGINS = re.compile(rb"[\xaa#%]")
 _LONGEST_LINE = 8192
 _LONG, _SHORT = 28, 12
 
@@ -25,8 +27,8 @@ class _Logs:
 
     def next(self, data: bytes, at: int) -> int:
         """Return the next byte with which a log may begin."""
-        places = [p for mark in (b"\xaa", b"#", b"%") if (p := data.find(mark, at)) >= 0]
-        return min(places, default=-1)
+        found = _BEGINS.search(data, at)  # one search: a mark that the file lacks would be sought to the piece's end
+        return -1 if found is None else found.start()
 
     def length(self, data: bytes, at: int) -> int:
         """Return the length of a log; more than there is where its header or line is not whole."""
@@ -92,7 +94,7 @@ class NovAtel:
                     errors += int(np.count_nonzero(data["info"] & 1))
                     encrypted += int(np.count_nonzero(data["info"] & 2))
             configured |= {kind for _, frame in found if (kind := _configured(frame)) is not None}
-        require_frames(counted, name, "NovAtel logs", "the file is no NovAtel log, or its bytes were changed")
+        require_frames(counted, name, "NovAtel logs", "the file is not a NovAtel log, or its bytes were changed")
         self.warnings += counted.warnings("logs")
         if errors:
             self.warnings.append(f"{errors} raw logs report an error of the inertial unit (bit 0 of its information)")

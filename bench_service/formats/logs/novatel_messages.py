@@ -110,7 +110,7 @@ class Rows:
         self._text = []
 
     def taken(self) -> Any:
-        """Return all records that were gathered, and begin anew."""
+        """Return all records that were gathered, and begin again."""
         if self._binary:
             self._close_binary()
         if self._text:

@@ -37,7 +37,7 @@ class LogColumn:
     source: str = ""
     """Origin of quantity, unit and scale, in words."""
     doubt: str = ""
-    """A sentence where the column may be something else, as its name tells."""
+    """A sentence where the column may be something else, by its name."""
 
 
 @dataclass(frozen=True)

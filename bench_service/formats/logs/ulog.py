@@ -138,7 +138,8 @@ class ULog:
                     if chr(kind) not in _KNOWN:
                         raise UnreadableFile(
                             self._name,
-                            f"byte {base + place} begins no message of a ULog (type {kind}): the file is damaged there",
+                            f"byte {base + place} is not the start of a message of a ULog (type {kind}): "
+                            "the file is damaged there",
                         )
                     yield chr(kind), data[place + 3 : end]
                 place = end

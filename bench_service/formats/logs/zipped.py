@@ -160,7 +160,9 @@ class Zipped:
     def _stamp_texts(self) -> list[str]:
         info = self._archive.getinfo(self._stamps or "")
         if info.file_size > 64 * MEGABYTE:
-            raise UnreadableFile(self._name, f"{self._stamps} has {info.file_size} bytes: it is no list of time stamps")
+            raise UnreadableFile(
+                self._name, f"{self._stamps} has {info.file_size} bytes: it is not a list of time stamps"
+            )
         return self._archive.read(info).decode("ascii", "replace").split("\n")
 
     def _times(self, texts: Sequence[str], row: int) -> Numbers:
@@ -168,7 +170,7 @@ class Zipped:
             return nanoseconds(pa.array([text.strip() for text in texts]), "decimal")
         except NoClock as error:
             raise UnreadableFile(
-                self._name, f"{self._stamps}: line {row + error.row + 1} is no time: {error.text[:40]!r}"
+                self._name, f"{self._stamps}: line {row + error.row + 1} is not a time: {error.text[:40]!r}"
             ) from error
 
     def _text_rows(self, table: LogTable, columns: Sequence[str]) -> Iterator[list[Numbers]]:

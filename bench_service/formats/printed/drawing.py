@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SIZE_IN = (7.2, 3.4)
-MARGINS = {"left": 0.12, "right": 0.985, "bottom": 0.15, "top": 0.97}
+MARGINS = {"left": 0.12, "right": 0.985, "bottom": 0.15, "top": 0.93}
 COLOURS = ("#1f5fa8", "#c2410c", "#15803d", "#7c3aed", "#a16207", "#0e7490")
 MARKS = ("o", "^", "s", "D", "v", "P")
 MOST_DECADES = 12
@@ -51,6 +51,8 @@ def _drawn(figure: Figure) -> str:
             _logarithmic(axes, "x", [v for s in figure.series for v in s.x])
         if figure.y_log:
             _logarithmic(axes, "y", [v for s in figure.series for v in (*s.y, *s.upper)])
+        if not figure.x_log and all(float(v).is_integer() for s in figure.series for v in s.x):
+            axes.xaxis.get_major_locator().set_params(integer=True)
         axes.grid(visible=True, linewidth=0.4, alpha=0.7)
         if len(figure.series) > 1:
             axes.legend(fontsize=8, framealpha=0.8)

@@ -4,14 +4,17 @@ Nothing is fetched: typst gets a folder of its own with the layout, the data, th
 """
 
 import json
+import os
 import unicodedata
-from collections.abc import Generator
-from contextlib import contextmanager
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from shutil import rmtree
+from tempfile import TemporaryDirectory, gettempdir
+from textwrap import wrap
 from typing import Any
 
 from bench_service.formats.printed.document import (
@@ -29,6 +32,8 @@ from procedures.core.report import Figure
 STANDARD = "a-3b"
 FONT = "DejaVuSans.ttf"
 LAYOUT = "report.typ"
+FOLDER = "bench-report-"
+"""Beginning of the names of temporary folders; the id of their process follows."""
 WIDTH_PT, INSET_PT = 498.0, 6.0
 """Width of a page's text, and the margins of a table's cell, as the layout has them [pt]."""
 LETTER_EM = 0.62
@@ -85,7 +90,7 @@ def _silent(character: str) -> bool:
 @contextmanager
 def _folder(document: PrintedDocument) -> Generator[Path]:
     """A folder with everything that the layout reads."""
-    with TemporaryDirectory(prefix="bench-report-") as name:
+    with TemporaryDirectory(prefix=f"{FOLDER}{os.getpid()}-") as name:
         folder = Path(name)
         (folder / LAYOUT).write_bytes((files("bench_service.formats.printed") / LAYOUT).read_bytes())
         data = {
@@ -101,6 +106,24 @@ def _folder(document: PrintedDocument) -> Generator[Path]:
         yield folder
 
 
+def remove_orphaned_folders() -> None:
+    """Remove the folders of processes that were killed while they printed; those of this user alone."""
+    for folder in Path(gettempdir()).glob(f"{FOLDER}*-*"):
+        with suppress(OSError, ValueError):
+            if folder.stat().st_uid == os.getuid() and not _alive(int(folder.name[len(FOLDER) :].partition("-")[0])):
+                rmtree(folder, ignore_errors=True)
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
 def _block(folder: Path, number: int, block: Block) -> dict[str, Any]:
     match block:
         case Heading(text):
@@ -113,7 +136,7 @@ def _block(folder: Path, number: int, block: Block) -> dict[str, Any]:
             return {
                 "kind": "table",
                 "title": printable(block.title),
-                "columns": [printable(column) for column in block.columns],
+                "columns": [printable(column) for column in _headers(block)],
                 "rows": [[printable(cell) for cell in row] for row in block.rows],
                 "numeric": list(block.numeric),
                 "size": _size(block),
@@ -125,12 +148,32 @@ def _block(folder: Path, number: int, block: Block) -> dict[str, Any]:
             return {"kind": "figure", "image": image, "title": figure.title, "note": figure.note}
 
 
+def _letters(table: PrintedTable) -> list[int]:
+    """Letters that each column needs so that its cells stay in one line: long texts may break.
+
+    Headers break between words too, but only where they would make the letters of the table smaller.
+    """
+    columns = range(len(table.columns))
+    cells = [max((min(len(row[i]), LONG) for row in table.rows), default=0) for i in columns]
+    whole = [max(cells[i], min(len(table.columns[i]), LONG)) for i in columns]
+    if _fitting(whole) >= LARGEST_PT:
+        return whole
+    return [max(cells[i], *(len(word) for word in table.columns[i].split() or [""])) for i in columns]
+
+
+def _headers(table: PrintedTable) -> list[str]:
+    """Headers broken between words where they are wider than their columns."""
+    return ["\n".join(wrap(name, max(n, 1))) for name, n in zip(table.columns, _letters(table), strict=True)]
+
+
 def _size(table: PrintedTable) -> float:
-    """Size of a table's letters [pt] at which its rows fit the page without a break; long texts may break."""
-    rows = (table.columns, *table.rows)
-    letters = sum(max(min(len(row[i]), LONG) for row in rows) for i in range(len(table.columns)))
-    room = WIDTH_PT - INSET_PT * len(table.columns)
-    return round(min(LARGEST_PT, max(SMALLEST_PT, room / (LETTER_EM * max(letters, 1)))), 2)
+    """Size of a table's letters [pt] at which its rows fit the page without a break."""
+    return round(min(LARGEST_PT, max(SMALLEST_PT, _fitting(_letters(table)))), 2)
+
+
+def _fitting(letters: Sequence[int]) -> float:
+    """Size [pt] at which columns of so many letters fill the page's width."""
+    return (WIDTH_PT - INSET_PT * len(letters)) / (LETTER_EM * max(sum(letters), 1))
 
 
 def _drawable_figure(figure: Figure) -> Figure:

@@ -46,7 +46,7 @@ def _is_better(new: LogColumn, known: LogColumn) -> bool:
 
 
 def _require_one_quantity(first: dict[str, LogColumn], kind: Sequence[str]) -> None:
-    """Leave out axes whose quantity is not that of the others: a rate beside two increments is a wrong guess."""
+    """Leave out axes whose quantity is not that of the others: a rate with two increments is a wrong guess."""
     found = [first[name].quantity for name in kind if name in first]
     if len(set(found)) > 1:
         most = max(set(found), key=found.count)

@@ -89,7 +89,7 @@ def _answer(line: socket.socket, files: list[ImportFile], description: ImportDes
         send(line, END, b"")
     except (BrokenPipeError, ConnectionResetError):
         raise
-    except Exception as error:  # whatever a file does to its reader, the service goes on
+    except Exception as error:  # whatever a file does to its reader, the service continues
         send_json(line, REFUSED, _refusal(error, files[0].name))
 
 
@@ -99,7 +99,7 @@ def _describe(line: socket.socket, file: ImportFile, asked: dict[str, str | None
         send(line, PROPOSED, proposal.model_dump_json().encode())
     except (BrokenPipeError, ConnectionResetError):
         raise
-    except Exception as error:  # whatever a file does to its reader, the service goes on
+    except Exception as error:  # whatever a file does to its reader, the service continues
         send_json(line, REFUSED, _refusal(error, file.name))
 
 

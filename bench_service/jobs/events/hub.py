@@ -97,7 +97,7 @@ class EventHub:
         try:
             watch = await self._watch(job_id)
         except ServiceError as error:
-            log.warning("nobody can listen to job %s now: %s", job_id, error)
+            log.warning("the events of job %s cannot be followed now: %s", job_id, error)
             return
         listener = Listener(after, watch.sequence, self._lag)
         watch.listeners.add(listener)
@@ -111,7 +111,7 @@ class EventHub:
             if listener.dropped:
                 yield self._frames.dropped
         except ServiceError as error:
-            log.warning("a listener to job %s is let go, the past cannot be read now: %s", job_id, error)
+            log.warning("a listener to job %s is disconnected, past events cannot be read now: %s", job_id, error)
         finally:
             watch.listeners.discard(listener)
 

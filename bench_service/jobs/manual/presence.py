@@ -1,7 +1,7 @@
 """Signs of life of the processes that answer clients, for the leases of manual mode that are open.
 
-An operator whose service is gone can command nothing, and a table that turns at a rate would go on: where nobody counts
-up a lease's `heard`, the worker ends it (`bench_service.jobs.manual.reader`).
+An operator whose service is gone can command nothing, and a table that turns at a rate would keep turning: where no
+service counts up a lease's `heard`, the worker ends it (`bench_service.jobs.manual.reader`).
 """
 
 import logging
@@ -41,4 +41,4 @@ class Presence:
             try:
                 self._store.hear()
             except ServiceError as error:
-                log.debug("no sign of life for manual mode: %s", error)
+                log.debug("no heartbeat for manual mode: %s", error)

@@ -34,7 +34,7 @@ class LeaseReader:
         self._heard = -1
         self._thread: Thread | None = None
         self.because = ""
-        """The reason why the lease has to end; empty: it goes on."""
+        """The reason why the lease has to end; empty: it continues."""
 
     def begin(self, session: ManualSession) -> None:
         """Begin to read for a session."""
@@ -92,7 +92,7 @@ class LeaseReader:
         elif news.lease.end_asked:
             self.because = f"ended by {news.lease.end_asked}"
         elif monotonic_s() - self._heard_s > SILENT_S:
-            self.because = f"no process that answers clients was heard of for {SILENT_S:g} s"
+            self.because = f"no process that serves clients has given a heartbeat for {SILENT_S:g} s"
         if self.because:
             session.leave()
             return

@@ -63,7 +63,7 @@ class ManualRunner:
             self._ended(lease, because, None if obstacle is None else obstacle.why)
             return True
         if not lease.live(now()) or self._stopped():
-            why = "the bench is stopped" if self._stopped() else "its time was over before it began"
+            why = "the bench is stopped" if self._stopped() else "its time had ended before it began"
             self._ended(lease, why, None)
             return True
         taken = self._stores.manual.take(lease.id, now(), str(ProcessIdentity.own()))
@@ -119,7 +119,7 @@ class ManualRunner:
         because, ending = "", False
         try:
             session.hold()
-            because = reader.because or "its time was over"
+            because = reader.because or "its time has ended"
         except Stopped:
             because = reader.because or "the bench was stopped"
         except ShuttingDown:

@@ -134,6 +134,6 @@ def _require_holder(lease: ManualLease, name: str) -> None:
     """Check that the holder asks: two people at one table would not know of each other's demands."""
     if lease.holder != name:
         raise NotAllowed(
-            f"lease {lease.id} is {lease.holder}'s, and {name} asks: only its holder commands the bench; anybody with "
-            "the right to operate ends it, and everybody stops the bench"
+            f"lease {lease.id} is {lease.holder}'s, not {name}'s: only its holder may command the bench; anybody "
+            "with the right to operate may end the lease, and everybody may stop the bench"
         )

@@ -25,7 +25,7 @@ class ManualStore(Protocol):
     def begin(self, lease: ManualLease, idempotency: Idempotency | None = None) -> ManualLease:
         """Store a new lease; with a known key and the same fingerprint, return the one that it made.
 
-        Raises `ManualRefused` while a job drives the bench, while it is stopped, or while another lease lives;
+        Raises `ManualRefused` while a job drives the bench, while it is stopped, or while another lease is active;
         `AlreadyReserved` where another holder's reservation of bench or unit holds; `IdempotencyConflict`.
         """
         ...

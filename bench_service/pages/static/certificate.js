@@ -18,7 +18,7 @@ form.addEventListener("submit", async (event) => {
   if (!found) return;
   form.querySelector("output").textContent = "";
   fill(outcome, h("div", { class: `verdict ${found.valid ? "pass" : "fail"}` }, found.valid ? t("VALID") : t("NOT VALID"),
-    h("small", {}, found.signed_by ? `${t("Signed by")} ${found.signed_by}. ` : t("The signature does not hold. "), found.unchanged ? t("The text is as it was signed.") : t("The text is not what was signed, or another key signed it."))),
+    h("small", {}, found.signed_by ? `${t("Signed by")} ${found.signed_by}. ` : t("The signature is not valid. "), found.unchanged ? t("The text is as it was signed.") : t("The text is not what was signed, or another key signed it."))),
     ...found.faults.map((text) => h("p", { class: "warning" }, text)),
     found.unit && h("p", {}, t("Unit"), " ", found.unit),
     found.calibrations.length > 0 && h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Calibrations of the certificate") }, h("table", {}, h("thead", {}, h("tr", {}, ...["Triad", "Calibration", "Here", "Approval"].map((name) => h("th", {}, t(name))))), h("tbody", {}, ...found.calibrations.map((one) => triad(one, found.unit))))));

@@ -20,7 +20,7 @@ function row(one) {
 
 function list() {
   fill(document.getElementById("found"), items.length ? h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": t("Mountings") }, h("table", {},
-    h("thead", {}, h("tr", {}, ...["Unit", "Bench", "Plate", "Azimuth", "By", "Mounted", "Theodolite and prism", "Remark", "State", "Mounting", "Do"].map((name) => h("th", {}, t(name))))),
+    h("thead", {}, h("tr", {}, ...["Unit", "Bench", "Plate", "Azimuth", "By", "Mounted", "Instrument of the reading: theodolite and prism", "Remark", "State", "Mounting", "Do"].map((name) => h("th", {}, t(name))))),
     h("tbody", {}, ...items.map(row)))) : h("p", { class: "note" }, t("No mounting was entered yet.")));
   older.hidden = !next;
   repeats();

@@ -1,6 +1,7 @@
 // Recordings: search, methods run on chosen ones, and the import of files.
 import { ask, part, read } from "./api.js";
 import { busy } from "./act.js";
+import * as batches from "./batches.js";
 import { bytes, h, fill, moment, number, span } from "./dom.js";
 import { SchemaForm } from "./form.js";
 import "./import_wizard.js";
@@ -42,14 +43,28 @@ function choose(name) {
   fill(at("form"), form.element);
 }
 
+/** The recordings of the analysis: the chosen ones together, or each of the search in a batch of its own tasks. */
+function evidence() {
+  const each = at("each").value;
+  if (!each) {
+    if (!chosen.size) throw new Error(t("Choose recordings in the list above first."));
+    return { recordings: [...chosen.keys()] };
+  }
+  return { each, selection: Object.fromEntries([...new FormData(search)].map(([name, value]) => [name, value.trim()]).filter(([, value]) => value)) };
+}
+
 async function analyse(event) {
   event.preventDefault();
   const made = await busy(at("go"), at("refusal"), async () => {
-    if (!chosen.size) throw new Error(t("Choose recordings in the list above first."));
-    try { return await ask("POST", "/api/v1/analyses", { method: at("method").value, recordings: [...chosen.keys()], parameters: form.values() }, { key, patience: 300000 }); }
+    try { return await ask("POST", "/api/v1/analyses", { method: at("method").value, ...evidence(), parameters: form.values() }, { key, patience: 300000 }); }
     catch (error) { form.errors(error.problem && error.problem.errors); throw error; }
   });
-  if (made) location.href = made.page;
+  if (!made) return;
+  if (made.page) { location.href = made.page; return; }
+  key = crypto.randomUUID();
+  at("refusal").textContent = t("The batch is queued: its progress stands below.");
+  await batches.show();
+  document.getElementById("batches").scrollIntoView({ block: "nearest" });
 }
 
 search.addEventListener("submit", (event) => { event.preventDefault(); find(); });
@@ -61,6 +76,8 @@ count();
 find();
 read("/api/v1/methods").then((all) => {
   methods = all;
+  batches.named(all);
   at("method").append(...all.map((one) => h("option", { value: one.name }, t(one.title))));
   if (all.length) choose(all[0].name);
+  return batches.show();
 }).catch((error) => { at("refusal").className = "refused"; at("refusal").textContent = error.message; });

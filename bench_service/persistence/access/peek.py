@@ -1,18 +1,15 @@
 """A look whether a database has accounts or valid tokens, without creating or migrating it."""
 
-from pathlib import Path
+from sqlalchemy import func, inspect, select
 
-from sqlalchemy import func, inspect, make_url, select
-
-from bench_service.persistence.database import connect
+from bench_service.persistence.database import connect, missing_file
 from bench_service.persistence.tables.access import AccountRow, TokenRow
 from bench_service.wall_clock import now
 
 
 def has_credentials(database_url: str) -> bool:
     """Return whether somebody could authenticate: there is an account, or a valid token. Raises `StorageFailure`."""
-    url = make_url(database_url)
-    if url.get_backend_name() == "sqlite" and not Path(url.database or "").is_file():
+    if missing_file(database_url) is not None:
         return False
     database = connect(database_url)
     try:

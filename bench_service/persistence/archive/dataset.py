@@ -1,13 +1,13 @@
 """The archive as a Parquet dataset: copies of chunks, and tables of units, recordings, results and quantities.
 
 `samples/recording=ID/chunk-N.parquet` has the raw counts, one column a channel; `tables/NAME/*.parquet` what they mean.
-Rows that never change are added in parts, each named by its last id; units and recordings are written anew.
+Rows that never change are added in parts, each named by its last id; units and recordings are written again.
 """
 
 import hashlib
 import io
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from sqlalchemy import select
@@ -18,6 +18,7 @@ from bench_service.model.raw_data import RawState
 from bench_service.persistence.archive.chunks import archived_chunk, chunk_name
 from bench_service.persistence.archive.places import place_at
 from bench_service.persistence.database import Database
+from bench_service.persistence.parts import in_parts
 from bench_service.persistence.tables.evidence import (
     ChunkRow,
     RecordingRow,
@@ -30,8 +31,6 @@ from bench_service.persistence.tables.jobs import JobRow
 
 PART = 20_000
 """Results in one part of a table."""
-AT_ONCE = 500
-"""Ids in one statement."""
 TEXT, NUMBER, INTEGER, TRUTH, MOMENT = "string", "float64", "int64", "bool", "moment"
 """Types of columns."""
 UNITS = {"serial": TEXT, "updated_at": MOMENT, "document": TEXT}
@@ -153,13 +152,9 @@ def _unit(row: UnitRow) -> dict[str, Any]:
     return {"serial": row.serial, "updated_at": row.updated_at, "document": json.dumps(row.document)}
 
 
-def _in_parts(ids: Sequence[str]) -> Iterator[Sequence[str]]:
-    return (ids[first : first + AT_ONCE] for first in range(0, len(ids), AT_ONCE))
-
-
 def _recordings(session: Session, ids: Sequence[str]) -> Rows:
     rows: Rows = []
-    for part in _in_parts(ids):
+    for part in in_parts(ids):
         query = select(RecordingRow, JobRow.procedure, JobRow.verdict).outerjoin(
             JobRow, JobRow.id == RecordingRow.job_id
         )
@@ -175,14 +170,14 @@ def _chunks(session: Session, ids: Sequence[str]) -> Rows:
     columns = (ChunkRow.recording_id, ChunkRow.number, ChunkRow.start_sample, ChunkRow.samples, ChunkRow.sha256)
     return [
         dict(zip(CHUNKS, (*row, chunk_name(row.recording_id, row.number)), strict=True))
-        for part in _in_parts(ids)
+        for part in in_parts(ids)
         for row in session.execute(select(*columns).where(ChunkRow.recording_id.in_(part)))
     ]
 
 
 def _results(session: Session, ids: Sequence[str]) -> Rows:
     rows: Rows = []
-    for part in _in_parts(ids):
+    for part in in_parts(ids):
         for row in session.scalars(select(ResultRow).where(ResultRow.id.in_(part))):
             documents = {"parameters": json.dumps(row.parameters), "document": json.dumps(row.document)}
             rows.append({name: getattr(row, name, None) for name in RESULTS} | {"job": row.job_id} | documents)
@@ -194,7 +189,7 @@ def _quantities(session: Session, ids: Sequence[str]) -> Rows:
     columns = (kept.result_id, kept.name, kept.value, kept.unit, kept.standard_uncertainty)
     return [
         dict(zip(QUANTITIES, row, strict=True))
-        for part in _in_parts(ids)
+        for part in in_parts(ids)
         for row in session.execute(select(*columns).where(kept.result_id.in_(part)))
     ]
 
@@ -204,6 +199,6 @@ def _lineage(session: Session, ids: Sequence[str]) -> Rows:
     columns = (used.result_id, used.position, used.recording_id, used.content_hash)
     return [
         dict(zip(LINEAGE, row, strict=True))
-        for part in _in_parts(ids)
+        for part in in_parts(ids)
         for row in session.execute(select(*columns).where(used.result_id.in_(part)))
     ]

@@ -1,6 +1,6 @@
 """Files of an archive through pyarrow's filesystems: a folder, or a store of objects with the interface of S3.
 
-A file appears whole or not at all: in a folder it is written beside, brought to the disk and renamed; a store of
+A file appears whole or not at all: in a folder it is written next to its place, synced and renamed; a store of
 objects shows an object only once it is whole. Credentials of a store come from the environment, as AWS names them.
 """
 

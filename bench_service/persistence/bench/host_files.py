@@ -39,7 +39,7 @@ class HostFiles:
         self._write(True)
 
     def supervisor(self) -> ProcessIdentity | None:
-        """Return the process that supervises the bench on this host, if one lives."""
+        """Return the process that supervises the bench on this host, if one is alive."""
         try:
             process = ProcessIdentity(**json.loads(self._supervisor.read_text(encoding="utf-8")))
         except (OSError, ValueError, TypeError):

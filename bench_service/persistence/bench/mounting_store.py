@@ -29,7 +29,7 @@ class SqlMountingStore:
                 known = made_before(session, idempotency, "mounting")
                 if known is not None:
                     return _mounting(_found(session, known))
-                self._database.one_at_a_time(session, f"claim a job of bench {mounting.bench}")
+                self._database.turn_at_bench(session, mounting.bench)
                 place = (MountingRow.bench == mounting.bench) & (MountingRow.plate == mounting.plate)
                 before = session.scalars(
                     select(MountingRow).where(
@@ -81,7 +81,7 @@ class SqlMountingStore:
         with self._database.write() as session:
             row = _found(session, mounting_id)
             if row.ended_at is None:
-                self._database.one_at_a_time(session, f"claim a job of bench {row.bench}")
+                self._database.turn_at_bench(session, row.bench)
                 _require_idle(session, {row.bench})
                 row.ended_at, row.ended_by = at, by
             return _mounting(row)
@@ -90,7 +90,7 @@ class SqlMountingStore:
 def _require_idle(session: Session, benches: set[str]) -> None:
     query = select(JobRow.id, JobRow.bench).where(JobRow.bench.in_(benches), JobRow.state == JobState.RUNNING.value)
     for job, bench in session.execute(query):
-        raise BenchBusy(f"job {job} drives bench {bench}: nobody mounts a unit there before it has ended")
+        raise BenchBusy(f"job {job} drives bench {bench}: a mounting can be entered after the job has ended")
 
 
 def _mounting(row: MountingRow) -> StoredMounting:

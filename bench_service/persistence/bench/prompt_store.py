@@ -31,9 +31,9 @@ class SqlPromptStore:
         with self._database.write() as session:
             row = found_job(session, job_id, lock=True)
             if row.prompt is None or "answer" in row.prompt:
-                raise IllegalTransition(f"job {job_id} asks nothing of anybody now")
+                raise IllegalTransition(f"job {job_id} has no open prompt")
             if row.prompt.get("id", "") != prompt_id:
-                text = f"job {job_id} asks something else now; this answer is to an older question: read it anew"
+                text = f"job {job_id} has a newer prompt; this answer is to an older one: read the job again"
                 raise IllegalTransition(text)
             row.prompt = {**row.prompt, "answer": said}
             append_event(session, job_id, "answer", at, {**said, "prompt": prompt_id})

@@ -94,7 +94,7 @@ class SqlBenchRegistry:
         with self._database.write() as session:
             row = session.get(BenchStopRow, stop_id, with_for_update=True)
             if row is None or row.bench != bench_id:
-                raise NotFound("stop", stop_id, f"bench {bench_id} has none of that id")
+                raise NotFound("stop", stop_id, f"bench {bench_id} has none with this id")
             if row.released_at is None:
                 row.released_at, row.released_by, row.remark = at, by, remark
             elif (row.released_by, row.remark) != (by, remark):

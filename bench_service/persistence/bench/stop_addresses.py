@@ -1,6 +1,6 @@
 """Addresses where the supervisors of benches listen for stops, kept in the benches' own rows.
 
-A bench that is registered anew loses its address; its supervisor writes it again at its next poll.
+A bench that is registered again loses its address; its supervisor writes it again at its next poll.
 """
 
 from sqlalchemy import select

@@ -19,14 +19,13 @@ from bench_service.persistence.evidence.batch_rows import (
 )
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.pages import page
+from bench_service.persistence.parts import in_parts
 from bench_service.persistence.searching import find_recordings
 from bench_service.persistence.tables.batches import BatchRow, TaskRecordingRow, TaskRow
 from bench_service.persistence.tables.evidence import RecordingRow
 from bench_service.persistence.tables.jobs import JobRow
 
 _GONE = tuple(state.value for state in GONE)
-AT_ONCE = 500
-"""Ids in one statement, and rows in one insert: databases limit the number of values."""
 
 
 class SqlBatchStore(SqlBatchQueue):
@@ -47,8 +46,7 @@ class SqlBatchStore(SqlBatchQueue):
             query = query.where(exists().where(of_job, JobRow.procedure == selection.procedure))
         parts = [query]
         if selection.ids:
-            ids = sorted(selection.ids)
-            parts = [query.where(RecordingRow.id.in_(ids[k : k + AT_ONCE])) for k in range(0, len(ids), AT_ONCE)]
+            parts = [query.where(RecordingRow.id.in_(ids)) for ids in in_parts(sorted(selection.ids))]
         found: list[tuple[str, str | None, str]] = []
         with self._database.read() as session:
             for part in parts:
@@ -87,8 +85,8 @@ class SqlBatchStore(SqlBatchQueue):
                 session.add(row_of_batch(batch))
                 session.flush()
                 for table, rows in ((TaskRow, tasks), (TaskRecordingRow, recordings)):
-                    for first in range(0, len(rows), AT_ONCE):
-                        session.execute(insert(table), rows[first : first + AT_ONCE])
+                    for part in in_parts(rows):
+                        session.execute(insert(table), part)
                 return batches_of_rows(session, [found_batch(session, batch.id)])[0]
 
         return again_after_conflict(once)
@@ -121,7 +119,7 @@ class SqlBatchStore(SqlBatchQueue):
         with self._database.write() as session:
             row = found_batch(session, batch_id, lock=True)
             if row.ended_at is not None:
-                raise IllegalTransition(f"batch {batch_id} has ended: nothing of it is left to be cancelled")
+                raise IllegalTransition(f"batch {batch_id} has ended: there is nothing left to cancel")
             if row.cancelled_at is None:
                 row.cancelled_at, row.cancelled_by = at, by
             session.execute(update(TaskRow).where(*waiting).values(state=TaskState.CANCELLED.value, ended_at=at))
@@ -138,6 +136,6 @@ class SqlBatchStore(SqlBatchQueue):
             mine = (TaskRow.batch_id == batch_id, TaskRow.state.in_(again))
             changed = session.execute(update(TaskRow).where(*mine).values(**values).returning(TaskRow.number)).all()
             if not changed:
-                raise IllegalTransition(f"batch {batch_id} has no failed or cancelled task: nothing is to be retried")
+                raise IllegalTransition(f"batch {batch_id} has no failed or cancelled task: there is nothing to retry")
             row.ended_at, row.final_counts, row.cancelled_at, row.cancelled_by = None, None, None, ""
         return self.get(batch_id)

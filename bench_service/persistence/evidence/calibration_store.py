@@ -194,7 +194,7 @@ def _decide(session: Session, calibration_id: str, act: Act, by: Decider) -> Non
 def _one(session: Session, unit: str, calibration_id: str) -> StoredCalibration:
     found = calibrations_where(session, CalibrationRow.id == calibration_id, CalibrationRow.unit == unit)
     if not found:
-        raise NotFound("calibration", calibration_id, f"unit {unit} has none of that id")
+        raise NotFound("calibration", calibration_id, f"unit {unit} has none with this id")
     return found[0]
 
 
@@ -212,7 +212,7 @@ def _require_choosable(calibration: StoredCalibration, by: Decider) -> None:
     if calibration.verdict not in (None, Verdict.PASS) and not by.remark:
         raise CalibrationRefused(
             f"calibration {calibration.id} of the {calibration.triad} triad comes from result {calibration.result_id}, "
-            f"whose verdict is {calibration.verdict}: give a remark that says why it is used all the same"
+            f"whose verdict is {calibration.verdict}: give a remark that says why it is used nevertheless"
         )
 
 

@@ -136,5 +136,5 @@ def _lock_all(session: Session, unit: str, kind: str) -> None:
 def _found(session: Session, unit: str, correction_id: str) -> CorrectionRow:
     row = session.get(CorrectionRow, correction_id)
     if row is None or row.unit != unit:
-        raise NotFound("correction", correction_id, f"unit {unit} has none of that id")
+        raise NotFound("correction", correction_id, f"unit {unit} has none with this id")
     return row

@@ -2,7 +2,7 @@
 
 A move begins with one transaction that decides (`removing`, `archiving`, `restoring`), goes over the chunks a few at a
 time, so that it keeps no writer waiting, and ends with one that says so. A crash in between leaves the first word, by
-which every reader acts rightly, and the next run goes on from there.
+which every reader acts rightly, and the next run continues from there.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,12 +1,11 @@
 """Claims on the raw data of recordings, in SQL: calibrations that count, holds, and analyses that have not ended."""
 
-from collections.abc import Iterable, Iterator
-
 from sqlalchemy import or_, select
 from sqlalchemy.orm import Session
 
 from bench_service.model.batches import TaskState
 from bench_service.model.calibrations import Approval
+from bench_service.persistence.parts import in_parts
 from bench_service.persistence.tables.batches import TaskRecordingRow, TaskRow
 from bench_service.persistence.tables.evidence import (
     CalibrationRow,
@@ -17,8 +16,6 @@ from bench_service.persistence.tables.evidence import (
     ResultRecordingRow,
 )
 
-AT_ONCE = 500
-"""Ids in one statement: databases limit the number of values."""
 _OPEN = (TaskState.WAITING.value, TaskState.RUNNING.value)
 
 
@@ -41,7 +38,7 @@ def wanted_by_calibrations(session: Session) -> frozenset[str]:
     while new:
         found |= new
         below: set[str] = set()
-        for ids in _parts(sorted(new)):
+        for ids in in_parts(sorted(new)):
             calibrations = (
                 select(CalibrationRow.result_id)
                 .join(ResultCalibrationRow, ResultCalibrationRow.calibration_id == CalibrationRow.id)
@@ -55,7 +52,7 @@ def wanted_by_calibrations(session: Session) -> frozenset[str]:
             below |= {result for query in (calibrations, corrections) for result in session.scalars(query) if result}
         new = below - found
     recordings: set[str] = set()
-    for ids in _parts(sorted(found)):
+    for ids in in_parts(sorted(found)):
         used = select(ResultRecordingRow.recording_id).where(ResultRecordingRow.result_id.in_(ids))
         recordings |= set(session.scalars(used))
     return frozenset(recordings)
@@ -79,7 +76,3 @@ def wanted_by_analyses(session: Session, recording_id: str | None = None) -> fro
     if recording_id is not None:
         query = query.where(TaskRecordingRow.recording_id == recording_id)
     return frozenset(session.scalars(query))
-
-
-def _parts(ids: list[str]) -> Iterator[Iterable[str]]:
-    return (ids[first : first + AT_ONCE] for first in range(0, len(ids), AT_ONCE))

@@ -8,7 +8,7 @@ from pydantic import TypeAdapter
 from bench_service.mapping import copied
 from bench_service.model.raw_data import RawState
 from bench_service.model.records import NewRecording, RecordingState, StoredRecording
-from bench_service.persistence.tables.evidence import RecordingRow
+from bench_service.persistence.tables.evidence import NAMES_JOIN, RecordingRow
 from procedures.core.measured import Measured
 from procedures.core.recording import Channel, RecordingInfo, Station
 
@@ -51,6 +51,8 @@ def row_of_new(new: NewRecording, recording_id: str, created_at: datetime, chunk
         chunk_rows=chunk_rows,
         station_index=None if new.station is None else new.station.index,
         station=None if new.station is None else STATION.dump_python(new.station, mode="json"),
+        station_label=None if new.station is None else new.station.label,
+        file_names=NAMES_JOIN.join(file["name"] for file in new.source.get("files", ())) or None,
         channels=CHANNELS.dump_python(new.channels, mode="json"),
         sample_type=np.dtype(new.dtype).name,
         samples=0,

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from bench_service.evidence.recordings import DamagedChunk
 from bench_service.formats.chunk import sample_type
-from bench_service.formats.content_hash import ContentHash
+from bench_service.formats.content_hash import hash_of_blocks
 from bench_service.model.errors import DamagedRecording, NotFound
 from bench_service.model.records import NewRecording, Page, RecordingState, StoredRecording
 from bench_service.model.search import EVERYTHING, Search
@@ -26,6 +26,7 @@ from bench_service.persistence.evidence.recording_writer import SqlRecordingWrit
 from bench_service.persistence.pages import page
 from bench_service.persistence.searching import find_recordings
 from bench_service.persistence.tables.evidence import ChunkRow, RecordingRow
+from bench_service.persistence.text_search import ways_to_recordings
 from procedures.core.recording import RawArray, RecordingInfo
 
 log = logging.getLogger(__name__)
@@ -41,7 +42,7 @@ _OF_JOB = (
 
 @dataclass(frozen=True)
 class StoredSamples:
-    """`procedures.core.recording.Recording` over the database: each pass reads the chunks anew."""
+    """`procedures.core.recording.Recording` over the database: each pass reads the chunks again."""
 
     info: RecordingInfo
     _reader: ChunkReader
@@ -78,7 +79,7 @@ class SqlRecordingStore:
         after: str | None = None,
         limit: int = 50,
     ) -> Page[StoredRecording]:
-        query = find_recordings(select(RecordingRow).where(RecordingRow.state != _OPEN), search)
+        query = find_recordings(select(RecordingRow).where(RecordingRow.state != _OPEN), search, text=False)
         if job_id is not None:
             query = query.where(RecordingRow.job_id == job_id)
         if unit is not None:
@@ -86,7 +87,8 @@ class SqlRecordingStore:
         if simulated is not None:
             query = query.where(RecordingRow.simulated == simulated)
         with self._database.read() as session:
-            return page(session, query, RecordingRow.id, after, limit, stored_of_row)
+            either = None if search.text is None else ways_to_recordings(session, search.text)
+            return page(session, query, RecordingRow.id, after, limit, stored_of_row, either)
 
     def of_job(self, job_id: str) -> tuple[StoredRecording, ...]:
         with self._database.read() as session:
@@ -162,11 +164,9 @@ class SqlRecordingStore:
         with self._database.read() as session:
             row = _found(session, recording_id, with_open=True)
             info, reader, dtype = info_of_row(row), self._reader(row), sample_type(row.sample_type)
-        digest = ContentHash(info.channels, info.rate_hz, dtype)
+        blocks = reader.blocks([c.name for c in info.channels], 0, info.count)
         try:
-            for block in reader.blocks([c.name for c in info.channels], 0, info.count):
-                digest.update(block)
-            content_hash = digest.hexdigest()
+            content_hash = hash_of_blocks(info.channels, info.rate_hz, dtype, blocks)
         except DamagedRecording as damage:
             log.error("recording %s is closed without a hash: %s", recording_id, damage)
             content_hash = ""

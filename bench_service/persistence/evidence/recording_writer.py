@@ -118,14 +118,14 @@ class SqlRecordingWriter:
             else:
                 self._interrupt()
         except (StorageFull, StorageFailure) as error:
-            log.warning("recording %s stays open, and unlisted, until it is cleared away: %s", self.id, error)
+            log.warning("recording %s stays open and unlisted until it is removed: %s", self.id, error)
 
     def _require_open(self) -> None:
         if self._closed:
             raise StorageFailure("this recording was closed: after a failed write it can only be abandoned")
 
     def _hand_over(self) -> None:
-        """Begin to store the full buffer, once the chunk before it is stored, and go on in the other buffer."""
+        """Begin to store the full buffer, once the chunk before it is stored, and continue in the other buffer."""
         self._arrived()
         full = self._buffer
         self._buffer = _empty(*full.shape, self._dtype) if self._spare is None else self._spare

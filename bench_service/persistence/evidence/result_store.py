@@ -26,7 +26,7 @@ from bench_service.persistence.evidence.result_rows import (
     result_of_row,
     row_of_result,
 )
-from bench_service.persistence.evidence.result_values import newest_first, of_verdicts, value_of_row, values_query
+from bench_service.persistence.evidence.result_values import AT_ONCE, DOCUMENTS, OfVerdicts, value_of_row, values_query
 from bench_service.persistence.idempotency import again_after_conflict, made_before, remember
 from bench_service.persistence.pages import page
 from bench_service.persistence.searching import find_results
@@ -39,6 +39,7 @@ from bench_service.persistence.tables.evidence import (
     ResultRecordingRow,
     ResultRow,
 )
+from bench_service.persistence.text_search import ways_to_results
 from procedures.core.imu_model import TriadCalibration
 from procedures.core.unit_correction import UnitCorrection
 
@@ -113,7 +114,7 @@ class SqlResultStore:
         after: str | None = None,
         limit: int = 50,
     ) -> Page[StoredResult]:
-        query = find_results(select(ResultRow), search)
+        query = find_results(select(ResultRow), search, text=False)
         if job_id is not None:
             query = query.where(ResultRow.job_id == job_id)
         if unit is not None:
@@ -121,13 +122,15 @@ class SqlResultStore:
         if name is not None:
             query = query.where(ResultRow.name == name)
         with self._database.read() as session:
-            rows = page(session, query, ResultRow.id, after, limit, _itself)
+            either = None if search.text is None else ways_to_results(session, search.text)
+            rows = page(session, query, ResultRow.id, after, limit, _itself, either)
             return Page(_results(session, rows.items), rows.next)
 
     def newest_verdict(self, unit: str, procedure: str, *, simulated: bool) -> StoredResult | None:
-        query = of_verdicts(select(ResultRow), unit, procedure, simulated).limit(1)
+        results = OfVerdicts(unit, procedure, simulated)
         with self._database.read() as session:
-            return next(iter(_results(session, session.scalars(query).all())), None)
+            newest = next(results.newest_first(session, select(ResultRow.id), at_once=DOCUMENTS), None)
+            return None if newest is None else _results(session, [_found(session, newest.id)])[0]
 
     def values(
         self,
@@ -140,9 +143,9 @@ class SqlResultStore:
         before: str | None = None,
         parameters: dict[str, Any] | None = None,
     ) -> tuple[ResultValue, ...]:
-        query = of_verdicts(values_query(quantity), unit, procedure, simulated)
+        results, at_once = OfVerdicts(unit, procedure, simulated), DOCUMENTS if quantity.startswith("/") else AT_ONCE
         with self._database.read() as session:
-            rows = newest_first(session, query, before)
+            rows = results.newest_first(session, values_query(quantity), before, at_once)
             same = (row for row in rows if parameters is None or row.parameters == parameters)
             return tuple(value_of_row(session, row, quantity) for row in islice(same, limit))
 

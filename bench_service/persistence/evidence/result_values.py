@@ -1,7 +1,8 @@
 """One quantity of many results: the queries, and the value in a row. No transaction begins here."""
 
 from collections.abc import Iterator
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import Any
 
 from sqlalchemy import Row, Select, and_, func, select
 from sqlalchemy.orm import Session
@@ -20,9 +21,8 @@ from bench_service.persistence.tables.evidence import (
 from bench_service.persistence.tables.jobs import JobRow
 from procedures.core.imu_model import COEFFICIENT_NAMES
 
-Q = TypeVar("Q", bound=Select[*tuple[Any, ...]])
 AT_ONCE, DOCUMENTS = 250, 20
-"""Number of rows read at once, and where the quantity is a JSON pointer, each with its document."""
+"""Number of results looked at at once, and where the quantity is a JSON pointer, each with its document."""
 ABOUT = (
     ResultRow.id,
     ResultRow.job_id,
@@ -33,13 +33,29 @@ ABOUT = (
 )
 
 
-def of_verdicts(query: Q, unit: str, procedure: str, simulated: bool) -> Q:
-    """Limit a query to the results that gave jobs of the unit their verdict, newest first; no repeated analyses."""
-    return (
-        query.join(JobRow, and_(JobRow.id == ResultRow.job_id, JobRow.result_id == ResultRow.id))
-        .where(ResultRow.unit == unit, ResultRow.name == procedure, ResultRow.simulated == simulated)
-        .order_by(ResultRow.id.desc())
-    )
+@dataclass(frozen=True)
+class OfVerdicts:
+    """The results that gave jobs of a unit their verdict; no repeated analyses."""
+
+    unit: str
+    procedure: str
+    simulated: bool
+
+    def newest_first(
+        self, session: Session, query: Select[*tuple[Any, ...]], before: str | None = None, at_once: int = AT_ONCE
+    ) -> Iterator[Row[*tuple[Any, ...]]]:
+        """All rows of a query of them, from the newest id on, or from the newest one older than `before`.
+
+        Ids come first, by an index alone: with the join in one statement Postgres expects a single row, and sorts all.
+        """
+        mine = (ResultRow.unit == self.unit, ResultRow.name == self.procedure, ResultRow.simulated == self.simulated)
+        ids = select(ResultRow.id).order_by(ResultRow.id.desc()).limit(at_once)
+        query = query.join(JobRow, and_(JobRow.id == ResultRow.job_id, JobRow.result_id == ResultRow.id))
+        older = mine if before is None else (*mine, ResultRow.id < before)
+        while known := session.scalars(ids.where(*older)).all():
+            oldest = known[-1]
+            yield from session.execute(query.where(*older, ResultRow.id >= oldest).order_by(ResultRow.id.desc()))
+            older = (*mine, ResultRow.id < oldest)
 
 
 def values_query(name: str) -> Select[*tuple[Any, ...]]:
@@ -63,16 +79,6 @@ def values_query(name: str) -> Select[*tuple[Any, ...]]:
         .outerjoin(given, and_(given.result_id == ResultRow.id, given.triad == triad))
         .outerjoin(number, and_(number.calibration_id == given.id, number.name == symbol))
     )
-
-
-def newest_first(
-    session: Session, query: Select[*tuple[Any, ...]], before: str | None
-) -> Iterator[Row[*tuple[Any, ...]]]:
-    """All rows of a query that begins with the newest id, or with the newest one older than `before`."""
-    query = query.limit(DOCUMENTS if ResultRow.document.key in query.selected_columns else AT_ONCE)
-    while rows := session.execute(query if before is None else query.where(ResultRow.id < before)).all():
-        yield from rows
-        before = rows[-1].id
 
 
 def value_of_row(session: Session, row: Row[*tuple[Any, ...]], name: str) -> ResultValue:

@@ -1,7 +1,7 @@
-"""Names of workers that analyse: each a lease, by a file beside SQLite or an advisory lock of Postgres.
+"""Names of workers that analyse: each a lease, by a file next to the SQLite file or an advisory lock of Postgres.
 
-A lease falls with its process, so no clock of any machine says whether a worker lives. A name has a dot, which the id
-of a bench cannot have.
+A lease ends with its process, so no clock of any machine decides whether a worker is alive. A name has a dot, which
+the id of a bench cannot have.
 """
 
 from dataclasses import dataclass

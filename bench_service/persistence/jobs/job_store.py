@@ -5,7 +5,7 @@ processes that want different ends for one job, one wins and the other gets `Ill
 """
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from datetime import datetime
 from typing import Any
@@ -23,6 +23,7 @@ from bench_service.persistence.jobs.job_rows import event_of_row, job_of_row, ro
 from bench_service.persistence.pages import page
 from bench_service.persistence.searching import find_jobs
 from bench_service.persistence.tables.jobs import EventRow, JobLabelRow, JobRow
+from bench_service.persistence.text_search import ways_to_jobs
 from procedures.core.limits import Verdict
 
 log = logging.getLogger(__name__)
@@ -79,7 +80,7 @@ class SqlJobStore:
         after: str | None = None,
         limit: int = 50,
     ) -> Page[Job]:
-        query = find_jobs(select(JobRow), search)
+        query = find_jobs(select(JobRow), search, text=False)
         if state is not None:
             query = query.where(JobRow.state == state.value)
         if procedure is not None:
@@ -89,7 +90,8 @@ class SqlJobStore:
         if bench is not None:
             query = query.where(JobRow.bench == bench)
         with self._database.read() as session:
-            return page(session, query, JobRow.id, after, limit, self._understood)
+            either = None if search.text is None else ways_to_jobs(session, search.text)
+            return page(session, query, JobRow.id, after, limit, self._understood, either)
 
     def _understood(self, row: JobRow) -> Job | None:
         """Read a job for a list; None where it is not understood, which is logged once for each job."""
@@ -101,11 +103,16 @@ class SqlJobStore:
                 log.warning("left out of lists: %s", error)
             return None
 
-    def counts(self) -> dict[JobState, int]:
-        query = select(JobRow.state, func.count()).group_by(JobRow.state)
+    def counts(self, states: Collection[JobState] = tuple(JobState)) -> dict[JobState, int]:
+        counted = JobRow.state.in_([state.value for state in states])
+        query = select(JobRow.state, func.count()).where(counted).group_by(JobRow.state)
         with self._database.read() as session:
             found = {state: number for state, number in session.execute(query)}  # noqa: C416  rows are not tuples
-        return {state: found.get(state.value, 0) for state in JobState}
+        return {state: found.get(state.value, 0) for state in states}
+
+    def has_any(self) -> bool:
+        with self._database.read() as session:
+            return session.scalar(select(JobRow.id).limit(1)) is not None
 
     def transition(
         self,
@@ -184,7 +191,9 @@ class SqlJobStore:
                 return job_of_row(row)
             job = job_of_row(row)
             if job.state is JobState.RUNNING:
-                raise IllegalTransition(f"job {job_id} is running, and nobody asked it to pause: nothing is to resume")
+                raise IllegalTransition(
+                    f"job {job_id} is running and no pause was requested: there is nothing to resume"
+                )
             if job.state in FINAL and not job.resumable:
                 why = "" if job.failure is None else f" ({job.failure.kind}: {job.failure.message})"
                 raise IllegalTransition(f"job {job_id} is {row.state}{why}; it cannot be resumed")

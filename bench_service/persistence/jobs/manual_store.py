@@ -38,7 +38,7 @@ class SqlManualStore:
                 known = made_before(session, idempotency, "manual lease")
                 if known is not None:
                     return lease_of_row(_found(session, known))
-                self._database.one_at_a_time(session, f"claim a job of bench {lease.bench}")
+                self._database.turn_at_bench(session, lease.bench)
                 _require_free(session, lease)
                 remember(session, idempotency, "manual lease", lease.id, lease.created_at)
                 session.add(copied(ManualLeaseRow, lease))
@@ -64,7 +64,7 @@ class SqlManualStore:
     def take(self, lease_id: str, at: datetime, process: str) -> ManualLease | None:
         with self._database.write() as session:
             row = _found(session, lease_id)
-            self._database.one_at_a_time(session, f"claim a job of bench {row.bench}")
+            self._database.turn_at_bench(session, row.bench)
             running = select(JobRow.id).where(JobRow.bench == row.bench, JobRow.state == JobState.RUNNING.value)
             if row.began_at is not None or not lease_of_row(row).live(at) or session.scalar(running) is not None:
                 return None
@@ -130,7 +130,7 @@ class SqlManualStore:
                     ManualDemandRow.lease == demand.lease, ManualDemandRow.state == DemandState.ACCEPTED.value
                 )
                 if (session.scalar(waiting) or 0) >= WAITING:
-                    raise ManualRefused(f"{WAITING} demands of this lease wait already: wait until one is answered")
+                    raise ManualRefused(f"{WAITING} demands of this lease are waiting already: wait until one is done")
                 session.add(_row_of_demand(demand))
                 return demand
 
@@ -183,7 +183,9 @@ def _require_free(session: Session, lease: ManualLease) -> None:
     if (job := session.scalar(running)) is not None:
         raise ManualRefused(f"job {job} drives bench {lease.bench}: cancel it, or wait for its end")
     if stops := standing_stops(session, lease.bench):
-        raise ManualRefused(f"bench {lease.bench} is stopped: {reasons_of(stops)}; a person looks and releases it")
+        raise ManualRefused(
+            f"bench {lease.bench} is stopped: {reasons_of(stops)}; a person must look at it and release it"
+        )
     active = active_reservations(session, lease.created_at)
     mine = next((r for r in active if r.id == lease.reservation), None)
     for reservation in active:

@@ -59,7 +59,7 @@ class SqlQueueStore:
     def claim(self, entry: QueueEntry, context: dict[str, Any], at: datetime) -> Job | None:
         with self._database.write() as session:
             row = found_job(session, entry.id, lock=True)
-            self._database.one_at_a_time(session, f"claim a job of bench {row.bench}")
+            self._database.turn_at_bench(session, row.bench)
             current = copied(QueueEntry, row)
             if row.state != QUEUED or current.attempt != entry.attempt or _running(session, row.bench) is not None:
                 return None

@@ -8,6 +8,10 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from bench_service.persistence.tables.columns import Document, Id, Table
 
+NAMES_JOIN = "\n"
+OF_A_TREND = ("unit", "name", "simulated", "id", "job_id", "created_at", "code_version")
+"""Columns of results that a trend is found by, and what it shows of them: behind the document they are slow to read."""
+
 
 class UnitRow(Table):
     __tablename__ = "units"
@@ -38,6 +42,15 @@ class RecordingRow(Table):
         Index("ix_recordings_unit_id", "unit", "id"),
         Index("ix_recordings_state_stored_bytes", "state", "stored_bytes"),
         Index("ix_recordings_simulated_id", "simulated", "id"),
+        Index("ix_recordings_bench_id", "bench", "id"),
+        Index("ix_recordings_station_label_id", "station_label", "id"),
+        Index(
+            "ix_recordings_file_names_id",
+            "file_names",
+            "id",
+            sqlite_where=text("file_names IS NOT NULL"),
+            postgresql_where=text("file_names IS NOT NULL"),
+        ),
         Index("ix_recordings_raw_state_stored_bytes", "raw", "state", "stored_bytes"),
         Index(
             "uq_recordings_complete_station",
@@ -55,6 +68,8 @@ class RecordingRow(Table):
     job_id: Mapped[str | None] = mapped_column(Id, ForeignKey("jobs.id"))
     station_index: Mapped[int | None]
     station: Mapped[dict[str, Any] | None] = mapped_column(Document)
+    station_label: Mapped[str | None]
+    """Of the station, to be searched."""
     channels: Mapped[list[Any]]
     rate_hz: Mapped[float] = mapped_column(Float(53))
     start_s: Mapped[float] = mapped_column(Float(53))
@@ -69,6 +84,8 @@ class RecordingRow(Table):
     state: Mapped[str]
     created_at: Mapped[datetime]
     source: Mapped[dict[str, Any]]
+    file_names: Mapped[str | None]
+    """Names of the files of an import, joined by `NAMES_JOIN`, to be searched."""
     checkpoint: Mapped[dict[str, Any] | None] = mapped_column(Document, deferred=True)
     """State of the simulated world after it: long, and not read with a list."""
     measured: Mapped[dict[str, Any] | None] = mapped_column(Document)
@@ -112,6 +129,7 @@ class ResultRow(Table):
         Index("ix_results_name_id", "name", "id"),
         Index("ix_results_verdict_id", "verdict", "id"),
         Index("ix_results_id_name_unit_job_id", "id", "name", "unit", "job_id"),
+        Index("ix_results_unit_name_simulated_id", *OF_A_TREND),
     )
 
     id: Mapped[str] = mapped_column(Id, primary_key=True)

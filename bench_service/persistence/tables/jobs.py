@@ -19,7 +19,9 @@ class JobRow(Table):
         Index("ix_jobs_finished_at_id", "finished_at", "id"),
         Index("ix_jobs_verdict_id", "verdict", "id"),
         Index("ix_jobs_bench_id", "bench", "id"),
+        Index("ix_jobs_requested_by_id", "requested_by", "id"),
         Index("ix_jobs_id_procedure_unit_bench_requested_by", "id", "procedure", "unit", "bench", "requested_by"),
+        Index("ix_jobs_result_id_id", "result_id", "id"),
         Index("ix_jobs_number", "number", unique=True),
     )
 

@@ -15,6 +15,9 @@ from bench_service.persistence.tables.evidence import RecordingRow
 from bench_service.persistence.tables.jobs import JobRow
 from bench_service.telemetry.tallies import Ending
 
+_STATE = JobRow.state.concat("")
+"""Not a column: SQLite would take its index, which holds the whole history, for the one of the times."""
+
 
 class SqlTallyStore:
     """SQL implementation of `bench_service.telemetry.tallies.TallyStore`."""
@@ -25,7 +28,7 @@ class SqlTallyStore:
     def endings(self, since: datetime | None, after: str, limit: int) -> tuple[Ending, ...]:
         query = (
             select(*columns(JobRow, Ending))
-            .where(JobRow.finished_at.is_not(None), JobRow.state.in_([state.value for state in FINAL]))
+            .where(JobRow.finished_at.is_not(None), _STATE.in_([state.value for state in FINAL]))
             .order_by(JobRow.finished_at, JobRow.id)
             .limit(limit)
         )

@@ -41,4 +41,4 @@ def _report(database: Database, report: UpkeepReport) -> None:
     try:
         SqlUpkeepStore(database).begin(report)
     except ServiceError as error:  # the copy is made and good, whether or not it can be noted
-        log.warning("the copy is not noted in the database: %s", error)
+        log.warning("the copy is not entered in the database: %s", error)

@@ -85,12 +85,12 @@ class CopyContents:
 def check_copy(copy: Path) -> CopyContents:
     """Check a copy as a whole: its integrity, its references, and every chunk against its hash.
 
-    Raises `StorageFailure` where it is no copy of a database of this service.
+    Raises `StorageFailure` where it is not a copy of a database of this service.
     """
     with storage_errors(), _reading(copy) as file:
         names = [row[0] for row in file.execute("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name")]
         if "alembic_version" not in names:
-            raise StorageFailure(f"{copy} is no copy of a database of this service")
+            raise StorageFailure(f"{copy} is not a copy of a database of this service")
         (revision,) = file.execute("SELECT version_num FROM alembic_version").fetchone()
         faults = [*_faults(file)]
         rows = {name: file.execute(f'SELECT count(*) FROM "{name}"').fetchone()[0] for name in names}

@@ -5,7 +5,7 @@ read in one snapshot (REPEATABLE READ) and written into a file that the same mig
 text, so they keep their spelling. Either way the file is a database that the service itself can open.
 
 The job engine's own database is not copied. The service's tables alone say which stations of a job are recorded, and a
-job that was running at the moment of the copy goes on with those that are missing. An engine's database of another
+job that was running at the moment of the copy continues with those that are missing. An engine's database of another
 moment could count a station as done whose recording the copy does not have.
 """
 
@@ -98,7 +98,7 @@ def _companions(file: Path) -> tuple[Path, ...]:
 
 
 def _copy_file(source: Path, target: Path) -> None:
-    """Copy in one step: with WAL a reader holds no writer up, and a copy in many steps begins anew at each write."""
+    """Copy in one step: with WAL a reader holds no writer up, and a copy in many steps begins again at each write."""
     uri = f"file:{quote(str(source.absolute()))}?mode=rw"
     with closing(sqlite3.connect(uri, uri=True)) as from_, closing(sqlite3.connect(target)) as to:
         from_.backup(to, pages=-1)

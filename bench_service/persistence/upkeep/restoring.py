@@ -101,7 +101,7 @@ def _revision_in(copy: Path, file: sqlite3.Connection) -> str:
     try:
         return str(file.execute("SELECT version_num FROM alembic_version").fetchone()[0])
     except (sqlite3.Error, TypeError) as error:
-        raise StorageFailure(f"{copy} is no copy of a database of this service") from error
+        raise StorageFailure(f"{copy} is not a copy of a database of this service") from error
 
 
 def _check_empty(connection: Connection) -> None:

@@ -10,25 +10,38 @@ class ChannelResult(Part):
     """Result of one channel: its model, the fitted data, and how the orders were chosen."""
 
     name: str
+    """Name of the procedure or method"""
     model: ConverterModel
+    """Model"""
     target_c: tuple[float, ...]
+    """Temperature of the soak by the plan [°C]"""
     sensor_c: tuple[float, ...]
+    """Reading of the converter's sensor at each soak [°C]"""
     scale_code_per_ma: tuple[float, ...]
+    """Scale of the channel at each soak [code/mA]"""
     zero_code: tuple[float, ...]
+    """Zero of the channel at each soak"""
     zero_ma: tuple[float, ...]
+    """Zero at the input of thesis 3.13 [mA]"""
     scale_bic: tuple[float, ...]
+    """Information criterion of the scale's polynomial, by order"""
     zero_bic: tuple[float, ...]
+    """Information criterion of the zero's polynomial, by order"""
 
 
 class ConverterBenchDocument(Part):
     """Models of the three channels."""
 
     checks: tuple[Check, ...] = ()
+    """Values held to their limits"""
     verdict: Verdict
+    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
     warnings: tuple[str, ...] = ()
+    """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """None without checks and in results of older versions"""
+    """statement of conformity; None without checks and in results of older versions"""
     channels: tuple[ChannelResult, ...]
+    """Channels, in order"""
 
 
 class ConverterBenchResult(ResultHead):

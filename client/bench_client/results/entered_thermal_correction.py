@@ -11,12 +11,17 @@ class EnteredThermalCorrectionDocument(Part):
     """The correction as it is stored, a degree."""
 
     checks: tuple[Check, ...] = ()
+    """Values held to their limits"""
     verdict: Verdict
+    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
     warnings: tuple[str, ...] = ()
+    """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """None without checks and in results of older versions"""
+    """statement of conformity; None without checks and in results of older versions"""
     origin: str
+    """Origin of the numbers: passport, certificate or table"""
     correction: ThermalCorrection
+    """The correction"""
 
 
 class EnteredThermalCorrectionResult(ResultHead):

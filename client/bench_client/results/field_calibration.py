@@ -10,32 +10,52 @@ class FieldTriad(Part):
     """Bias and scale of one triad with standard uncertainties, and the tilt of the base by this triad."""
 
     calibration: TriadCalibration
+    """Calibration of the triad"""
     bias: tuple[float, ...]
+    """Bias b, in the output unit"""
     bias_sd: tuple[float, ...]
+    """Standard uncertainty of the bias"""
     scale: tuple[float, ...]
+    """Scale factors x, y, z, relative to nominal"""
     scale_relative_sd: tuple[float, ...]
+    """Relative standard uncertainty of the scale factors"""
     scale_estimated: bool
+    """Whether the scale factors were estimated"""
     chi_square: float
+    """Weighted sum of squared residuals"""
     degrees_of_freedom: int
+    """Degrees of freedom"""
     p_value: float | None
+    """Chance of so large a statistic by noise alone"""
     residuals: tuple[tuple[float, ...], ...]
+    """Per recording, in the output's unit."""
     misfit: float | None = None
+    """Residuals over what noise and declared uncertainties allow; None where no equation is spare."""
     worst: str = ""
+    """Position and channel with the greatest residual."""
     suspected: str = ""
+    """A mistake in the positions that would explain a misfit."""
 
 
 class FieldCalibrationDocument(Part):
     """The triads, and the tilt where it was estimated."""
 
     checks: tuple[Check, ...] = ()
+    """Values held to their limits"""
     verdict: Verdict
+    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
     warnings: tuple[str, ...] = ()
+    """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """None without checks and in results of older versions"""
+    """statement of conformity; None without checks and in results of older versions"""
     triads: tuple[FieldTriad, ...]
+    """Triads, one entry each"""
     tilt_deg: tuple[float, ...] | None
+    """Tilt of the base, α0 and β0; null: taken as level [deg]"""
     tilt_sd_deg: tuple[float, ...] | None
+    """Standard uncertainty of the tilt [deg]"""
     tilt_model: str
+    """Model of the base: level, base or turn_zeros"""
 
 
 class FieldCalibrationResult(ResultHead):

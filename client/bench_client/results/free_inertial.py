@@ -10,32 +10,52 @@ class Attitude(Part):
     """Attitude of the alignment [deg], heading clockwise from north."""
 
     heading_deg: float
+    """Heading, from north [deg]"""
     pitch_deg: float
+    """Pitch [deg]"""
     roll_deg: float
+    """Roll [deg]"""
 
 
 class FreeInertialDocument(Part):
     """Drift of the navigator beside its prediction."""
 
     checks: tuple[Check, ...] = ()
+    """Values held to their limits"""
     verdict: Verdict
+    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
     warnings: tuple[str, ...] = ()
+    """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """None without checks and in results of older versions"""
+    """statement of conformity; None without checks and in results of older versions"""
     basis: str
+    """Basis of the uncertainties, as a sentence"""
     sentence: str
+    """The finding, as a sentence"""
     attitude: Attitude
+    """Attitude by the alignment"""
     alignment_s: float
+    """Duration of the alignment at the beginning of the recording [s]"""
     time_s: tuple[float, ...]
+    """Time [s]"""
     north_m: tuple[float, ...]
+    """Distance to the north from the start, at each time [m]"""
     east_m: tuple[float, ...]
+    """Distance to the east from the start, at each time [m]"""
     radial_m: tuple[float, ...]
+    """Distance from the start, at each time [m]"""
     velocity_north_m_s: tuple[float, ...]
+    """Velocity to the north, at each time [m/s]"""
     velocity_east_m_s: tuple[float, ...]
+    """Velocity to the east, at each time [m/s]"""
     radius_95_m: tuple[float, ...]
+    """Radius that holds the position with 95 %, at each time [m]"""
     mahalanobis: float
+    """Mahalanobis distance of the last position; null: noise not known"""
     p_value: float
+    """Chance of so large a statistic by noise alone"""
     noise_known: bool
+    """Whether the noise is that of the unit's record"""
 
 
 class FreeInertialResult(ResultHead):

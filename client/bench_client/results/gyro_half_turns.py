@@ -10,29 +10,48 @@ class GyroChannel(Part):
     """Result of one gyro [rad/s]."""
 
     channel: str
+    """Name of the channel"""
     horizontal: bool
+    """Horizontal rate found by half turns"""
     half_difference: float
+    """Component of the Earth's rate along the channel at the unturned heading."""
     standard_uncertainty: float
+    """Standard uncertainty from the scatter of the pairs."""
     lower: float
+    """Lower end of the interval"""
     upper: float
+    """Interval of 95 %, Student's factor for the number of pairs."""
     within_sd: float
+    """Standard uncertainty expected from the noise within the recordings alone."""
     half_sum: float
+    """Bias of the channel; that of the vertical one includes the Earth's vertical rate, where no latitude is
+    given.
+    """
     half_sum_sd: float
+    """Standard deviation of the half sums"""
 
 
 class GyroHalfTurnsDocument(Part):
     """Results of three channels and the rate that the two horizontal ones measure together."""
 
     checks: tuple[Check, ...] = ()
+    """Values held to their limits"""
     verdict: Verdict
+    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
     warnings: tuple[str, ...] = ()
+    """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """None without checks and in results of older versions"""
+    """statement of conformity; None without checks and in results of older versions"""
     channels: tuple[GyroChannel, ...]
+    """Channels, in order"""
     pairs: int
+    """Number of pairs of opposite headings"""
     horizontal_rate_rad_s: float
+    """Horizontal rate of all channels; null: not both [rad/s]"""
     horizontal_rate_sd_rad_s: float
+    """Standard uncertainty of the horizontal rate [rad/s]"""
     expected_rad_s: float | None
+    """Horizontal part of the Earth's rate at the given latitude; null: no latitude [rad/s]"""
 
 
 class GyroHalfTurnsResult(ResultHead):

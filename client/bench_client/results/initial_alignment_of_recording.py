@@ -10,33 +10,54 @@ class AlignedAttitude(Part):
     """Attitude from one recording [deg]; heading clockwise from north, 0 … 360."""
 
     recording: str
+    """Recording, by its id"""
     heading_deg: float
+    """Heading, from north [deg]"""
     pitch_deg: float
+    """Pitch [deg]"""
     roll_deg: float
+    """Roll [deg]"""
     heading_sd_deg: float
+    """Standard uncertainty of the heading [deg]"""
     pitch_sd_deg: float
+    """Standard uncertainty of the pitch [deg]"""
     roll_sd_deg: float
+    """Standard uncertainty of the roll [deg]"""
     duration_s: float
+    """Duration [s]"""
     predicted_azimuth_error_deg: float | None
+    """Thesis 1.1, magnitudes added; None where the unit's noise is not known [deg]"""
     predicted_azimuth_sd_deg: float | None
+    """Predicted azimuth error with the parts as independent standard uncertainties [deg]"""
     magnitude_errors: tuple[float, ...]
+    """|f| − g [m/s²], |ω| − Ω and ω upwards − Ω·sin L [rad/s]."""
     magnitude_sd: tuple[float, ...]
+    """Standard uncertainty of the magnitude"""
     step_deg: float | None = None
+    """Step of the attitude within the recording; zero: none was seen; None: too few samples to look [deg]"""
     step_at_s: float | None = None
+    """Time of the step since the recording's beginning; None: none was seen [s]"""
     step_by: str = ""
+    """Sensors that saw the step: "accelerometers" or "gyros"."""
     step_visible_deg: float | None = None
+    """Smallest tilt within the recording that would have been seen [deg]"""
 
 
 class InitialAlignmentOfRecordingDocument(Part):
     """Every recording's attitude, in order."""
 
     checks: tuple[Check, ...] = ()
+    """Values held to their limits"""
     verdict: Verdict
+    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
     warnings: tuple[str, ...] = ()
+    """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """None without checks and in results of older versions"""
+    """statement of conformity; None without checks and in results of older versions"""
     basis: str
+    """Basis of the uncertainties, as a sentence"""
     attitudes: tuple[AlignedAttitude, ...]
+    """Attitude of each recording"""
 
 
 class InitialAlignmentOfRecordingResult(ResultHead):

@@ -10,27 +10,42 @@ class CrossCoupling(Part):
     """Repeatability of one cross-coupling over n mountings; plain numbers in radians, JSON-ready."""
 
     triad: str
+    """Triad: gyro or accelerometer"""
     name: str
+    """Symbol of the coefficient: "K12", …"""
     mean: float
+    """Mean of the mountings' means, relative to K_ii: an angle [rad]."""
     sd: float
+    """Repeatability: sample standard deviation of the mountings' means, ``√(Σ(m − m̄)²/(n − 1))`` [rad]."""
     low: float
+    """Lower end of the 95 % interval"""
     high: float
+    """95 % interval of the true standard deviation, from chi-square with n − 1 degrees of freedom [rad]."""
     within_sd: float | None
+    """Pooled standard deviation of repeated calibrations under the same mounting [rad]; None: none was repeated."""
     within_degrees: int
+    """Degrees of freedom of `within_sd`."""
     expected_from_measurement: float
+    """Standard deviation of the mountings' means that the calibrations' own uncertainties give [rad]."""
     values: tuple[float, ...]
+    """Mean of each mounting [rad], in the order of the mountings."""
 
 
 class MountingRepeatabilityDocument(Part):
     """Repeatability of each cross-coupling over the mountings."""
 
     checks: tuple[Check, ...] = ()
+    """Values held to their limits"""
     verdict: Verdict
+    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
     warnings: tuple[str, ...] = ()
+    """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """None without checks and in results of older versions"""
+    """statement of conformity; None without checks and in results of older versions"""
     mountings: tuple[str, ...]
+    """Mountings that took part, by id"""
     cross_couplings: tuple[CrossCoupling, ...]
+    """Spread of each cross-coupling between mountings"""
 
 
 class MountingRepeatabilityResult(ResultHead):

@@ -10,10 +10,13 @@ class NoOperationDocument(Part):
     """Result without any measurement."""
 
     checks: tuple[Check, ...] = ()
+    """Values held to their limits"""
     verdict: Verdict
+    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
     warnings: tuple[str, ...] = ()
+    """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """None without checks and in results of older versions"""
+    """statement of conformity; None without checks and in results of older versions"""
 
 
 class NoOperationResult(ResultHead):

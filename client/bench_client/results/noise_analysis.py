@@ -11,14 +11,21 @@ class NoiseAnalysisDocument(Part):
     """Noise of the recordings."""
 
     checks: tuple[Check, ...] = ()
+    """Values held to their limits"""
     verdict: Verdict
+    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
     warnings: tuple[str, ...] = ()
+    """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """None without checks and in results of older versions"""
+    """statement of conformity; None without checks and in results of older versions"""
     launches: tuple[LaunchNoise, ...]
+    """Launches, in order"""
     channels: tuple[ChannelSummary, ...]
+    """Channels, in order"""
     averaging_time_s: float | None
+    """Averaging time at which quantization falls below the other noise [s]"""
     drawn_launch: int = 1
+    """Launch whose band and intervals are drawn, from 1"""
 
 
 class NoiseAnalysisResult(ResultHead):

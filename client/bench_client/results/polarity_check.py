@@ -10,21 +10,30 @@ class Answers(Part):
     """Answers of a triad's channels to the three axes, and what they mean."""
 
     triad: str
+    """Triad: gyro or accelerometer"""
     matrix: tuple[tuple[float, ...], ...]
+    """Row: channel x, y, z; column: axis turned or pointed upwards. Per unit of the input; see `relative`."""
     relative: bool
+    """True for channels in counts: the matrix is divided by its largest element."""
     axes: tuple[str, ...]
+    """Axis that each channel answers to: "+x", "−y", "nothing" or "no single axis"."""
 
 
 class PolarityCheckDocument(Part):
     """Answers of both triads to the three axes, and in words what is wrong."""
 
     checks: tuple[Check, ...] = ()
+    """Values held to their limits"""
     verdict: Verdict
+    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
     warnings: tuple[str, ...] = ()
+    """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """None without checks and in results of older versions"""
+    """statement of conformity; None without checks and in results of older versions"""
     triads: tuple[Answers, ...]
+    """Triads, one entry each"""
     sentences: tuple[str, ...]
+    """The findings, as sentences"""
 
 
 class PolarityCheckResult(ResultHead):

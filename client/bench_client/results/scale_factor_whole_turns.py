@@ -10,12 +10,17 @@ class ScaleFactorWholeTurnsDocument(Part):
     """The gyro triad's coefficients, the scale factor at each rate, and the verdict."""
 
     checks: tuple[Check, ...] = ()
+    """Values held to their limits"""
     verdict: Verdict
+    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
     warnings: tuple[str, ...] = ()
+    """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """None without checks and in results of older versions"""
+    """statement of conformity; None without checks and in results of older versions"""
     gyro: WholeTurns
+    """Gyro triad"""
     make_calibration: bool = False
+    """Whether the coefficients became the gyros' current calibration"""
 
 
 class ScaleFactorWholeTurnsResult(ResultHead):

@@ -9,35 +9,55 @@ class Limit(Part):
     """A requirement on one value, inclusive at both ends, and where it comes from."""
 
     unit: str
+    """Unit of measurement"""
     maximum: float | None = None
+    """Largest value; as a limit, null: none"""
     minimum: float | None = None
+    """Smallest value; as a limit, null: none"""
     source: str = ""
+    """Source"""
 
 
 class Decision(Part):
     """How one value was decided."""
 
     rule: str
+    """Rule in words; a test of significance is held at its level, without a guard band."""
     outcome: Literal["pass", "conditional pass", "conditional fail", "fail"]
+    """Outcome: pass, fail, conditional pass or conditional fail"""
     expanded_uncertainty: float | None = None
+    """Expanded uncertainty U in the limit's unit; None: the value has no stated uncertainty."""
     coverage_factor: float | None = None
+    """Coverage factor k of U = k·u"""
     coverage_probability: float | None = None
+    """Coverage probability of U"""
     degrees_of_freedom: float | None = None
+    """Degrees of freedom of u; None: so many that they do not count, or no uncertainty."""
     guard_band: float = 0.0
+    """Guard band w in the limit's unit."""
 
 
 class Check(Part):
     """Check of one value against one limit."""
 
     name: str
+    """Name"""
     value: float
+    """Value, in `unit` where there is one"""
     limit: Limit
+    """Limit that the value is held to"""
     passed: bool
+    """Whether the value is within its limit"""
     standard_uncertainty: float | None = None
+    """Standard uncertainty, in the unit of the value"""
     note: str = ""
+    """Remark, for people"""
     degrees_of_freedom: float | None = None
+    """Degrees of freedom of the standard uncertainty; None: so many that they do not count."""
     decision: Decision | None = None
+    """Rule by which it was decided, and the expanded uncertainty; None in results of versions before it."""
     significance: bool = False
+    """True for a test of significance: the value is a p-value and the limit its level."""
 
 
 Verdict = Literal["pass", "fail", "error"]
@@ -47,8 +67,11 @@ class Statement(Part):
     """Statement of conformity of a whole result."""
 
     outcome: Literal["pass", "conditional pass", "conditional fail", "fail"]
+    """The verdict, conditional where some value lies within its expanded uncertainty of the limit."""
     rule: str
+    """Decision rule in words."""
     conditional: tuple[str, ...] = ()
+    """Checks whose values lie within their expanded uncertainty of the limit."""
 
 
 class TriadCalibration(Part):
@@ -60,116 +83,190 @@ class TriadCalibration(Part):
     """
 
     triad: str
+    """Triad by its name, either "gyro" or "accelerometer"."""
     output_unit: str
+    """Unit of the output U and of b: "rad/s", "m/s^2" or "count"."""
     input_unit: str
+    """Unit of the input v, "rad/s" or "m/s^2"."""
     bias: tuple[float, ...]
+    """Bias b, in the output unit"""
     matrix: tuple[tuple[float, ...], ...]
+    """Matrix K, row by row"""
     covariance: tuple[tuple[float, ...], ...]
+    """Covariance matrix of the coefficients, in their order"""
     model: str = "linear"
+    """"linear" (full K against known vectors), "scalar" (K upper triangular, magnitude as the only reference),
+    "field" (K diagonal; cross-couplings zero with the spread that was declared) or "entered" (typed by a
+    person).
+    """
 
 
 class CalibrationSummaryCoefficient(Part):
     """Coefficient of ``U = b + K·v`` with its standard uncertainty and the contributions to it."""
 
     name: str
+    """Name"""
     unit: str
+    """Unit of measurement"""
     estimate: float
+    """Estimated value, in `unit`"""
     standard_uncertainty: float
+    """Standard uncertainty, in the unit of the value"""
     from_noise: float
+    """Part of the standard uncertainty by noise"""
     from_table: float
+    """Part of the standard uncertainty by the table's errors"""
     from_table_source: dict[str, float]
+    """The table's part by source: orthogonality, level, azimuth, gravity, pointing."""
 
 
 class StationResidual(Part):
     """Outputs minus model at one station, channels x, y, z, with their expected standard deviations."""
 
     label: str
+    """Name for people"""
     residual: tuple[float, ...]
+    """Output less model, channels x, y, z"""
     expected_sd: tuple[float, ...]
+    """Expected standard deviation"""
 
 
 class Magnitudes(Part):
     """|v̂| at n stations before and after correction, in SI; plain tuples, JSON-ready."""
 
     triad: str
+    """Triad: gyro or accelerometer"""
     unit: str
+    """Unit of measurement"""
     reference: float
+    """Reference value: gravity or the Earth's rate"""
     labels: tuple[str, ...]
+    """Stations, in order"""
     before: tuple[float, ...] | None
+    """Magnitudes before correction; None where the outputs are in counts, which have none."""
     after: tuple[float, ...]
+    """Value after correction"""
     expected_sd: tuple[float, ...]
+    """Standard deviations of the errors after correction; empty where the noise is not known."""
     mean_error_before: float | None
+    """Mean error before correction"""
     sd_before: float | None
+    """Standard deviation before correction"""
     mean_error_after: float
+    """Mean error after correction"""
     sd_after: float
+    """Sample standard deviation over the stations, n − 1 (Tables 5.3, 5.4)."""
     per_axis: float
+    """Error per axis ``δ/√3`` (thesis 5.1): one axis's share, all three taken as alike."""
     per_axis_sd: float
+    """Standard uncertainty of that figure, ``δ/√(2(n − 1))/√3``: independent errors of n stations."""
 
 
 class ScalarParameter(Part):
     """Cross-check of one of the nine parameters: from magnitudes alone, from the linear fit, and their difference."""
 
     name: str
+    """Name"""
     unit: str
+    """Unit of measurement"""
     scalar: float
+    """Value from the magnitudes alone"""
     standard_uncertainty: float
+    """Standard uncertainty, in the unit of the value"""
     linear: float
+    """Value from the linear fit"""
     difference_sigmas: float
+    """Difference in standard deviations of the difference, both estimates' common data allowed for."""
 
 
 class ScalarCheck(Part):
     """The scalar calibration of the same stations, which trusts no angle of the table."""
 
     parameters: tuple[ScalarParameter, ...]
+    """The nine parameters by both ways"""
     condition: float
+    """Condition number of the column-scaled design"""
     p_value: float | None
+    """Chance of so large a statistic by noise alone"""
 
 
 class BudgetRow(Part):
     """One source of uncertainty of one coefficient."""
 
     source: str
+    """Source"""
     value: float
+    """Value of the source in `unit`: a standard deviation, or the limit of a rectangular distribution."""
     unit: str
+    """Unit of measurement"""
     distribution: Literal["normal", "rectangular"]
+    """Distribution of the source: normal or rectangular"""
     divisor: float
+    """Divisor from the stated value to a standard uncertainty"""
     sensitivity: float
+    """Change of the coefficient [its unit] per `unit` of the source."""
     contribution: float
+    """``|c|·u(x)`` in the coefficient's unit."""
     degrees_of_freedom: float | None
+    """None: infinite, the value is taken as known."""
 
 
 class Budget(Part):
     """Uncertainty budget of one coefficient."""
 
     coefficient: str
+    """Name of the coefficient, such as gyro.K11"""
     unit: str
+    """Unit of measurement"""
     rows: tuple[BudgetRow, ...]
+    """Rows"""
     standard_uncertainty: float
+    """Root sum of squares of the contributions."""
     degrees_of_freedom: float | None
+    """Effective degrees of freedom by Welch and Satterthwaite; None: infinite."""
     coverage_factor: float
+    """Coverage factor k of U = k·u"""
     expanded_uncertainty: float
+    """Expanded uncertainty U = k·u"""
     coverage_probability: float = 0.9545
+    """Coverage probability of U"""
 
 
 class TriadSummary(Part):
     """Complete calibration results of one triad."""
 
     calibration: TriadCalibration
+    """Calibration of the triad"""
     coefficients: tuple[CalibrationSummaryCoefficient, ...]
+    """Coefficients, with their uncertainties where they are estimates"""
     condition: float
+    """Condition number of the column-scaled design"""
     residuals: tuple[StationResidual, ...]
+    """Residuals at the stations, in their order"""
     chi_square: float
+    """Weighted sum of squared residuals"""
     degrees_of_freedom: int
+    """Degrees of freedom"""
     p_value: float | None
+    """Chance of so large a statistic by noise alone"""
     noise_known: bool
+    """Whether the noise is that of the unit's record"""
     magnitudes: Magnitudes
+    """Errors of the magnitude at the stations"""
     scalar: ScalarCheck | None = None
+    """Cross-check by the magnitudes alone; null: not made"""
     weighting: Literal["noise_and_table", "noise"] = "noise"
+    """Weights of the fit; results of procedure versions before 1.1.0 lack the field and were weighted by noise."""
     misfit: float | None = None
+    """Residuals over what noise and table allow; None without a spare equation and in results of older versions."""
     worst: str = ""
+    """Station and channel with the greatest residual."""
     left_out: Magnitudes | None = None
+    """Magnitudes out of sample, each station corrected by the fit of the others; None where that cannot be made."""
     suspect: str = ""
+    """The flaw of the reference that the residuals look like, as a sentence; empty where they are as declared."""
     budgets: tuple[Budget, ...] = ()
+    """Uncertainty budget of each coefficient; empty in results of older versions."""
 
 
 Form = Literal["both", "switched", "single"]
@@ -181,52 +278,79 @@ class Normalised(Part):
     """
 
     relative: bool
+    """Whether the values are relative to that at the reference"""
     reference_c: float
+    """Temperature at which the correction does nothing [°C]"""
     at_reference: float
+    """Value at the reference value_0, in the unit of the values."""
     coefficients: tuple[float, ...]
+    """a_1 … a_q of F, in 1/°C^k, or in the unit of the values a °C^k."""
     covariance: tuple[tuple[float, ...], ...]
+    """Covariance of value_0, a_1 … a_q, (q + 1, q + 1)."""
     residual_sd: float
+    """Standard deviation of the residuals"""
 
 
 class ConverterModel(Part):
     """``N(I, t) = K0·Fc(t)·I + N0 + Fs(t)`` of one channel, t its own sensor's reading."""
 
     scale: Normalised
+    """Scale K0 [codes a mA] and Fc."""
     zero: Normalised
+    """Zero N0 [codes] and Fs, the change."""
 
 
 class RatePoint(Part):
     """Scale factor of one axis at one rate and direction, as a departure from the fitted K."""
 
     axis: str
+    """Axis"""
     rate_deg_s: float
+    """Signed table rate [deg/s]."""
     turns: int
+    """Number of whole turns, signed"""
     departure: float
+    """Departure ``(y − b·T − K·E)/(2πn·K·e) − 1``, relative: the sum of asymmetry and nonlinearity."""
     standard_uncertainty: float
+    """Standard uncertainty of noise and table at this station alone."""
     modelled: float
+    """Departure predicted by the fitted terms."""
 
 
 class WholeTurns(Part):
     """Complete results of whole turns for a gyro triad."""
 
     coefficients: tuple[CalibrationSummaryCoefficient, ...]
+    """Coefficients, with their uncertainties where they are estimates"""
     calibration: TriadCalibration
+    """b and K with their covariance; the terms beyond the linear ones are not part of it."""
     reference_rate_deg_s: float
+    """Rate at which the quadratic and the cubic term have the given sizes [deg/s]"""
     points: tuple[RatePoint, ...]
+    """Points, in order"""
     condition: float
+    """Condition number of the column-scaled design"""
     chi_square: float
+    """Weighted sum of squared residuals"""
     degrees_of_freedom: int
+    """Degrees of freedom"""
     p_value: float | None
+    """Chance of so large a statistic by noise alone"""
     noise_known: bool
+    """Whether the noise is that of the unit's record"""
 
 
 class BandCurve(Part):
     """Least, mean and greatest Allan deviation over every start offset (paper A)."""
 
     tau_s: tuple[float, ...]
+    """Averaging times [s]"""
     least: tuple[float, ...]
+    """Least deviation over every start"""
     mean: tuple[float, ...]
+    """Mean value"""
     greatest: tuple[float, ...]
+    """Greatest deviation over every start"""
 
 
 class Density(Part):
@@ -238,17 +362,24 @@ class Density(Part):
     """
 
     frequency_hz: tuple[float, ...]
+    """Frequency [Hz]"""
     density: tuple[float, ...]
+    """Power spectral density at each frequency, one-sided"""
     lower: tuple[float, ...]
+    """Lower end of the interval"""
     upper: tuple[float, ...]
+    """Ends of the interval at the requested confidence, by chi-square of each bin's degrees of freedom."""
 
 
 class SensorCorrection(Part):
     """Correction of one temperature sensor about the set's reference."""
 
     channel: str
+    """Name of the channel"""
     offset_c: float
+    """Reading less temperature at the reference [°C]."""
     slope: float
+    """Change of the offset by reading [°C/°C]."""
 
 
 class ThermometerCorrection(Part):
@@ -257,6 +388,10 @@ class ThermometerCorrection(Part):
     """
 
     sensors: tuple[SensorCorrection, ...]
+    """Thermometers, one entry each"""
     reference_c: float
+    """Temperature at which the correction does nothing [°C]"""
     covariance: tuple[tuple[float, ...], ...]
+    """Covariance of offset and slope of the first sensor, of the second, …, (2m, 2m)."""
     fitted_range_c: tuple[float, ...]
+    """Lowest and highest temperature of the soaks; beyond them the lines are extrapolated [°C]"""

@@ -10,46 +10,70 @@ class SensorFit(Part):
     """Line of one sensor through its soaks."""
 
     channel: str
+    """Name of the channel"""
     offset_c: float
+    """Offset of the sensor at the reference [°C]"""
     offset_sd_c: float
+    """Standard uncertainty of the offset [°C]"""
     slope: float
+    """Slope against temperature"""
     slope_sd: float
+    """Standard uncertainty of the slope"""
     error_c: tuple[float, ...]
+    """Reading at switching on less the chamber's air, at each soak [°C]"""
     error_sd_c: tuple[float, ...]
+    """Standard uncertainty of the error [°C]"""
     residual_c: tuple[float, ...]
+    """Root mean square of the residuals [°C]"""
     p_value: float
+    """Chance of residuals as large, were all errors as large as claimed (chi-square of n − 2)."""
 
 
 class UpAgainstDown(Part):
     """Difference of a sensor's errors at one temperature reached from below and from above."""
 
     channel: str
+    """Name of the channel"""
     target_c: float
+    """Temperature of the soak by the plan [°C]"""
     difference_c: float
+    """Error on the way up less that on the way down [°C]"""
     standard_uncertainty_c: float
+    """Standard uncertainty [°C]"""
     p_value: float
+    """Chance of so large a statistic by noise alone"""
 
 
 class Calibrated(Part):
     """The sensors' calibration as a whole."""
 
     sensors: tuple[SensorFit, ...]
+    """Thermometers, one entry each"""
     correction: ThermometerCorrection
+    """The correction"""
     hysteresis: tuple[UpAgainstDown, ...]
+    """Difference between soaks reached from below and from above"""
     unsoaked_c: tuple[float, ...]
+    """Greatest rest of the step before each soak that the unit had not followed [°C]"""
 
 
 class ThermometerCalibrationDocument(Part):
     """Calibration of the unit's thermometers."""
 
     checks: tuple[Check, ...] = ()
+    """Values held to their limits"""
     verdict: Verdict
+    """Verdict of all checks: pass, fail or error; null: open, or nothing was judged"""
     warnings: tuple[str, ...] = ()
+    """What to know before believing the numbers, as sentences"""
     statement: Statement | None = None
-    """None without checks and in results of older versions"""
+    """statement of conformity; None without checks and in results of older versions"""
     thermometers: Calibrated
+    """Calibration of the thermometers"""
     target_c: tuple[float, ...]
+    """Temperature of the soak by the plan [°C]"""
     air_c: tuple[float, ...]
+    """Temperature of the chamber's air [°C]"""
 
 
 class ThermometerCalibrationResult(ResultHead):

@@ -83,7 +83,7 @@ class CorrelatedSums:
         near -= edge_sums(self._head, self._tail, self._near, self._span, self._squares)
         spans = self._statistic.differences * self._near
         if len(near) and worst_rounding(near, spans, float(products[0])) > ROUNDING:
-            raise Uncorrelatable("the rate wanders too far for the fast sums; ask for correlate=False")
+            raise Uncorrelatable("the rate drifts too far for the fast sums; ask for correlate=False")
         far = self._far_modified() if self._statistic.modified else self._far()
         terms = [self._statistic.starts(self._count, int(m)) for m in self._near]
         return np.concatenate([near, far[0]]), np.concatenate([np.array(terms, np.int64), far[1]])
@@ -137,5 +137,5 @@ class CorrelatedSums:
             sums[i] += n * float(np.dot([comb(d, a) ** 2 for a in range(d + 1)], remainders))
             forgotten = share * (4**d - comb(2 * d, d)) / 2 * float(np.mean(remainders))
             if n * forgotten > LINES * sums[i]:
-                raise Uncorrelatable("a periodic signal rules where the fast sums forget it; ask for correlate=False")
+                raise Uncorrelatable("a periodic signal dominates where the fast sums drop it; ask for correlate=False")
         return sums, terms

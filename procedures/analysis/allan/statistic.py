@@ -98,7 +98,7 @@ def one_two_four_sizes(largest: int) -> Sizes:
 def checked_sizes(sizes: Sequence[int] | Sizes | None, count: int, statistic: Statistic) -> Sizes:
     """The requested cluster sizes, ascending, or the default ones. Raises `UnfitRecording` and `BadParameter`."""
     if count < FEWEST_SAMPLES:
-        raise UnfitRecording(f"{count} samples are too few for an Allan deviation; it takes {FEWEST_SAMPLES}")
+        raise UnfitRecording(f"{count} samples are too few for an Allan deviation; the least is {FEWEST_SAMPLES}")
     largest = statistic.largest(count)
     if sizes is None:
         return log_sizes(largest)

@@ -264,7 +264,7 @@ def _sentence(
         return f"{triad}: {', '.join(map(_named, named))} moved.{turned if len(named) > 1 else ''}"
     alone = [c.name for c in changes if c.p_value_alone >= LIKELY_P_VALUE]
     one = f"each of these alone would explain it: {', '.join(alone)}" if alone else "no single change explains it"
-    return f"{triad}: something moved, and these stations cannot tell what; {one}.{turned}"
+    return f"{triad}: something moved, and these stations do not show which; {one}.{turned}"
 
 
 def _named(change: Change) -> str:

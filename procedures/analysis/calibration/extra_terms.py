@@ -1,4 +1,4 @@
-"""Terms beside ``U = b + K·v`` that a set of positions may determine: K₂, asymmetry, a gyro's g-sensitivity.
+"""Terms in addition to ``U = b + K·v`` that a set of positions may determine: K₂, asymmetry, a gyro's g-sensitivity.
 
 ``U_c = b_c + Σ_j K_cj·v_j + K2_c·v_c² + KA_c·|v_c| + Σ_j G_cj·f_j`` by generalised least squares over all outputs of
 the triad at once (IEEE Std 1293 and 647 name the terms), weighted by the covariance of the means and of the table's
@@ -64,7 +64,7 @@ class TermEstimate:
 
 @dataclass(frozen=True)
 class ExtraFit:
-    """Twelve coefficients with the terms beside them; `covariance` (12, 12) has what the terms take from them."""
+    """Twelve coefficients with further terms; `covariance` (12, 12) has what the terms take from them."""
 
     coefficients: Array
     """Shape (12,), in the order of `COEFFICIENT_NAMES`."""

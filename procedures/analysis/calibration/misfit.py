@@ -117,8 +117,8 @@ def require_live(triad: str, outputs: Array, output_unit: str, expected: Array |
     for axis, span, ratio in zip("xyz", spans.tolist(), felt.tolist(), strict=True):
         if ratio < DEAD * np.median(felt):
             raise UnfitRecording(
-                f"{triad} {axis} changes by {span:.3g} {output_unit} between the poses, the triad's liveliest channel "
-                f"by {spans.max():.3g}: the channel is dead or stuck, or no pose turns it to the reference"
+                f"{triad} {axis} changes by {span:.3g} {output_unit} between the poses, its most sensitive channel "
+                f"by {spans.max():.3g}: the channel is stuck or gives no signal, or no pose turns it to the reference"
             )
 
 
@@ -141,5 +141,5 @@ def require_plausible_scales(triad: str, scales: Array, nominal: bool) -> None:
             what = "one" if nominal else f"the triad's middle one, {middle:.3g}"
             raise UnfitRecording(
                 f"the scale factor of {triad} {axis} comes out as {scale:.4g}, more than {allowed:g} times off {what}: "
-                "the channel is dead, clipped or in another unit than declared"
+                "the channel gives no signal, is clipped, or is in another unit than declared"
             )

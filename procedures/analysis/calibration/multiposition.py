@@ -13,9 +13,9 @@ from scipy.linalg import block_diag, null_space
 from procedures.analysis.calibration.estimator import Estimator, TableShare, Weighting, estimator, table_share
 from procedures.analysis.calibration.magnitude import magnitude_gradient
 from procedures.analysis.calibration.noise_scale import noise_factor
-from procedures.analysis.calibration.suspect_flaw import LOOKS_SOUND, FreeResiduals, free_residuals
+from procedures.analysis.calibration.suspect_flaw import FreeResiduals, free_residuals
 from procedures.analysis.calibration.table_errors import TableErrors
-from procedures.analysis.least_squares.chi_square import chi_square, judged_p_value, tail_probability
+from procedures.analysis.least_squares.chi_square import chi_square, judged_p_value
 from procedures.core.arrays import Array
 from procedures.core.imu_model import TriadCalibration, triad_calibration
 
@@ -49,7 +49,7 @@ class TriadFit:
     noise_known: bool
     """False where the noise was estimated from the recordings themselves: then chi-square proves nothing."""
     free: FreeResiduals | None = None
-    """Residuals without what coefficients can explain; None where they are as declared, or the noise is not known."""
+    """Residuals without what coefficients can explain; None where no equation is spare, or the noise is not known."""
 
     @property
     def noise_covariance(self) -> Array:
@@ -108,11 +108,9 @@ def fit_triad(
         flaws = of_table if weighting == "noise_and_table" else None
         plan = estimator(what, vectors, noise_covariance * factor, flaws)
     coefficients = plan.coefficients(outputs)
-    residual_sd, magnitude_sd = _expected(
-        plan, vectors, coefficients.reshape(3, 4)[:, 1:], noise_covariance * factor, of_table
-    )
+    matrix = coefficients.reshape(3, 4)[:, 1:]
+    residual_sd, magnitude_sd = _expected(plan, vectors, matrix, noise_covariance * factor, of_table)
     square = chi_square(free, of_noise + of_flaws)
-    doubtful = noise_known and len(free) > 0 and tail_probability(square, len(free)) < LOOKS_SOUND
     return TriadFit(
         triad,
         output_unit,
@@ -120,7 +118,7 @@ def fit_triad(
         weighting,
         coefficients,
         plan,
-        table_share(plan, of_table, table, coefficients.reshape(3, 4)[:, 1:]),
+        table_share(plan, of_table, table, matrix),
         noise_covariance * factor,
         of_table,
         outputs - plan.modelled(coefficients),
@@ -129,9 +127,7 @@ def fit_triad(
         square,
         len(free),
         noise_known,
-        free_residuals(free, of_noise + of_flaws, basis, coefficients.reshape(3, 4)[:, 1:], table)
-        if doubtful
-        else None,
+        free_residuals(free, of_noise + of_flaws, basis, matrix, table) if noise_known and len(free) > 0 else None,
     )
 
 

@@ -61,7 +61,7 @@ def require_correctable(thermal_correction: str, dwell_s: float | None, unit: Un
         why = unit.why_withheld("thermal") or f"unit {unit.serial} has no thermal correction yet"
         raise BadParameter("thermal_correction", "current", f"none: {why}")
     if dwell_s is not None and dwell_s < LEAST_DWELL_S:
-        raise BadParameter("dwell_s", dwell_s, f"at least {LEAST_DWELL_S:g}: temperatures are read beside")
+        raise BadParameter("dwell_s", dwell_s, f"at least {LEAST_DWELL_S:g}: temperatures are read at the same time")
 
 
 @dataclass(frozen=True)
@@ -285,6 +285,6 @@ def _of_range(temperatures: StationTemperatures, correction: ThermalCorrection) 
     return [
         f"at {outside} of {len(beyond)} stations the unit was up to {beyond.max():.1f} K beyond the range in which its "
         f"thermal correction was fitted ({correction.fitted_range}): the correction is extrapolated there, and its "
-        "uncertainty does not tell by how much it is wrong; calibrate within the range, or repeat the thermal cycle "
+        "uncertainty does not say by how much it is wrong; calibrate within the range, or repeat the thermal cycle "
         "over the temperatures of use"
     ]

@@ -186,7 +186,7 @@ def _refuse_frozen(recordings: Sequence[Recording], summaries: Sequence[_Summary
         silent = values[0] == 0.0 and len(values) < 4
         if values[0] is not None and not silent and all(v == values[0] for v in values):
             raise UnfitRecording(
-                f"channel {name} reads {values[0]:g} throughout all {len(values)} recordings: it is dead"
+                f"channel {name} reads {values[0]:g} throughout all {len(values)} recordings: it is stuck"
             )
         moving = any(v is None for v in values)
         for recording, value in zip(recordings, values, strict=True):

@@ -19,6 +19,11 @@ from procedures.core.arrays import Array
 
 LOOKS_SOUND = 0.01
 """P-value from which on what a flaw leaves of the residuals is taken for noise."""
+NEARLY = float(chdtri(1, 0.01))
+"""A flaw that explains less of chi-square than the best by no more than this is named too: where it is the true one,
+another explains so much more with a chance of at most 1 %."""
+DISAGREE = 3.0
+"""Sizes of one flaw from two triads that differ by more standard uncertainties contradict each other."""
 SINGLE = ("orthogonality", "level", "azimuth", "gravity")
 """Flaws that are one number for all stations."""
 NAMES = {
@@ -50,24 +55,27 @@ def free_residuals(free: Array, covariance: Array, basis: Array, matrix: Array, 
     return FreeResiduals(free, covariance, effect.reshape(len(free), -1), table.source)
 
 
-def suspect(found: FreeResiduals, labels: Sequence[str]) -> str:
+def suspect(found: FreeResiduals, labels: Sequence[str], others: Sequence[FreeResiduals] = ()) -> str:
     """The flaw that the residuals look like, as a sentence: one for all stations, one station, or a loose mounting.
 
-    Empty where the residuals are as declared, or there is no table whose flaws could be told.
+    Flaws for all stations that explain nearly as much as the best one are all named, except those that the residuals of
+    the other triads at the same stations, `others`, contradict: gyros cannot tell a wrong azimuth from a wrong level,
+    accelerometers see the level. Empty where the residuals are as declared, or there is no table whose flaws could be
+    told.
     """
     weights = whitener(found.covariance)
     y, f = weights @ found.values, weights @ found.per_radian
     square, freedom = float(y @ y), len(y)
     if freedom == 0 or tail_probability(square, freedom) >= LOOKS_SOUND:
         return ""
-    singles = [j for j, one in enumerate(found.source) if one in SINGLE and float(f[:, j] @ f[:, j]) > 0.0]
+    singles = _singles(found, y, f, others) if freedom > 1 else []
     stations = _stations(y, f, found.source, len(labels))
     left: dict[str, float] = {}
-    if singles and freedom > 1:
-        explained = {j: float(f[:, j] @ y) ** 2 / float(f[:, j] @ f[:, j]) for j in singles}
-        best = max(explained, key=lambda j: explained[j])
-        said = _single(found.source[best], float(f[:, best] @ y) / float(f[:, best] @ f[:, best]), f[:, best])
-        left[said] = tail_probability(square - explained[best], freedom - 1)
+    if singles:
+        said = " or ".join(_single(found.source[one.column], one) for one in singles)
+        unclear = "; these residuals cannot tell which" if len(singles) > 1 else ""
+        best = max(one.explained for one in singles)
+        left[f"the residuals look like {said}{unclear}"] = tail_probability(square - best, freedom - 1)
     if stations is not None and freedom > 3:
         worst = int(np.argmax(stations))
         said = f"the residuals look like one station that stood otherwise than commanded: {labels[worst]}"
@@ -82,11 +90,53 @@ def suspect(found: FreeResiduals, labels: Sequence[str]) -> str:
     )
 
 
-def _single(source: str, size: float, column: Array) -> str:
-    sd = 1.0 / float(np.linalg.norm(column))
-    if source == "gravity":
-        return f"the residuals look like {NAMES[source]}: {size / units.PPM:.3g} ± {sd / units.PPM:.2g} ppm"
-    return f"the residuals look like {NAMES[source]}: {size / units.ARCSEC:.3g} ± {sd / units.ARCSEC:.2g} arcsec"
+@dataclass(frozen=True)
+class _Flaw:
+    """Estimate of one flaw alone: its column, size, standard uncertainty, and the chi-square that it explains."""
+
+    column: int
+    size: float
+    sd: float
+    explained: float
+
+
+def _estimated(y: Array, f: Array, column: int) -> _Flaw | None:
+    """Estimate one flaw from whitened residuals; None where they do not show it."""
+    information, projected = float(f[:, column] @ f[:, column]), float(f[:, column] @ y)
+    if information <= 1e-18 * float(np.sum(f**2)):
+        return None
+    return _Flaw(column, projected / information, information**-0.5, projected**2 / information)
+
+
+def _singles(found: FreeResiduals, y: Array, f: Array, others: Sequence[FreeResiduals]) -> list[_Flaw]:
+    """Flaws for all stations that explain nearly as much as the best, the best of each source, largest share first."""
+    every = [_estimated(y, f, j) for j, source in enumerate(found.source) if source in SINGLE]
+    possible = [one for one in every if one is not None and not any(_contradicts(o, one) for o in others)]
+    possible.sort(key=lambda one: -one.explained)
+    best: dict[str, _Flaw] = {}
+    for one in possible:
+        if one.explained >= possible[0].explained - NEARLY:
+            best.setdefault(found.source[one.column], one)
+    return list(best.values())
+
+
+def _contradicts(other: FreeResiduals, flaw: _Flaw) -> bool:
+    """Whether another triad's residuals, which show the flaw, give it another size.
+
+    Its standard uncertainty is scaled up to its residuals, which may show some other flaw.
+    """
+    weights = whitener(other.covariance)
+    y = weights @ other.values
+    seen = _estimated(y, weights @ other.per_radian, flaw.column)
+    if seen is None:
+        return False
+    scale = max(1.0, float(y @ y) / max(len(y), 1))
+    return abs(seen.size - flaw.size) > DISAGREE * float(np.sqrt(scale * seen.sd**2 + flaw.sd**2))
+
+
+def _single(source: str, flaw: _Flaw) -> str:
+    unit, name = (units.PPM, "ppm") if source == "gravity" else (units.ARCSEC, "arcsec")
+    return f"{NAMES[source]}: {flaw.size / unit:.3g} ± {flaw.sd / unit:.2g} {name}"
 
 
 def _stations(y: Array, f: Array, source: Sequence[str], stations: int) -> Array | None:

@@ -27,6 +27,7 @@ from procedures.analysis.calibration.summary import (
     scalar_check,
     triad_summary,
 )
+from procedures.analysis.calibration.suspect_flaw import suspect
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
 from procedures.analysis.calibration.verification import magnitudes
 from procedures.core.arrays import Array
@@ -60,12 +61,12 @@ def analyse_gyros(
     record: TriadRecord | None,
     weighting: Weighting = "noise_and_table",
     correction: GyroThermalCorrection | None = None,
-) -> TriadSummary:
+) -> tuple[TriadSummary, TriadFit]:
     """Calibrate the gyros, by a correction for temperature first where there is one. Raises as `analyse_triad`."""
     means, more = station_means(recordings, "gyro"), dict[str, Array]()
     if correction is not None:
         means, more["thermal correction"] = gyros_at_reference(recordings, means, correction)
-    return analyse_means(means, site, uncertainty, record, False, weighting, more)[0]
+    return analyse_means(means, site, uncertainty, record, False, weighting, more)
 
 
 def analyse_means(
@@ -145,7 +146,7 @@ def analyse_accelerometers(
     uncertainty: TableUncertainty,
     record: TriadRecord | None,
     settings: AccelerometerSettings,
-) -> tuple[TriadSummary, ThermalShare | None, tuple[str, ...]]:
+) -> tuple[TriadSummary, TriadFit, ThermalShare | None, tuple[str, ...]]:
     """Calibrate the accelerometers; with a correction also return its effect on them and warnings about its use.
 
     Raises as `analyse_triad` and `bring_to_reference`.
@@ -153,11 +154,24 @@ def analyse_accelerometers(
     means, correction = station_means(recordings, "accelerometer"), settings.correction
     how = settings.with_scalar, settings.weighting
     if correction is None:
-        return analyse_means(means, site, uncertainty, record, *how)[0], None, ()
+        return *analyse_means(means, site, uncertainty, record, *how), None, ()
     brought = bring_to_reference(recordings, means, correction, settings.lag_s)
     more = {"thermal correction": brought.of_correction, "thermometers": brought.of_sensors}
     summary, fit = analyse_means(brought.means, site, uncertainty, record, *how, more)
-    return summary, thermal_share(brought, correction, fit), thermal_warnings(brought, correction)
+    return summary, fit, thermal_share(brought, correction, fit), thermal_warnings(brought, correction)
+
+
+def suspected(found: Sequence[tuple[TriadSummary, TriadFit]]) -> tuple[TriadSummary, ...]:
+    """The summaries of triads at the same stations, each with the flaw that its residuals look like beside the others'.
+
+    A flaw of the table that one triad's residuals look like is not named where another triad's contradict it.
+    """
+    made: list[TriadSummary] = []
+    for summary, fit in found:
+        others = [other.free for _, other in found if other is not fit and other.free is not None]
+        labels = [r.label for r in summary.residuals]
+        made.append(summary if fit.free is None else replace(summary, suspect=suspect(fit.free, labels, others)))
+    return tuple(made)
 
 
 def noise_of_means(means: StationMeans, record: TriadRecord | None) -> tuple[Array, bool]:

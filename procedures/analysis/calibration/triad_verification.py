@@ -59,7 +59,7 @@ def planned_covariance(plan: TriadPlan) -> Array | None:
 
 
 def planned_diagnosis(plan: TriadPlan, site: Site, uncertainty: TableUncertainty) -> TriadDiagnosis | None:
-    """Diagnosis of a plan whose residuals are all zero: what it could tell; None where the noise is not known."""
+    """Diagnosis of a plan whose residuals are all zero: what it could find; None where the noise is not known."""
     noise, calibration = plan.noise_covariance(), calibration_of(plan.unit, plan.triad)
     if noise is None or calibration.model == "scalar" or calibration.output_unit == "count":
         return None

@@ -78,6 +78,6 @@ def require_accelerometers(recordings: Sequence[Recording]) -> None:
         names = {c.name for c in recording.info.channels}
         if names.isdisjoint(ACCELEROMETER) and names.issuperset(GYRO):
             raise UnfitRecording(
-                f"recording {recording.info.id} has gyros alone: a field calibration finds the base by accelerometers; "
+                f"recording {recording.info.id} has only gyros: a field calibration finds the base by accelerometers; "
                 "the method gyro_half_turns needs none"
             )

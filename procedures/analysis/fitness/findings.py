@@ -75,7 +75,7 @@ class FitnessSettings:
     least_samples: int = 20
     """Fewest samples accepted: the standard uncertainty of a mean is taken from 20 batches (see `station_means`)."""
     gaps: Literal["refuse", "aware"] = "refuse"
-    """Treatment of samples that are no numbers: "refuse", or "aware", a warning for an analysis that omits gaps."""
+    """Treatment of samples that are not numbers: "refuse", or "aware", a warning for an analysis that omits gaps."""
     counters_may_rest: bool = False
     """A counter that stands still causes a warning, not a refusal: across the Earth's rate it gives no pulse for
     minutes, so a dwell of a calibration may well be silent. A silent static run has nothing to analyse."""

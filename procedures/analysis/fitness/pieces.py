@@ -108,7 +108,7 @@ def _numbers(block: RawArray, channels: int) -> Samples:
 
 
 def _fill(columns: Samples, history: int) -> Mask | None:
-    """Replace new samples that are no numbers, if any, by the mean of the piece, in place."""
+    """Replace new samples that are not numbers, if any, by the mean of the piece, in place."""
     new = columns[:, history:]
     if not new.size or np.all(np.isfinite(new.min(axis=1)) & np.isfinite(new.max(axis=1))):
         return None

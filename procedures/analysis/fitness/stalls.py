@@ -40,7 +40,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Around:
-    """Shares of samples that repeat beside a run."""
+    """Shares of samples that repeat outside a run."""
 
     parts: Array
     """Share of each channel, (channels,)."""
@@ -184,7 +184,7 @@ def _quantile(ascending: NDArray[np.uint8], share: float) -> float:
 
 
 def _around(same: Mask, rows: Mask, begin: int, end: int) -> Around | None:
-    """Shares of repeats beside a run; None where the piece has too few samples there."""
+    """Shares of repeats outside a run; None where the piece has too few samples there."""
     before, after = slice(max(begin - NEAR, 0), begin), slice(end, end + NEAR)
     beside = np.hstack([same[:, before], same[:, after]])
     if beside.shape[1] < NEAR:

@@ -110,7 +110,7 @@ def hung(group: Group, words: Wording) -> Finding:
     longest = max(group.runs, key=lambda run: run.length)
     told = (
         f"{longest.length} rows in a row repeat the one before exactly, from sample {words.at(longest.first_index)}: "
-        "the data link seems to have hung"
+        "the data link seems to have stalled"
     )
     count, total = len(group.runs) + group.lost, sum(run.length for run in group.runs)
     if count > 1:

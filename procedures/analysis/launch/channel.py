@@ -216,7 +216,7 @@ def _averaging(fit: NoiseFit) -> Averaging:
     covariance[np.ix_(at, at)] = fit.correlation * np.outer(sds, sds)
     found = averaging_time(fit.coefficients(), covariance)
     if found.tau_s is None:
-        return Averaging(None, None, "only quantization was observed: it rules as far as the record goes")
+        return Averaging(None, None, "only quantization was observed: it dominates over the whole record")
     if found.tau_s == 0.0:
         return Averaging(None, None, "no quantization was observed")
     return Averaging(found.tau_s, found.sd_s)

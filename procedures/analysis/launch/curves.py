@@ -1,4 +1,4 @@
-"""A deviation curve of a recording's channel with what stands beside it, and bands of many channels in one pass."""
+"""A deviation curve of a recording's channel with what belongs to it, and bands of many channels in one pass."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Curve:
     noise_exponent: tuple[float, ...]
     """α of the rate's spectral density f^α that the degrees of freedom were taken for."""
     density: Density | None = None
-    """Power spectral density of the nominal rate; None where it was not asked for or cannot be told."""
+    """Power spectral density of the nominal rate; None where it was not asked for or cannot be computed."""
     band: BandCurve | None = None
     """Least, mean and greatest deviation over the starts; of sampled intervals the deviation and one sigma about it."""
 

@@ -210,7 +210,7 @@ class ChannelNoise:
     density: Density | None = None
     """Power spectral density of what the coefficients refer to; None in results of earlier versions."""
     temperatures: tuple[TemperatureCorrelation, ...] = ()
-    """Correlation with each temperature recorded beside; empty where there is none."""
+    """Correlation with each temperature recorded at the same time; empty where there is none."""
     vibration: Vibration | None = None
     """Root mean square above 1 Hz; None where the launch was not sampled so fast, or in earlier versions."""
 

@@ -16,7 +16,7 @@ FEWEST_A_CELL = 8
 def densities(recording: Recording, names: Sequence[str], confidence: float) -> list[Density | None]:
     """Densities of channels in one pass, None of a recording that is too short for one.
 
-    Raises `MissingChannel`, `UnfitRecording` for samples that are no numbers.
+    Raises `MissingChannel`, `UnfitRecording` for samples that are not numbers.
     """
     info = recording.info
     samples = cell_samples(info.rate_hz, max(CELL_S, 1.0 / info.rate_hz))

@@ -1,4 +1,4 @@
-"""Surroundings of a launch at rest: correlation with the temperatures beside it, base vibration, lines and dithers.
+"""Surroundings of a launch at rest: correlation with its temperatures, base vibration, lines and dithers.
 
 Whether an output at rest follows the temperature (thesis 4.1.3), what the base shakes by and at which lines (paper A,
 "conditions" and p. 5-6).
@@ -43,7 +43,7 @@ class TemperatureCorrelation:
 
 
 def correlations(series: Array, temperatures: Mapping[str, Array], cell_s: float) -> tuple[TemperatureCorrelation, ...]:
-    """Correlations of cells (n,) with every temperature beside them, (n,) each; none where there are too few cells."""
+    """Correlations of cells (n,) with every temperature of the launch, (n,) each; none if there are too few cells."""
     size = max(1, min(round(GROUP_S / cell_s), len(series) // FEWEST), -(-len(series) // MOST_GROUPS))
     count = len(series) // size
     if count < FEWEST:

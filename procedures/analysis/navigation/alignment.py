@@ -69,7 +69,9 @@ def initial_attitude(
     require_alignable(latitude_deg)
     angles = _angles(force_b, rate_b)
     if abs(angles[1]) > PITCH_MAX_DEG * units.DEG:
-        raise Undetermined("the heading of a unit on end", ("heading − roll",), 2, 3, 1.0 / float(np.cos(angles[1])))
+        raise Undetermined(
+            "the heading of a unit that stands on end", ("heading − roll",), 2, 3, 1.0 / float(np.cos(angles[1]))
+        )
     steps = np.repeat([1e-6 * gravity_m_s2, 1e-6 * earth_rate_rad_s], 3)
     derivative = np.empty((3, 6))
     both = np.concatenate([force_b, rate_b])

@@ -113,7 +113,7 @@ def _cut(ways: tuple[_Way, ...], unfolded_hz: float) -> Agreement:
     if len(ways) == 1 or top > unfolded_hz or not np.any(first.is_fast & (first.frequency_hz < top)):
         return part
     below = first.below(np.nextafter(top, inf))
-    own = "; Q is not told from the edge"
+    own = "; Q is not separated from the edge"
     return _told(below, own, described=True) if misfit(below) <= 1.0 else _parted(first, own)
 
 

@@ -179,7 +179,7 @@ def _remarks(selection: Selection) -> tuple[str, ...]:
     if not selection.ambiguous:
         return ()
     taken, other = ("rate ramp", "rate random walk")[:: 1 if selection.ramp else -1]
-    return (f"The slow drift is taken for a {taken}, but one record does not tell it from a {other}.",)
+    return (f"The slow drift is taken for a {taken}, but one record does not distinguish it from a {other}.",)
 
 
 def _doubts(doubt: Doubt) -> tuple[str, ...]:

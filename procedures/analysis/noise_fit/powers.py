@@ -77,7 +77,7 @@ def slow_powers(
     y = _checked(cells, 0)
     n = len(y)
     if n < FEWEST_SAMPLES:
-        raise UnfitRecording(f"{n} cell means are too few for noise coefficients; it takes {FEWEST_SAMPLES}")
+        raise UnfitRecording(f"{n} cell means are too few for noise coefficients; the least is {FEWEST_SAMPLES}")
     if np.all(y == y[0]):
         raise UnfitRecording(f"the channel is constant ({y[0]!r}): a stuck channel has no noise to analyse")
     # one process at a time: transforms of all four would be the largest thing in memory

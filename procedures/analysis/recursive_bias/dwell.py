@@ -4,7 +4,7 @@ The calibration takes the plain mean of a dwell; its standard uncertainty after 
 noise alone, and is known before the first sample. So when to stop does not depend on what was measured, and an optional
 stop cannot bias the mean. What was measured enters in one way: the recursive estimate's innovations are white with
 unit variance where the noise is as declared. Where they are not, the declared uncertainty is not to be believed, and
-the dwell goes on to its longest time. Innovations count by their squares, whatever their sign: no bias from there.
+the dwell continues to its longest time. Innovations count by their squares, whatever their sign: no bias from there.
 """
 
 from collections.abc import Sequence
@@ -48,7 +48,7 @@ def expected_s(rule: StopRule, longest_s: float) -> float:
 
 
 class LiveDwell:
-    """Follows the samples of a dwell, block by block, and tells how many of them are enough."""
+    """Follows the samples of a dwell, block by block, and says how many of them are enough."""
 
     def __init__(self, rule: StopRule, channels: Sequence[Channel], rate_hz: float, longest_s: float) -> None:
         """Start before the first sample. Raises `MissingChannel`."""

@@ -3,7 +3,7 @@
 A normalised innovation is unit normal where the channel is as its noise record says, and independent of the others; so
 the sum of n squares (normalised innovation squared) is chi-square of n degrees of freedom. A channel that is noisier,
 steps, drifts or drops out makes it too large; one that is held, filtered or clipped makes it too small. A channel that
-wanders may hide there: its neighbouring innovations are alike, and their products tell it. (One that stands still at
+wanders may hide there: its neighbouring innovations are alike, and their products show it. (One that stands still at
 a likely value is found by the inspection of the samples, not here.)
 """
 

@@ -1,6 +1,6 @@
 """Repeatability of cross-couplings over repeated mountings of a unit, from calibrations made under each mounting.
 
-A unit that is mounted anew sits at other small angles on its plate, and its calibration finds other cross-couplings
+A unit that is mounted again sits at other small angles on its plate, and its calibration finds other cross-couplings
 K_ij, i ≠ j: for a turn δ of the seat K' = K·(1 − [δ]×), so a pair changes by ±δ. Scale factors change in second order
 only.
 """

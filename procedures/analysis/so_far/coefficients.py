@@ -44,7 +44,7 @@ class CoefficientsSoFar:
 def coefficients_so_far(
     means: StationMeans, site: Site, record: TriadRecord | None, table: TableUncertainty
 ) -> CoefficientsSoFar:
-    """Estimate ``U = b + K·v`` by generalised least squares with a prior, anew after each station.
+    """Estimate ``U = b + K·v`` by generalised least squares with a prior, again after each station.
 
     ``x̂ = (AᵀS⁻¹A + P⁻¹)⁻¹(AᵀS⁻¹U + P⁻¹x₀)`` for each channel by itself, with ``S = C + F·Fᵀ``: C the covariance of the
     means from the unit's noise, or of their scatter, F the table's declared flaws through the K of a first pass, and P

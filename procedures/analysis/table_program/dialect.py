@@ -98,7 +98,7 @@ class _Reader:
             raise refusal(line, code, f"seconds, above 0 and at most {DELAY_MAX_S:g}")
         missing = [axis for axis in NUMBERS if axis not in self.at]
         if missing:
-            raise refusal(line, code, f"'{DEMAND}' of axis {', '.join(missing)} first: nobody knows where it stands")
+            raise refusal(line, code, f"'{DEMAND}' of axis {', '.join(missing)} first: its angle is not known")
         if len(self.dwells) == DWELLS_MAX:
             raise refusal(line, code, f"no more: {DWELLS_MAX} delays are the most")
         self.dwells.append(Dwell(self._angles(), delay_s, line))

@@ -47,10 +47,10 @@ def spectrum(residuals: Sequence[Array], cell_s: float) -> Spectrum:
     """
     shortest = min(len(r) for r in residuals)
     if shortest < FEWEST:
-        raise UnfitRecording(f"a run of {shortest} cells is too short to tell its noise; it takes {FEWEST}")
+        raise UnfitRecording(f"a run of {shortest} cells is too short to estimate its noise; the least is {FEWEST}")
     power = np.mean([cosines(r[:shortest]) ** 2 for r in residuals], axis=0)
     if not np.any(power):
-        raise UnfitRecording("the residuals are exactly zero: there is no noise to tell")
+        raise UnfitRecording("the residuals are exactly zero: there is no noise to estimate")
     noise = fit_noise(np.sqrt(power), unit_variances(shortest, cell_s)).noise
     squares = np.square([noise.quantization, noise.random_walk, noise.bias_instability, noise.rate_random_walk])
     variances = [squares @ unit_variances(len(r), cell_s) for r in residuals]

@@ -62,7 +62,7 @@ def compare_orders(
 
 
 def f_test(fewer: float, more: float, k_fewer: int, k_more: int, count: float) -> float:
-    """p-value of ``F = ((rss₁ − rss₂)/(k₂ − k₁))/(rss₂/(m − k₂))``, m independent values; 1 where it tells nothing."""
+    """p-value of ``F = ((rss₁ − rss₂)/(k₂ − k₁))/(rss₂/(m − k₂))``, m independent values; 1 where it says nothing."""
     if count <= k_more or k_more <= k_fewer:
         return 1.0
     statistic = (fewer - more) / (k_more - k_fewer) / (more / (count - k_more))

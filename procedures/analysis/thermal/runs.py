@@ -80,7 +80,7 @@ def thermal_run(
     force_m_s2 : effective specific force along each axis where the mounting or cross-coupling make it differ from
         gravity along `up`: ``(K·f)_i/K_ii`` of a calibration. A horizontal axis that feels 0.05 m/s² of it mixes its
         scale's temperature dependence into its bias.
-    trace : regime of every sample where it was told already.
+    trace : regime of every sample where it is known already.
 
     Raises `BadParameter`, `UnfitRecording` (a value that is no number, a series of another length, no two cells).
     """

@@ -116,7 +116,7 @@ def _require_working(recording: Recording, name: str, readings_c: Array) -> None
 def _at_start(recording: str, since_s: Array, readings_c: Array, settings: SoakSettings) -> tuple[Array, Array]:
     """Readings (m, n) brought to the moment of switching on, and their standard uncertainties, (m,) each."""
     if len(since_s) < FEWEST_CELLS:
-        raise UnfitRecording(f"recording {recording}: {len(since_s)} readings are too few; it takes {FEWEST_CELLS}")
+        raise UnfitRecording(f"recording {recording}: {len(since_s)} readings are too few; the least is {FEWEST_CELLS}")
     tau = settings.lag_s
     start, rate, variance = _line(since_s, readings_c, tau)
     other, _, _ = _line(since_s, readings_c, tau + settings.lag_sd_s)

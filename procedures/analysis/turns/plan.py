@@ -37,7 +37,7 @@ class TurnProgram:
     settle_s: float
 
     def turns(self, rate_deg_s: float) -> int:
-        """Whole turns at a rate, at least one."""
+        """Number of whole turns at a rate, at least one."""
         return max(1, floor(rate_deg_s * self.turning_s / 360.0 + 0.5))
 
     def stations(self) -> tuple[Station, ...]:

@@ -12,14 +12,10 @@ from math import pi
 
 import numpy as np
 
+from procedures.analysis.own_axes import axes_answered, wrong_axes
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 from procedures.core.recording import AXES, TRIADS, Recording, rates
-
-DEAD = 0.2
-"""Answer, as a share of the triad's largest where the scale is not known, that counts as none."""
-CLEAR = 0.5
-"""Share of a channel's largest answer that its other answers must stay beneath for one axis to be named."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +54,7 @@ def answers(recordings: Sequence[Recording], triad: str, turned_s: float, gravit
     relative = units == {"count"}
     largest = float(np.abs(rows).max())
     matrix = rows / largest if relative and largest > 0.0 else rows
-    return Answers(triad, tuple(tuple(row) for row in matrix.tolist()), relative, tuple(_axis(row) for row in matrix))
+    return Answers(triad, tuple(tuple(row) for row in matrix.tolist()), relative, axes_answered(matrix))
 
 
 def _answer(recording: Recording, names: Sequence[str], triad: str, turned_s: float, gravity_m_s2: float) -> Array:
@@ -73,18 +69,10 @@ def _answer(recording: Recording, names: Sequence[str], triad: str, turned_s: fl
     return np.asarray((samples.mean(axis=0) - at_rest) * info.duration_s / (2.0 * pi), dtype=np.float64)
 
 
-def _axis(row: Array) -> str:
-    k = int(np.argmax(np.abs(row)))
-    own, others = float(row[k]), np.abs(np.delete(row, k))
-    if abs(own) < DEAD:
-        return "nothing"
-    return f"{'+' if own > 0.0 else '−'}{AXES[k]}" if others.max() <= CLEAR * abs(own) else "no single axis"
-
-
 def sentences(both: Sequence[Answers]) -> tuple[str, ...]:
     """Faults of each triad, and whether a turned mounting would explain it; empty for a good unit."""
     wrong = [a for a in both if a.axes != ("+x", "+y", "+z")]
-    said = [_of_triad(a) for a in wrong]
+    said = [wrong_axes(a.triad, a.axes) for a in wrong]
     made = [a.permutation for a in wrong]
     if len(made) == 2 and made[0] is not None and made[1] is not None and np.array_equal(made[0], made[1]):
         turned = round(float(np.linalg.det(made[0]))) == 1
@@ -95,20 +83,3 @@ def sentences(both: Sequence[Answers]) -> tuple[str, ...]:
             else "both triads are wrong in the same way, which no mounting can do: the unit's axes are left-handed"
         )
     return tuple(said)
-
-
-def _of_triad(found: Answers) -> str:
-    """Name exchanged, reversed and dead channels of a triad."""
-    names, own = TRIADS[found.triad], [f"+{axis}" for axis in AXES]
-    told: list[str] = []
-    for i, (name, axis) in enumerate(zip(names, found.axes, strict=True)):
-        partner = next((j for j in range(3) if j != i and axis[1:] == AXES[j]), None)
-        if partner is not None and found.axes[partner][1:] == AXES[i]:
-            if partner > i:
-                signs = "" if axis[0] == found.axes[partner][0] == "+" else f" ({axis} and {found.axes[partner]})"
-                told.append(f"{name} and {names[partner]} are exchanged{signs}")
-        elif axis == f"−{AXES[i]}":
-            told.append(f"{name} is reversed")
-        elif axis != own[i]:
-            told.append(f"{name} answers to {axis}")
-    return "; ".join(told)

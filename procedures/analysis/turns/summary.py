@@ -9,6 +9,7 @@ from procedures.analysis.calibration.station_means import station_means
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.summary import Coefficient
 from procedures.analysis.calibration.table_errors import TableUncertainty
+from procedures.analysis.own_axes import axes_answered, wrong_axes
 from procedures.analysis.turns.fit import Term, TurnFit, Turning, fit_turns, turning
 from procedures.analysis.turns.path import as_turned
 from procedures.analysis.turns.plan import coefficient_names
@@ -128,12 +129,26 @@ def require_turns(motion: Turning, outputs: Array, labels: Sequence[str]) -> Non
     for i, channel in enumerate(motion.channels):
         made = motion.angle_rad[i] * np.sign(motion.axis_b[i, channel])
         if not abs(outputs[i, channel] / made - 1.0) < PLAUSIBLE:
-            others = [a for c, a in enumerate(AXES) if abs(abs(outputs[i, c] / made) - 1.0) < PLAUSIBLE]
-            counted = f"; gyro_{others[0]} counted them: the channels are exchanged" if others else ""
+            exchanged = _exchanged(motion, outputs)
             raise UnfitRecording(
                 f"station {labels[i]}: gyro_{AXES[channel]} counted {outputs[i, channel] / (2.0 * np.pi):.4g} turns "
-                f"where {made / (2.0 * np.pi):.4g} were made{counted}"
+                f"where {made / (2.0 * np.pi):.4g} were made{f': {exchanged}' if exchanged else ''}"
             )
+
+
+def _exchanged(motion: Turning, outputs: Array) -> str:
+    """Name exchanged, reversed and dead channels by the turns that each counted about each axis.
+
+    Empty where not every axis was turned: a channel that counted nothing may be that of an axis that stood still.
+    """
+    counted = np.zeros((3, 3))
+    for axis in range(3):
+        of = [i for i, channel in enumerate(motion.channels) if channel == axis]
+        if not of:
+            return ""
+        made = motion.angle_rad[of] * np.sign(motion.axis_b[of, axis])
+        counted[:, axis] = np.mean(outputs[of] / made[:, None], axis=0)
+    return wrong_axes("gyro", axes_answered(counted))
 
 
 def _coefficients(fit: TurnFit, terms: Sequence[Term]) -> tuple[Coefficient, ...]:

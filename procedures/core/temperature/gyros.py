@@ -1,7 +1,7 @@
 """Correction of gyros that depend on their own temperature: a polynomial of each one's own thermometer.
 
 ``ω = ω_measured − Σ_k c_k·(T − T_ref)^k``, k from 1. It is one of bias: in a thermal cycle a gyro sees nothing but the
-Earth's rate, so that a scale factor's dependence cannot be told.
+Earth's rate, so that a scale factor's dependence cannot be found.
 """
 
 from dataclasses import dataclass

@@ -81,7 +81,7 @@ class Mat5:
             kind, length = struct.unpack(f"{self._order}II", exactly(self._stream, 8, self._name, "a variable"))
             if kind not in (_MATRIX, _COMPRESSED):
                 raise UnreadableFile(
-                    self._name, f"byte {at} begins no variable (type {kind}): the file is damaged there"
+                    self._name, f"byte {at} is not the start of a variable (type {kind}): the file is damaged there"
                 )
             if at + 8 + length > size:
                 raise UnreadableFile(
@@ -181,7 +181,7 @@ class Mat5:
         """List the arrays, those of one length as one table. Raises `UnreadableFile` where there is none."""
         found = tables_by_length([p.array for p in self._arrays.values()], self._notes)
         if not found:
-            why = "; ".join(self._notes) or "it holds single numbers alone"
+            why = "; ".join(self._notes) or "it holds only single numbers"
             raise UnreadableFile(self._name, f"holds no matrix of samples: {why}")
         return found
 

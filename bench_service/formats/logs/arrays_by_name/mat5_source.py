@@ -58,7 +58,7 @@ class _PlainWalk:
 
 
 class Packed:
-    """A variable packed by zlib. Reading goes forward; a place that lies behind begins anew."""
+    """A variable packed by zlib. Reading goes forward; a place that lies behind begins again."""
 
     def __init__(self, stream: BinaryIO, begin: int, length: int, big_endian: bool) -> None:
         self._stream, self._begin, self._length = stream, begin, length
@@ -79,7 +79,7 @@ class Packed:
     def walk(self, at: int) -> Walk:
         """Return a walk from a place on. Raises `EOFError`, `zlib.error`.
 
-        A variable that is small unpacked is unpacked once; of a larger one each walk goes on from the last mark before
+        A variable that is small unpacked is unpacked once; of a larger one each walk begins at the last mark before
         its place, so that columns which are asked for in their order are skipped once and read once.
         """
         if self.unpacked_bytes <= WHOLE_BYTES:

@@ -133,7 +133,9 @@ class Mcap:
             if opcode == _DATA_END:
                 return
             if not begun and opcode != 1:
-                raise UnreadableFile(self._name, f"byte {len(MAGIC)} begins no header record of an MCAP: it is damaged")
+                raise UnreadableFile(
+                    self._name, f"byte {len(MAGIC)} is not the start of a header record of an MCAP: it is damaged"
+                )
             begun = True
             if opcode == _CHUNK:
                 yield from self._inner(self._chunk(body), wanted)

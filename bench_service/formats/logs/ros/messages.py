@@ -162,7 +162,7 @@ class Topic:
     problem: str = ""
     """Why its messages cannot be read; empty: they can."""
     publish: bool = False
-    """Whether messages have a time of publication beside that of arrival."""
+    """Whether messages have a time of publication in addition to that of arrival."""
 
     def table(self) -> LogTable:
         """Describe the topic as a table."""

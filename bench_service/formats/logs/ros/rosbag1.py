@@ -117,7 +117,9 @@ class Bag:
 
     def _cut(self, at: int, length: int | None) -> None:
         if length is not None:
-            raise UnreadableFile(self._name, f"byte {at} begins no record of a bag: the file is damaged there")
+            raise UnreadableFile(
+                self._name, f"byte {at} is not the start of a record of a bag: the file is damaged there"
+            )
         words = (
             f"the bag is cut off in the record at byte {at}, as when its recorder was killed: what is before was read"
         )

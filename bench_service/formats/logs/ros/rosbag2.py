@@ -42,7 +42,9 @@ class Database:
         self._topics: dict[int, Topic] = {}
         have = {row[0] for row in self._ask("SELECT name FROM sqlite_master WHERE type = 'table'")}
         if not {"topics", "messages"} <= have:
-            raise UnreadableFile(name, "is an SQLite database but no ROS 2 bag: it has no tables topics and messages")
+            raise UnreadableFile(
+                name, "is an SQLite database but not a ROS 2 bag: it has no tables topics and messages"
+            )
         texts = self._definitions() if "message_definitions" in have else {}
         for number, topic, title, form in self._ask("SELECT id, name, type, serialization_format FROM topics"):
             self._topics[number] = self._topic(number, str(topic), str(title), str(form), texts)

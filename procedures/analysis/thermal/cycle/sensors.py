@@ -38,7 +38,7 @@ def with_delay(
 ) -> tuple[CycleSettings, Following | None, list[str]]:
     """The settings with the time constant of the converter's sensor found where it was not given, and warnings.
 
-    The delay itself is found in either case. A time constant that the readings do not tell is taken over from the
+    The delay itself is found in either case. A time constant that the readings do not determine is taken over from the
     case's sensor, and the result says so.
     """
     asked = settings.converter_lag_s is None

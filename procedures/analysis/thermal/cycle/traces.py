@@ -1,4 +1,4 @@
-"""Series of a run for the eye, what the regime indicator made of its ramps, and Allan deviations before and after."""
+"""Series of a run for figures, what the regime indicator made of its ramps, and Allan deviations before and after."""
 
 from collections.abc import Sequence
 from math import ceil

@@ -1,0 +1,43 @@
+"""People in a printed report: who asked for the work and when, and their remarks about the unit."""
+
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+
+from bench_service.formats.printed.document import Block, Facts, Heading, PrintedTable
+from bench_service.model.job import Job
+from bench_service.model.notes import UnitNote
+from bench_service.model.records import StoredResult
+
+
+def moment(at: datetime | None) -> str:
+    """A time to the second, in UTC with the zone named; a dash for none."""
+    return "–" if at is None else f"{at.astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC"
+
+
+def people(result: StoredResult, job: Job | None) -> Iterator[Block]:
+    """The person who asked, and the times of the job and of the result."""
+    yield Heading("Who and when")
+    rows = [("result", moment(result.created_at))]
+    if job is not None:
+        rows = [
+            ("requested by", job.requested_by or "no name was given"),
+            ("requested", moment(job.created_at)),
+            ("begun", moment(job.started_at)),
+            ("ended", moment(job.finished_at)),
+            ("job", f"{job.number}, {job.id}"),
+            ("bench", job.bench),
+            *rows,
+        ]
+    yield Facts(tuple(rows))
+
+
+def remarks(notes: Sequence[UnitNote]) -> Iterator[Block]:
+    """Remarks about the unit, newest first; nothing where there are none."""
+    if not notes:
+        return
+    yield Heading("Remarks about the unit")
+    rows = tuple(
+        (moment(note.at), note.by if note.proven or not note.by else f"{note.by} (name as given)", note.text)
+        for note in notes
+    )
+    yield PrintedTable("", ("at", "by", "remark"), rows)

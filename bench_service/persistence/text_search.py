@@ -1,0 +1,119 @@
+"""Search of lists by a text, along indexes. Knows which columns a text is sought in; must not know how lists are paged.
+
+To look for a part of a word in every row costs what the history costs. A history has few different words: units,
+procedures, benches, people, stations and labels repeat. So the different values of a column are gone through first, by
+one step along its index for each, and then only the rows that have one of those that hold the text. Ids are all
+different, and are looked through in their index alone, where the text could be a part of one.
+
+Each list gets conditions of which at least one must hold; each of them is a walk along one index.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import ColumnElement, and_, func, or_, select
+from sqlalchemy.orm import InstrumentedAttribute, Session, aliased
+
+from bench_service.model.job import job_number
+from bench_service.persistence.searching import imported_name_holds, text_held
+from bench_service.persistence.tables.evidence import RecordingRow, ResultRow
+from bench_service.persistence.tables.jobs import JobLabelRow, JobRow
+
+MOST = 2000
+"""Different values of a column that are gone through; of a column with more of them every value is looked at."""
+LABEL_NAMES = 50
+"""Different names of labels whose values are gone through, name by name."""
+LISTED = 500
+"""Values in one condition; where more of them hold the text, rows with it are frequent."""
+ID_LENGTH = 36
+Ways = tuple[ColumnElement[bool], ...]
+
+_OTHER = aliased(RecordingRow)
+_PART_OF_ID = re.compile(r"[0-9a-f-]{1,36}", re.IGNORECASE)
+_Column = InstrumentedAttribute[Any]
+
+
+def ways_to_jobs(session: Session, text: str) -> Ways:
+    """Conditions of jobs, at least one of which holds where a job has the text."""
+    named = (JobRow.procedure, JobRow.unit, JobRow.bench, JobRow.requested_by)
+    return (*_in_columns(session, named, text), *_in_ids(JobRow.id, text), *_in_job(session, JobRow.id, text))
+
+
+def ways_to_recordings(session: Session, text: str) -> Ways:
+    """Conditions of recordings, at least one of which holds where a recording or its job's labels have the text."""
+    named = (RecordingRow.unit, RecordingRow.bench, RecordingRow.station_label)
+    of_job = tuple(RecordingRow.job_id.in_(select(JobRow.id).where(way)) for way in _in_ids(JobRow.id, text))
+    return (
+        *_in_columns(session, named, text),
+        *_in_ids(RecordingRow.id, text),
+        *of_job,
+        *_in_job(session, RecordingRow.job_id, text),
+        RecordingRow.id.in_(select(_OTHER.id).where(imported_name_holds(text, _OTHER))),
+    )
+
+
+def ways_to_results(session: Session, text: str) -> Ways:
+    """Conditions of results, at least one of which holds where a result or its job's labels have the text."""
+    of_job = tuple(ResultRow.job_id.in_(select(JobRow.id).where(way)) for way in _in_ids(JobRow.id, text))
+    return (
+        *_in_columns(session, (ResultRow.name, ResultRow.unit), text),
+        *_in_ids(ResultRow.id, text),
+        *of_job,
+        *_in_job(session, ResultRow.job_id, text),
+    )
+
+
+def _in_columns(session: Session, columns: Sequence[_Column], text: str) -> list[ColumnElement[bool]]:
+    ways = (_in_column(session, column, text) for column in columns)
+    return [way for way in ways if way is not None]
+
+
+def _in_column(session: Session, column: _Column, text: str, *where: ColumnElement[bool]) -> ColumnElement[bool] | None:
+    """Return the condition that a column holds a text; None where no row does. `where`: fixes columns before it."""
+    known = _values(session, column, text, where)
+    if known is None or sum(known.values()) > LISTED:
+        return and_(*where, text_held(column, text))
+    having = [value for value, held in known.items() if held]
+    return and_(*where, column.in_(having)) if having else None
+
+
+def _values(
+    session: Session, column: _Column, text: str, where: Sequence[ColumnElement[bool]]
+) -> dict[str, bool] | None:
+    """Find the different values of a column, and whether each holds a text; None where there are more than `MOST`.
+
+    The column begins an index, or follows the columns of `where` in one.
+    """
+    steps = select(func.min(column).label("value")).where(*where).cte("steps", recursive=True)
+    following = select(func.min(column)).where(*where, column > steps.c.value).correlate(steps).scalar_subquery()
+    steps = steps.union_all(select(following).where(steps.c.value.is_not(None)))
+    query = select(steps.c.value, text_held(steps.c.value, text)).where(steps.c.value.is_not(None)).limit(MOST + 1)
+    found = session.execute(query).all()
+    return None if len(found) > MOST else {value: bool(held) for value, held in found}
+
+
+def _in_job(session: Session, job: ColumnElement[Any] | _Column, text: str) -> list[ColumnElement[bool]]:
+    """Conditions that a job has a label that holds a text, or the number that the text is."""
+    pairs = list[ColumnElement[bool]]()
+    names = _values(session, JobLabelRow.name, text, ())
+    if names is None or len(names) > LABEL_NAMES:
+        pairs = [text_held(JobLabelRow.name, text), text_held(JobLabelRow.value, text)]
+    else:
+        for name, held in names.items():
+            named = JobLabelRow.name == name
+            way = named if held else _in_column(session, JobLabelRow.value, text, named)
+            pairs += [] if way is None else [way]
+    ways = [job.in_(select(JobLabelRow.job_id).where(or_(*pairs)))] if pairs else []
+    number = job_number(text)
+    return ways if number is None else [*ways, job.in_(select(JobRow.id).where(JobRow.number == number))]
+
+
+def _in_ids(key: _Column, text: str) -> list[ColumnElement[bool]]:
+    """Conditions that an id is, or holds, a text: none where no id could."""
+    if not _PART_OF_ID.fullmatch(text):
+        return []
+    if len(text) == ID_LENGTH:
+        return [key == text.lower()]
+    other = aliased(key.class_)
+    return [key.in_(select(getattr(other, key.key)).where(getattr(other, key.key).contains(text.lower())))]
