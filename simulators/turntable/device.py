@@ -261,7 +261,7 @@ class SimTurntable:
     def _seen(self, joints_rad: Array) -> EncoderTrace:
         """Encoder readings of true joint angles at the ends of the ticks that pass now, (ticks, 3)."""
         shown = (joints_rad - self._pointing + 2.0 * np.pi * self._turns) / units.DEG
-        times = (self._clock.ticks + 1.0 + np.arange(len(shown))) / self._clock.rate_hz
+        times: Array = (self._clock.ticks + np.arange(1, len(shown) + 1, dtype=np.float64)) / self._clock.rate_hz
         return EncoderTrace(times, shown, np.zeros(len(shown)))
 
     def _unwind(self, spin: Spin) -> None:

@@ -168,7 +168,7 @@ def _fitted(times: Array, values: Array, omega: float, label: str) -> _Fitted:
             f"station {label}: {len(times)} values over {times[-1] - times[0]:.3g} s cannot tell a sinusoid of "
             f"{omega / (2.0 * pi):g} Hz from a drift"
         )
-    weights = np.linalg.solve(design.T @ design, design.T)
+    weights: Array = np.asarray(np.linalg.solve(design.T @ design, design.T), dtype=np.float64)
     found = weights @ values
     left = values - design @ found
     variance = float(left @ left) / (len(times) - design.shape[1])

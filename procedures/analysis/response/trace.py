@@ -83,9 +83,9 @@ def samples_of(recording: Recording, channel: str, directions: Sequence[float]) 
 
 def _readings(raw: Array, rate_hz: float, directions: Sequence[float]) -> Readings:
     """Readings from the columns of the angles, age and within, each once."""
-    ends = (np.arange(len(raw)) + 1.0) / rate_hz
+    ends: Array = np.arange(1, len(raw) + 1, dtype=np.float64) / rate_hz
     known = raw[:, -2] > NO_READING
-    times = (ends - TIME_STEP_S * raw[:, -2])[known]
+    times: Array = (ends - TIME_STEP_S * raw[:, -2])[known]
     angle = ANGLE_STEP_DEG * units.DEG * (raw[known, :3] - raw[known, :3][:1]) @ np.array(directions)
     # A reading that stands beside several samples has one time, but for the rounding of its age.
     fresh = np.diff(times, prepend=-np.inf) > 2.0 * TIME_STEP_S
