@@ -104,7 +104,7 @@ class WiredLoad:
         body = {"procedure": "table_program", "unit": "GL017", "parameters": parameters}
         answer = client.post("/api/v1/jobs", json=body)
         if answer.status_code != 202:
-            self.reasons[f"not accepted: {answer.status_code}"] += 1
+            self.reasons[f"not taken: {answer.status_code}"] += 1
             return None
         self.asked |= {f"{angle:.5f}" for angle in angles}
         return answer.json()["id"]
