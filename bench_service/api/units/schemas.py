@@ -100,7 +100,7 @@ class CorrectionView(BaseModel):
 class CorrectionChoice(Request):
     """Request to make a correction set the one that counts."""
 
-    by: Annotated[str, NAME] | None = Field(None, description="Who decides; null: the client's name")
+    by: Annotated[str, NAME] | None = Field(None, description="Person who decides; null: the client's name")
     remark: Remark = ""
 
 

@@ -3,31 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Statement, ThermalShare, TriadSummary, Verdict
-
-
-class DwellEnded(Part):
-    """Duration of one dwell under a stop rule."""
-
-    label: str
-    """Name for people"""
-    duration_s: float
-    """Duration [s]"""
-    longest_s: float
-    """Longest allowed dwell [s]"""
-    by_rule: bool
-    """True if the rule ended it; False if it ran to its longest time."""
-
-
-class DwellsSaved(Part):
-    """Time that a stop rule saved in a job."""
-
-    dwells: tuple[DwellEnded, ...]
-    """Dwells, in order"""
-    saved_s: float
-    """Sum of what the dwells were shorter than their longest time [s]"""
-    share: float
-    """Part of the longest time of all dwells together."""
+from bench_client.results.shared import Check, DwellsSaved, Statement, ThermalShare, TriadSummary, Verdict
 
 
 class Calibration12OrientationsDocument(Part):

@@ -293,6 +293,30 @@ class ThermalShare(Part):
     """Standard uncertainty due to the temperature sensors' noise."""
 
 
+class DwellEnded(Part):
+    """Duration of one dwell under a stop rule."""
+
+    label: str
+    """Name for people"""
+    duration_s: float
+    """Duration [s]"""
+    longest_s: float
+    """Longest allowed dwell [s]"""
+    by_rule: bool
+    """True if the rule ended it; False if it ran to its longest time."""
+
+
+class DwellsSaved(Part):
+    """Time that a stop rule saved in a job."""
+
+    dwells: tuple[DwellEnded, ...]
+    """Dwells, in order"""
+    saved_s: float
+    """Sum of what the dwells were shorter than their longest time [s]"""
+    share: float
+    """Part of the longest time of all dwells together."""
+
+
 class Normalised(Part):
     """Normalised function: ``value_0·F(t)`` with F(t_0) = 1 if `relative`, else ``value_0 + F(t)`` with F(t_0) =
     0.
@@ -359,6 +383,8 @@ class WholeTurns(Part):
     """Chance of so large a statistic by noise alone"""
     noise_known: bool
     """Whether the noise is that of the unit's record"""
+    budgets: tuple[Budget, ...] = ()
+    """Uncertainty budget of each coefficient; empty in results of older versions."""
 
 
 class BandCurve(Part):

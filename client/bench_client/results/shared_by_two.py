@@ -7,6 +7,7 @@ from bench_client.results.shared import (
     BandCurve,
     Check,
     Density,
+    DwellsSaved,
     Statement,
     ThermalShare,
     ThermometerCorrection,
@@ -86,7 +87,9 @@ class MultiPositionCalibrationDocument(Part):
     extended: tuple[Extended, ...] = ()
     """Fits with further terms, of each triad for which they were asked"""
     thermal: ThermalShare | None = None
-    """of the accelerometers, where they were corrected"""
+    """where corrected"""
+    dwells: DwellsSaved | None = None
+    """of a stop rule"""
 
 
 class Transient(Part):
