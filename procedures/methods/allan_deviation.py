@@ -30,7 +30,7 @@ from procedures.analysis.launch.results import BandCurve
 from procedures.analysis.launch.spectrum import densities
 from procedures.core.errors import BadParameter, UnfitRecording
 from procedures.core.limits import Limit, check, verdict
-from procedures.core.recording import INCREMENTS, Quantity, Recording
+from procedures.core.recording import AROUND, INCREMENTS, Recording
 from procedures.core.report import Report
 from procedures.core.unit import Unit
 from procedures.procedure import Evidence, Method, Outcome, RecordedParameters
@@ -109,7 +109,7 @@ def report(result: Result) -> Report:
 
 def _curves(recording: Recording, statistic: Statistic, params: Params) -> tuple[Curve, ...]:
     info = recording.info
-    names = params.channels or tuple(c.name for c in info.channels if c.quantity is not Quantity.TEMPERATURE)
+    names = params.channels or tuple(c.name for c in info.channels if c.quantity not in AROUND)
     try:
         found = _deviations(recording, names, statistic, params, correlate=True)
     except Uncorrelatable:

@@ -116,7 +116,13 @@ _INERTIAL = frozenset(name for names in TRIADS.values() for name in names)
 
 def _at_rest(recording: Recording) -> bool:
     station = recording.info.station
-    return station is not None and station.angles is not None and station.turn is None and station.profile is None
+    return (
+        station is not None
+        and station.angles is not None
+        and station.turn is None
+        and station.sinusoid is None
+        and station.profile is None
+    )
 
 
 def _noise_of(unit: Unit, channel: Channel) -> NoiseCoefficients | None:
