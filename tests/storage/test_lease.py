@@ -12,7 +12,8 @@ import pytest
 import sqlalchemy as sa
 
 from bench_service.model.errors import BenchBusy, StorageFailure
-from bench_service.persistence import BenchLease, acquire_lease
+from bench_service.persistence import BenchLease, acquire_lease, open_stores
+from bench_service.persistence.bench.lease import lease_holder
 from bench_service.wall_clock import monotonic_s, pause
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -103,6 +104,25 @@ def test_a_lease_that_was_given_back_is_not_taken_again_by_who_looks_once_more(d
     assert not lease.held()
     assert not lease.regain()
     acquire_lease(database_url, "sim").release()
+
+
+def test_the_process_that_drives_a_bench_is_named_and_a_supervisor_is_none(database_url: str) -> None:
+    _, database = open_stores(database_url)
+    assert lease_holder(database, database_url, "sim") is None, "nobody was ever there"
+    lease = acquire_lease(database_url, "sim")
+    named = lease_holder(database, database_url, "sim")
+    assert named is not None
+    assert {"process", str(os.getpid())} <= set(named.strip("'").split())
+    assert lease_holder(database, database_url, "sim-2") is None
+    lease.release()
+    until_s = monotonic_s() + 10.0
+    while lease_holder(database, database_url, "sim") is not None:  # a server sees a connection's end a moment later
+        assert monotonic_s() < until_s
+        pause(0.01)
+    passing = acquire_lease(database_url, "sim", "supervisor")
+    assert lease_holder(database, database_url, "sim") is None, "a supervisor makes a bench safe, it drives none"
+    passing.release()
+    database.dispose()
 
 
 def test_a_lease_whose_lock_file_was_taken_away_is_lost(sqlite_url: str, tmp_path: Path) -> None:
