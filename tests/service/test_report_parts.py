@@ -40,7 +40,7 @@ def test_a_killed_process_leaves_no_half_report_and_the_next_one_prints_the_same
             half = pool.submit(processes.result, "print", endless)
             folder = _folder_of_a_child()
             os.kill(int(folder.name.split("-")[2]), signal.SIGKILL)
-            with pytest.raises(StorageFailure, match="ask again"):
+            with pytest.raises(StorageFailure, match="try again"):
                 half.result(timeout=60.0)
         found = base64.b64decode(processes.result("print", document))
         assert not folder.exists()
