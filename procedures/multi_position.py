@@ -17,6 +17,14 @@ from procedures.analysis.calibration.misfit import MISFIT_MAX
 from procedures.analysis.calibration.multiposition import TriadFit
 from procedures.analysis.calibration.plan import TriadPlan, predicted_parts
 from procedures.analysis.calibration.reference import INPUT_UNITS, reference_magnitude, reference_vectors
+from procedures.analysis.calibration.reference_temperature import (
+    AtReference,
+    ThermalShare,
+    bring_to_reference,
+    gyros_at_reference,
+    thermal_share,
+    thermal_warnings,
+)
 from procedures.analysis.calibration.station_means import StationMeans, launch_warnings, station_means
 from procedures.analysis.calibration.summary import TriadSummary, coefficient_unit
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
@@ -96,6 +104,9 @@ class Result(Outcome):
 
     triads: tuple[TriadSummary, ...]
     extended: tuple[Extended, ...] = ()
+    thermal: ThermalShare | None = Field(
+        None, exclude_if=lambda share: share is None, description="of the accelerometers, where they were corrected"
+    )
 
 
 def inputs_at(
@@ -131,19 +142,36 @@ def require_determined(params: FitParameters, triad: str, inputs: Inputs) -> Non
 
 
 def calibrated(
-    recordings: Sequence[Recording], params: FitParameters, inputs: dict[str, Inputs], unit: Unit | None
+    recordings: Sequence[Recording],
+    params: FitParameters,
+    inputs: dict[str, Inputs],
+    unit: Unit | None,
+    lag_s: tuple[float, float] | None = None,
 ) -> Result:
-    """Calibrate the triads of `inputs`. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`."""
+    """Calibrate the triads of `inputs`. Raises `UnfitRecording`, `MissingChannel`, `Undetermined`.
+
+    `lag_s`, time constants of case and converter sensor: both triads are first brought to the references of the unit's
+    corrections; None: they are taken as they are.
+    """
+    share, doubts = None, ()
     fitted: list[tuple[TriadSummary, TriadFit]] = []
     extended: list[Extended] = []
     for triad, given in inputs.items():
         require_determined(params, triad, given)
-        means, record = station_means(recordings, triad), unit.triad(triad) if unit else None
+        means, record, more = station_means(recordings, triad), unit.triad(triad) if unit else None, None
+        warm = None
+        if unit is not None and lag_s is not None:
+            means, more, warm = _brought(recordings, means, unit, lag_s)
         scalar = params.scalar_check and triad == "accelerometer"
-        found = analyse_inputs(means, given.vectors, given.errors, given.magnitude, record, scalar, params.weighting)
+        fixed = (given.vectors, given.errors, given.magnitude, record, scalar, params.weighting, more)
+        found = analyse_inputs(means, *fixed)
+        if warm is not None and unit is not None and unit.thermal_correction is not None:
+            share = thermal_share(warm, unit.thermal_correction, found[1])
+            doubts = thermal_warnings(warm, unit.thermal_correction)
         fitted.append(found)
         if kinds := params.terms_for(triad):
             noise, known = noise_of_means(means, record)
+            noise = noise + sum((more or {}).values())
             terms = terms_of(kinds, given.vectors, given.forces)
             units = means.output_unit, INPUT_UNITS[triad]
             whole = fit_terms(
@@ -155,10 +183,24 @@ def calibrated(
     return Result(
         checks=checks,
         verdict=verdict(checks),
-        warnings=launch_warnings(recordings) + _unknown_noise(summaries),
+        warnings=launch_warnings(recordings) + _unknown_noise(summaries) + doubts,
         triads=summaries,
         extended=tuple(extended),
+        thermal=share,
     )
+
+
+def _brought(
+    recordings: Sequence[Recording], means: StationMeans, unit: Unit, lag_s: tuple[float, float]
+) -> tuple[StationMeans, dict[str, Array], AtReference | None]:
+    """Station means at the references of the unit's corrections, and their covariances from these, by cause."""
+    if means.triad == "accelerometer" and unit.thermal_correction is not None:
+        warm = bring_to_reference(recordings, means, unit.thermal_correction, lag_s)
+        return warm.means, {"thermal correction": warm.of_correction, "thermometers": warm.of_sensors}, warm
+    if means.triad == "gyro" and unit.gyro_correction is not None:
+        own, covariance = gyros_at_reference(recordings, means, unit.gyro_correction)
+        return own, {"thermal correction": covariance}, None
+    return means, {}, None
 
 
 def calibrations(result: Result) -> tuple[TriadCalibration, ...]:

@@ -34,6 +34,9 @@ class AnalysisSubmission(Request):
     recordings: list[str] = Field(default_factory=list[str], max_length=1000)
     calibrations: list[str] = Field(default_factory=list[str], max_length=1000)
     parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+    unit: str | None = Field(
+        None, max_length=100, description="Serial of the unit; null: that of the evidence. Needed without evidence"
+    )
     selection: RecordingSelection | None = Field(
         None, description="Instead of `recordings`: a query; a batch with one task for each group is queued (202)"
     )
@@ -138,6 +141,8 @@ def _queued(
 ) -> JSONResponse:
     if body.recordings:
         raise BadParameter("recordings", body.recordings[0], "either recordings or a selection (selection.ids)")
+    if body.unit is not None:
+        raise BadParameter("unit", body.unit, "none: a batch takes the unit of each recording")
     wanted = copied(BatchRequest, body, selection=selection.query(), calibrations=tuple(body.calibrations))
     batch = service.batches.submit(wanted, by, key)
     view = BatchView.of(batch).model_dump(mode="json")

@@ -17,6 +17,7 @@ from bench_service.cli.groups import (
     calibrations,
     campaigns,
     certificates,
+    corrections,
     database,
     evidence,
     importing,
@@ -67,6 +68,7 @@ PANELS = {
         reports.report,
         units.units,
         calibrations.calibrations,
+        corrections.corrections,
     ),
     "Database": (database.database, database.scrub, database.backup, database.restore),
     "Reservations": (reservations.reservations, reservations.reserve, reservations.unreserve),
@@ -79,6 +81,7 @@ for _panel, _commands in PANELS.items():
 app.command("import", rich_help_panel="Evidence")(importing.import_)
 app.add_typer(job, name="job", rich_help_panel="Jobs")
 app.add_typer(calibrations.calibration, name="calibration", rich_help_panel="Evidence")
+app.add_typer(corrections.correction, name="correction", rich_help_panel="Evidence")
 app.add_typer(certificates.certificate, name="certificate", rich_help_panel="Evidence")
 app.add_typer(batches.batches, name="batch", rich_help_panel="Evidence")
 app.add_typer(mountings.mounting, name="mounting", rich_help_panel="Service and bench")

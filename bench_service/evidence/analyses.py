@@ -35,6 +35,8 @@ class AnalysisRequest:
     recordings: tuple[str, ...] = ()
     calibrations: tuple[str, ...] = ()
     parameters: dict[str, Any] = field(default_factory=dict[str, Any])
+    unit: str | None = None
+    """Serial of the unit that it is about; None: that of the evidence. Needed where there is no evidence."""
 
 
 Computed = tuple[StoredResult, tuple[TriadCalibration, ...], tuple[UnitCorrection, ...]]
@@ -134,10 +136,7 @@ class AnalysisService:
         dated = tuple(DatedCalibration(c.id, c.made_at.isoformat(), (c.value,), self._mounting_of(c)) for c in used)
         evidence = Evidence(self._complete(request.recordings), dated)
         infos = [recording.info for recording in evidence.recordings]
-        units = {info.unit for info in infos} | {c.unit for c in used}
-        if len(units) > 1:
-            raise UnfitRecording(f"the evidence is of several units: {', '.join(sorted(units))}")
-        serial = next(iter(units), None)
+        serial = _unit_of({info.unit for info in infos} | {c.unit for c in used}, request.unit)
         unit = None if serial is None else self._stores.units.unit(serial)
         content = content_of(method.name, method.version, params.model_dump(mode="json"), infos, used, unit)
         simulated = any(info.simulated for info in infos) or any(c.simulated for c in used)
@@ -146,6 +145,11 @@ class AnalysisService:
     def _computed(self, inputs: _Inputs, request: AnalysisRequest) -> Computed:
         method = inputs.method
         outcome = analyse_method(method, inputs.evidence, inputs.params, inputs.unit)
+        corrections = method.corrections(outcome)
+        if corrections and inputs.serial is None:
+            raise BadParameter("unit", None, "the serial of the unit whose correction this is to be")
+        kinds = () if inputs.unit is None else method.uses_corrections(inputs.params)
+        applied = [inputs.unit.correction_id(kind) for kind in kinds if inputs.unit is not None]
         stored = StoredResult(
             id=new_id(),
             kind="method",
@@ -160,8 +164,9 @@ class AnalysisService:
             simulated=inputs.simulated,
             created_at=now(),
             unit=inputs.serial,
+            corrections=tuple(c for c in applied if c is not None),
         )
-        return stored, method.calibrations(outcome), method.corrections(outcome)
+        return stored, method.calibrations(outcome), corrections
 
     def _mounting_of(self, calibration: StoredCalibration) -> str:
         """Id of the mounting that the calibration's job rested on; empty where it rested on none."""
@@ -177,6 +182,15 @@ class AnalysisService:
             if stored.state is not RecordingState.COMPLETE:
                 raise UnfitRecording(f"recording {recording_id} is {stored.state.value}: kept, but not for analysis")
         return tuple(self._stores.recordings.load(recording_id) for recording_id in ids)
+
+
+def _unit_of(of_evidence: set[str], named: str | None) -> str | None:
+    """The one unit of the evidence, or the named one where there is none. Raises `UnfitRecording`, `BadParameter`."""
+    if len(of_evidence) > 1:
+        raise UnfitRecording(f"the evidence is of several units: {', '.join(sorted(of_evidence))}")
+    if named is not None and of_evidence - {named}:
+        raise BadParameter("unit", named, f"{min(of_evidence)}, the unit of the evidence, or none")
+    return named or next(iter(of_evidence), None)
 
 
 def _require_each_once(field: str, ids: Sequence[str]) -> None:

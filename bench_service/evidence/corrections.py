@@ -59,7 +59,9 @@ class CorrectionStore(Protocol):
         """Ids of the results that rest on a correction, newest first."""
         ...
 
-    def make_current(self, unit: str, correction_id: str, idempotency: Idempotency | None = None) -> StoredCorrection:
+    def make_current(
+        self, unit: str, correction_id: str, by: Decider, idempotency: Idempotency | None = None
+    ) -> StoredCorrection:
         """Choose the correction that new jobs use; it supersedes the current one of its kind.
 
         A known key with the same fingerprint changes nothing. Raises `NotFound`, `IdempotencyConflict`.

@@ -134,7 +134,7 @@ class RecomputationService:
         analyses = AnalysisService(self._stores, self._catalogue, self._read_job, self._code_version)
         recordings_used = tuple(known for known, _ in result.recordings)
         stored, calibrations, _ = analyses.computed(
-            AnalysisRequest(result.name, recordings_used, result.calibrations, result.parameters)
+            AnalysisRequest(result.name, recordings_used, result.calibrations, result.parameters, result.unit)
         )
         return stored.version, stored.document, calibrations
 

@@ -173,10 +173,12 @@ class Client:
         calibrations: Sequence[str] = (),
         parameters: Mapping[str, Any] | None = None,
         key: str | None = None,
+        unit: str | None = None,
     ) -> Result:
-        """Run a method on stored recordings or calibrations."""
+        """Run a method on stored recordings or calibrations; one that needs neither is told the unit's serial."""
         ids = [one.id if isinstance(one, Recording) else one for one in recordings]
         given = {"recordings": ids, "calibrations": list(calibrations), "parameters": dict(parameters or {})}
+        given |= {} if unit is None else {"unit": unit}
         return result_of_document(self._transport.post("/api/v1/analyses", key, json={"method": method, **given}))
 
     def recording(self, recording_id: str) -> Recording:

@@ -18,12 +18,21 @@ from procedures.analysis.thermal.thermometers import Calibrated, Soaked, SoakSet
 from procedures.bench import Bench
 from procedures.bench.imu import Stream
 from procedures.core.errors import BadParameter
-from procedures.core.limits import Check, Limit, check, verdict
+from procedures.core.limits import Check, Limit, PlannedCheck, check, significance, verdict
 from procedures.core.recording import Recording, Station
 from procedures.core.report import Report
 from procedures.core.temperature_profile import ProfileLeg, SoakCriterion, TemperatureProfile
 from procedures.core.unit_correction import UnitCorrection
-from procedures.procedure import STATIONS, Context, Outcome, Parameters, PredictedUncertainty, Prediction, Procedure
+from procedures.procedure import (
+    STATIONS,
+    Context,
+    JudgedParameters,
+    Outcome,
+    Parameters,
+    PredictedUncertainty,
+    Prediction,
+    Procedure,
+)
 from procedures.reports.thermometers import thermometer_report
 
 OURS = "ours"
@@ -41,7 +50,7 @@ class Limits(Parameters):
     level: float = Field(0.01, gt=0.0, le=0.2, description="chance that a sound set fails the tests of line or path")
 
 
-class Params(Parameters):
+class Params(JudgedParameters):
     """Soaks, accuracy of the comparison, and limits."""
 
     temperatures_c: tuple[float, ...] = Field(
@@ -170,6 +179,20 @@ def analyse(recordings: Sequence[Recording], params: Params, context: Context) -
     )
 
 
+def planned_checks(params: Params, _context: Context) -> tuple[PlannedCheck, ...]:
+    """Tests of significance that a result will have, each with the chance that a sound unit fails it."""
+    level, source = params.limits.level, "ours: a test of significance"
+    each = Limit("1", minimum=level / len(SENSORS), source=source)
+    found = [PlannedCheck(f"{name} {LINE}", each, level=level / len(SENSORS)) for name in SENSORS]
+    if len(set(params.temperatures_c)) < len(params.temperatures_c):
+        found.append(PlannedCheck(PATH, Limit("1", minimum=level, source=source), level=level))
+    return tuple(found)
+
+
+LINE, PATH = "is a straight line, p-value", "up against down, p-value"
+"""Names of the tests of significance; the first after its sensor's."""
+
+
 def _checks(found: Calibrated, limits: Limits) -> list[Check]:
     checks: list[Check] = []
     for s in found.sensors:
@@ -177,13 +200,12 @@ def _checks(found: Calibrated, limits: Limits) -> list[Check]:
         checks.append(check(f"{s.channel} offset", abs(s.offset_c), offset, s.offset_sd_c))
         checks.append(check(f"{s.channel} slope", abs(s.slope), replace(slope, source=OURS), s.slope_sd))
     # Bonferroni: several sensors, and several pairs, one chance.
-    level = Limit("1", minimum=limits.level / len(found.sensors), source=OURS)
-    checks += [check(f"{s.channel} is a straight line, p-value", s.p_value, level) for s in found.sensors]
+    level = limits.level / len(found.sensors)
+    checks += [significance(f"{s.channel} {LINE}", s.p_value, level) for s in found.sensors]
     if found.hysteresis:
         worst = min(found.hysteresis, key=lambda h: h.p_value)
-        limit = Limit("1", minimum=limits.level / len(found.hysteresis), source=OURS)
         note = f"worst: {worst.channel} at {worst.target_c:g} °C"
-        checks.append(check("up against down, p-value", worst.p_value, limit, note=note))
+        checks.append(significance(PATH, worst.p_value, limits.level / len(found.hysteresis), note))
     return checks
 
 
@@ -215,10 +237,11 @@ def quantities(params: Params, context: Context) -> tuple[str, ...]:
 
 
 PROCEDURE = Procedure(
-    *("thermometer_calibration", "Calibration of the unit's thermometers", "1.0.0"),
+    *("thermometer_calibration", "Calibration of the unit's thermometers", "1.1.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report),
     corrections=corrections,
     quantities=quantities,
+    planned_checks=planned_checks,
     # Only the sensors count, and a set point that stands still is as it should be: `read_soaks` looks at them.
     inspection=lambda _: Inspection(STATIONS.settings, channels=()),
 )

@@ -5,14 +5,14 @@ thesis prints them, need the sensor's codes per degree. The correction joins the
 current (`POST /units/{serial}/corrections/{id}/current`).
 """
 
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from procedures.core.limits import Limit, check, verdict
 from procedures.core.report import Report, Table
-from procedures.core.thermal_correction import COEFFICIENTS, AxisCorrection, Form, ThermalCorrection
+from procedures.core.thermal_correction import COEFFICIENTS, AxisCorrection, Form, TemperatureRange, ThermalCorrection
 from procedures.core.unit import Unit
 from procedures.core.unit_correction import UnitCorrection
 from procedures.parameters import Parameters
@@ -20,6 +20,8 @@ from procedures.procedure import Evidence, Method, Outcome
 
 Four = Annotated[tuple[float, float, float, float], Field(description="in thesis 4.1's order, a degree")]
 Spread = Annotated[float, Field(ge=0.0)]
+Range = Annotated[tuple[float, float], Field(description="[°C], the lower one first")]
+Range = Annotated[tuple[float, float], Field(description="[°C], the lower one first")]
 FourSpreads = tuple[Spread, Spread, Spread, Spread]
 POWERS = np.array([2, 1, 2, 1, 1, 2, 1, 2])
 """Power of the sensor's reading that each α and β multiplies: α1 α2 α3 α4 β1 β2 β3 β4 of thesis 4.1."""
@@ -46,7 +48,22 @@ class Params(Parameters):
     converter_codes_per_c: float = Field(1.0, gt=0.0, le=1e9)
     case_reference_c: float = Field(20.0, ge=-100.0, le=200.0, description="where the correction does nothing")
     converter_reference_c: float = Field(20.0, ge=-100.0, le=200.0)
+    case_range_c: Range | None = Field(None, description="readings at which they were found; both ranges or none")
+    converter_range_c: Range | None = Field(None, description="of none, no use can say that it extrapolates")
     form: Form = Form.BOTH
+
+    @model_validator(mode="after")
+    def _both_ranges(self) -> Self:
+        if (self.case_range_c is None) != (self.converter_range_c is None):
+            raise ValueError("case_range_c and converter_range_c: both or none")
+        return self
+
+    @property
+    def fitted_range(self) -> TemperatureRange | None:
+        """The range of both sensors, where it is known. Raises `BadParameter` where it ends before it begins."""
+        if self.case_range_c is None or self.converter_range_c is None:
+            return None
+        return TemperatureRange(self.case_range_c, self.converter_range_c)
 
 
 class Result(Outcome):
@@ -58,7 +75,8 @@ class Result(Outcome):
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     """Convert to degrees and keep. Raises `BadParameter`."""
-    found = ThermalCorrection("accelerometer", (_axis(params, 0), _axis(params, 1), _axis(params, 2)))
+    axes = (_axis(params, 0), _axis(params, 1), _axis(params, 2))
+    found = ThermalCorrection("accelerometer", axes, fitted_range=params.fitted_range)
     given = float(sum(np.count_nonzero([*a.alpha, *a.beta]) for a in params.axes))
     limit = Limit("1", minimum=1.0, source="ours: a correction of zeros corrects nothing")
     checks = (check("coefficients that are not zero", given, limit),)
@@ -102,7 +120,7 @@ def _axis(params: Params, number: int) -> AxisCorrection:
 
 
 METHOD = Method(
-    *("entered_thermal_correction", "Thermal correction from known coefficients", "1.0.0"),
+    *("entered_thermal_correction", "Thermal correction from known coefficients", "1.1.0"),
     *(Params, Result, analyse, report),
     corrections=corrections,
 )

@@ -5,12 +5,13 @@ accelerometers alone (thesis 3.3.3-3.3.6).
 """
 
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
 from procedures import multi_position
+from procedures.analysis.calibration.reference_temperature import require_correctable
 from procedures.analysis.calibration.table_errors import TableUncertainty, direction_errors
 from procedures.core import units
 from procedures.core.errors import BadParameter, UnfitRecording
@@ -23,6 +24,7 @@ from procedures.procedure import STATIONS, Evidence, Method, RecordedParameters
 
 Angle = Annotated[float, Field(ge=-3600.0, le=3600.0)]
 Component = Annotated[float, Field(ge=-1e6, le=1e6)]
+Lag = Annotated[float, Field(ge=0.0, le=600.0)]
 Arcsec = Annotated[float, Field(ge=0.0, le=36_000.0)]
 
 
@@ -50,6 +52,11 @@ class Params(FitParameters, RecordedParameters):
     orthogonality_sd_arcsec: Arcsec = 0.0
     pointing_sd_arcsec: Arcsec = 0.0
     level_sd_arcsec: Arcsec = 0.0
+    thermal_correction: Literal["none", "current"] = Field(
+        "none", description="current: the unit's corrections bring both triads to their reference temperatures"
+    )
+    case_lag_s: Lag = Field(5.0, description="time constant of the case sensor; used by thermal_correction=current")
+    converter_lag_s: Lag = Field(5.0, description="the same of the converter's sensor")
 
 
 def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
@@ -60,7 +67,13 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
         inputs = {"accelerometer": _from_directions(params, len(evidence.recordings))}
     else:
         inputs = _from_angles(evidence, params)
-    return multi_position.calibrated(evidence.recordings, params, inputs, unit)
+    if params.thermal_correction == "none":
+        return multi_position.calibrated(evidence.recordings, params, inputs, unit)
+    if unit is None or "accelerometer" not in params.triads:
+        raise BadParameter("thermal_correction", "current", "none, without the accelerometers of a unit")
+    require_correctable("current", min(r.info.duration_s for r in evidence.recordings), unit)
+    lags = params.case_lag_s, params.converter_lag_s
+    return multi_position.calibrated(evidence.recordings, params, inputs, unit, lags)
 
 
 def _from_directions(params: Params, recordings: int) -> Inputs:
@@ -129,12 +142,13 @@ def _require_one_each(field: str, given: int, recordings: int) -> None:
 METHOD = Method(
     "multi_position_calibration_of_recordings",
     "Calibration in any positions, of recordings",
-    "1.0.0",
+    "1.1.0",
     Params,
     Result,
     analyse,
     multi_position.report,
     multi_position.calibrations,
+    uses_corrections=lambda params: ("thermal", "gyros") if params.thermal_correction == "current" else (),
     inspection=lambda params, _: replace(
         STATIONS, channels=tuple(channel for triad in params.triads for channel in TRIADS[triad])
     ),

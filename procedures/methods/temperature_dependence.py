@@ -4,10 +4,11 @@ For imported recordings, of whole cycles or of parts. The polynomials are of ord
 criterion with the channel's own slow noise (thesis appendix B); the soaks are found from the temperature itself.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from procedures.analysis.cells import cell_means
@@ -30,8 +31,8 @@ from procedures.analysis.thermal.regime import RegimeSettings, regimes
 from procedures.analysis.thermal.runs import without_lag
 from procedures.core.arrays import Array
 from procedures.core.errors import BadParameter, UnfitRecording
-from procedures.core.limits import Limit, check, verdict
-from procedures.core.recording import AROUND, GYRO, Quantity, Recording
+from procedures.core.limits import significance, verdict
+from procedures.core.recording import AROUND, GYRO, Quantity, Recording, RecordingInfo
 from procedures.core.report import Report
 from procedures.core.temperature.gyros import GyroPolynomial, GyroThermalCorrection
 from procedures.core.unit import Unit
@@ -112,9 +113,12 @@ def analyse(evidence: Evidence, params: Params, unit: Unit | None) -> Result:
     if params.order is not None and params.cell_s * FEWEST > min(r.info.duration_s for r in recordings):
         raise BadParameter("cell_s", params.cell_s, f"so short that every recording has {FEWEST} cells")
     known = unit.thermometers if unit is not None and params.thermometers else None
-    found = [_channel(recordings, name, _sensor(recordings, name, params), params, unit) for name in names]
-    limit = Limit("1", minimum=params.level / len(names), source="ours: no dependence on temperature")
-    checks = tuple(check(f"{c.channel} independence of temperature, p-value", c.p_value, limit) for c, _ in found)
+    sensors = {name: _sensor(recordings, name, params) for name in names}
+    series = [_series(recording, sensors, params, unit) for recording in recordings]
+    found = [_channel(recordings[0].info, name, sensors[name], [s[name] for s in series], params) for name in names]
+    level, source = params.level / len(names), "ours: no dependence on temperature"
+    name = "independence of temperature, p-value"
+    checks = tuple(significance(f"{c.channel} {name}", c.p_value, level, source=source) for c, _ in found)
     temperatures = [s.departure_c + params.reference_c for _, series in found for s in series]
     return Result(
         checks=checks,
@@ -154,9 +158,8 @@ def _sensor(recordings: Sequence[Recording], channel: str, params: Params) -> st
 
 
 def _channel(
-    recordings: Sequence[Recording], channel: str, sensor: str, params: Params, unit: Unit | None
+    info: RecordingInfo, channel: str, sensor: str, series: list[Series], params: Params
 ) -> tuple[ChannelFound, list[Series]]:
-    series = [_series(r, channel, sensor, params, unit) for r in recordings]
     order = judge_order(series, params.cell_s)
     used = order.preferred if params.order is None else params.order
     fit = fit_order(series, used, params.cell_s)
@@ -167,7 +170,6 @@ def _channel(
     if params.soaks:
         noise = own_noise(series, used, params.cell_s)
         soaks = soak_fits(series, noise, params.cell_s, 0.0, params.least_soak_s)
-    info = recordings[0].info
     found = ChannelFound(
         channel,
         info.channels[info.column(channel)].rate_unit,
@@ -193,28 +195,37 @@ def _spread(values: Sequence[Array]) -> float:
     return float(np.sqrt(np.mean(np.concatenate([(v - v.mean()) ** 2 for v in values]))))
 
 
-def _series(recording: Recording, channel: str, sensor: str, params: Params, unit: Unit | None) -> Series:
-    """Cells of a channel and its temperature, with the regime where soaks are asked for."""
-    cells = cell_means(recording, (channel, sensor), SECOND_S)
-    values, temperature = cells.rates
+def _series(recording: Recording, sensors: Mapping[str, str], params: Params, unit: Unit | None) -> dict[str, Series]:
+    """Cells of each channel and of its temperature sensor, with the regime where soaks are asked for; read once."""
+    of_sensors = tuple(dict.fromkeys(sensors.values()))
+    cells = cell_means(recording, (*sensors, *of_sensors), SECOND_S)
     known = unit.thermometers if unit is not None and params.thermometers else None
-    if known is not None and known.has(sensor):
-        temperature = known.corrected(sensor, temperature)
-    if params.lag_s > 0.0:
-        temperature = without_lag(temperature, cells.cell_s, params.lag_s)
     size = max(1, round(params.cell_s / cells.cell_s))
-    count = len(values) // size
+    count = cells.rates.shape[1] // size
     if count < FEWEST:
         raise UnfitRecording(
             f"recording {recording.info.id}: {count} cells of {params.cell_s:g} s are too few, the least is {FEWEST}: "
             "make cell_s shorter"
         )
-    rows = [v[: count * size].reshape(count, size) for v in (values, temperature - params.reference_c)]
-    dynamic = None
-    if params.soaks:
-        trace = regimes(temperature, cells.cell_s, RegimeSettings(**params.regime.model_dump()))
-        dynamic = np.any(trace.dynamic[: count * size].reshape(count, size), axis=1, keepdims=True)[:, 0]
-    return Series(rows[0].mean(axis=1), rows[1].mean(axis=1), dynamic)
+    departures: dict[str, Array] = {}
+    dynamic: dict[str, NDArray[np.bool_]] = {}
+    for sensor, readings in zip(of_sensors, cells.rates[len(sensors) :], strict=True):
+        temperature = known.corrected(sensor, readings) if known is not None and known.has(sensor) else readings
+        if params.lag_s > 0.0:
+            temperature = without_lag(temperature, cells.cell_s, params.lag_s)
+        departures[sensor] = _cells(temperature - params.reference_c, count, size)
+        if params.soaks:
+            trace = regimes(temperature, cells.cell_s, RegimeSettings(**params.regime.model_dump()))
+            dynamic[sensor] = trace.dynamic[: count * size].reshape(count, size).any(axis=1)
+    rows = zip(sensors.items(), cells.rates, strict=False)  # the sensors' own rows come after
+    return {
+        name: Series(_cells(values, count, size), departures[sensor], dynamic.get(sensor))
+        for (name, sensor), values in rows
+    }
+
+
+def _cells(values: Array, count: int, size: int) -> Array:
+    return np.asarray(values[: count * size].reshape(count, size).mean(axis=1), dtype=np.float64)
 
 
 def _gyros(
@@ -262,7 +273,7 @@ def report(result: Result) -> Report:
 
 
 METHOD = Method(
-    *("temperature_dependence", "Dependence of recordings on temperature", "1.0.0"),
+    *("temperature_dependence", "Dependence of recordings on temperature", "1.1.0"),
     *(Params, Result, analyse, report),
     corrections=corrections,
     inspection=lambda params, _: Inspection(replace(STATIONS.settings, least_samples=FEWEST), params.channels),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from procedures import methods
 from procedures.analysis.calibration.reference_temperature import gyros_at_reference
 from procedures.analysis.calibration.station_means import station_means
 from procedures.analysis.calibration.station_noise import triad_covariance
@@ -21,7 +22,8 @@ from procedures.core.recording import ACCELEROMETER, GYRO, Channel, MemoryRecord
 from procedures.core.temperature.gyros import GyroPolynomial, GyroThermalCorrection
 from procedures.core.temperature.thermometers import SensorCorrection, ThermometerCorrection
 from procedures.core.thermal_correction import AxisCorrection, Form, TemperatureRange, ThermalCorrection
-from procedures.core.unit import TriadRecord
+from procedures.core.unit import TriadRecord, Unit
+from procedures.procedure import Evidence
 from simulators.chamber.behaviour import response
 from simulators.truth.thermal import REFERENCE_C, AccelerometerThermalTruth, ConverterTruth, UnitThermalTruth
 from tests.kit.forward_model import ACCELEROMETER_NOISE, B_ACCELEROMETER, K_ACCELEROMETER, SITE, Table
@@ -132,6 +134,30 @@ def test_a_warm_unit_is_found_as_it_is_at_the_reference_within_what_is_claimed()
         assert share is not None
         assert share.form is Form.BOTH
     assert chi2.ppf(3e-5, degrees) < total < chi2.isf(3e-5, degrees)  # 4 standard deviations of a normal number
+
+
+def test_recordings_without_a_bench_are_brought_to_the_reference_by_the_units_correction():
+    """The method on recordings gives what the calibration on the bench gives, and says where it extrapolates."""
+    rng = np.random.Generator(np.random.PCG64(78))
+    data, correction = recordings(STILL, rng, B_ACCELEROMETER), true_correction(STILL)
+    unit = Unit("S-1", 1.0, CHANNELS, accelerometer=RECORD, thermal_correction=correction, thermal_correction_id="c")
+    method = methods.discover()["multi_position_calibration_of_recordings"]
+    given = {"gravity_m_s2": SITE.gravity_m_s2, "gravity_sd_m_s2": 0.0, "triads": ["accelerometer"]}
+    given |= {"case_lag_s": LAG_S, "converter_lag_s": LAG_S, "thermal_correction": "current"}
+    params = method.params.model_validate(given)
+    found = method.analyse(Evidence(tuple(data)), params, unit)
+    expected, share, _ = calibrated(data, correction)
+    np.testing.assert_allclose(found.triads[0].calibration.coefficients, expected.calibration.coefficients, rtol=1e-9)
+    np.testing.assert_allclose(
+        found.triads[0].calibration.standard_uncertainties, expected.calibration.standard_uncertainties, rtol=1e-6
+    )
+    assert found.thermal == share
+    assert method.uses_corrections(params) == ("thermal", "gyros")
+    cold = replace(correction, fitted_range=TemperatureRange((-40.0, 30.0), (-40.0, 30.0)))
+    beyond = method.analyse(Evidence(tuple(data)), params, replace(unit, thermal_correction=cold))
+    assert any("beyond the range" in w for w in beyond.warnings)
+    with pytest.raises(BadParameter, match="has no thermal correction yet"):
+        method.analyse(Evidence(tuple(data)), params, replace(unit, thermal_correction=None))
 
 
 def test_without_the_correction_it_is_wrong_by_many_standard_uncertainties():

@@ -65,9 +65,8 @@ def test_a_wrong_azimuth_is_named_with_its_size():
 def test_gyros_alone_cannot_tell_an_azimuth_from_a_level_and_accelerometers_can():
     """With the outer axis at zero, heading north, turns about up and about north both give the rate a part to the east.
 
-    They are then one column, exactly. The level is named beside the azimuth by the gyros alone, and is left out where
-    the accelerometers, which see an arcsecond of it, say nothing of it; a real level stays, and the accelerometers
-    name it.
+    They are then one column, exactly. The level is named with the azimuth by the gyros alone, and is left out where the
+    accelerometers, which see an arcsecond of it, do not show it; a real level stays, and the accelerometers name it.
     """
     north = replace(SITE, azimuth_deg=0.0)
     azimuth, level = (column("gyro", source) * 20.0 * 60.0 * ARCSEC for source in ("azimuth", "level"))

@@ -5,12 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from procedures import methods
 from procedures.core import units
 from procedures.core.errors import BadParameter, MissingChannel, UnfitRecording
 from procedures.core.recording import GYRO, Channel, MemoryRecording, Quantity, RecordingInfo
 from procedures.core.unit import Unit
+from procedures.inspection import judged
 from procedures.methods import temperature_dependence
 from procedures.methods.temperature_dependence import Params, Result
+from procedures.parameters import DecisionRules
 from procedures.procedure import Evidence
 from tests.correction_samples import thermometers
 from tests.validation.thermal_rig import flicker
@@ -150,3 +153,23 @@ def test_wrong_channels_and_sensors_are_named(recordings):
     with pytest.raises(UnfitRecording, match="make cell_s shorter"):
         analysed(recordings, cell_s=600.0, channels=("gyro_x",))
     assert temperature_dependence.report(analysed(recordings[:1], channels=("gyro_x",))).sections
+
+
+def test_each_recording_is_read_once_and_a_rule_of_its_own_leaves_a_test_of_significance_alone(recordings):
+    reads: list[str] = []
+
+    class Counted(MemoryRecording):
+        def blocks(self):
+            reads.append(self.info.id)
+            return super().blocks()
+
+    method = methods.discover()["temperature_dependence"]
+    params = Params(own_sensors=OWN, soaks=False, decision=DecisionRules(rule="guarded"))
+    evidence = Evidence((Counted(recordings[0].info, recordings[0].raw),))
+    found = temperature_dependence.analyse(evidence, params, None)
+    assert reads == [recordings[0].info.id]
+    ruled = judged(found, params)
+    assert method.params is Params
+    assert all(c.significance and c.decision is not None for c in ruled.checks)
+    assert [c.passed for c in ruled.checks] == [c.passed for c in found.checks]
+    assert ruled.checks[0].decision.rule.startswith("test of significance at 0.0033")

@@ -213,6 +213,32 @@ def test_known_coefficients_are_entered_chosen_approved_and_rejected(bench: Benc
     one_line(bench("calibration", "enter", "SIM-0001", file), "no JSON")
 
 
+def test_corrections_are_listed_and_decided(bench: Bench, address: str) -> None:
+    axis = {"scale": 1.2, "bias_m_s2": 0.0, "alpha": [0, 1e-5, 0, 0], "beta": [0] * 4}
+    axis |= {"alpha_sd": [0, 1e-6, 0, 0], "beta_sd": [0] * 4}
+    entry = ("analyse", "entered_thermal_correction", "--set", "origin=passport 12/7")
+    one_line(bench(*entry, "--set", f"axes={json.dumps([axis] * 3)}"), "unit")
+    for _ in range(2):
+        assert bench(*entry, "--set", f"axes={json.dumps([axis] * 3)}", "--unit", "SIM-0001").code == 0
+    new, old = bench("corrections", "SIM-0001", "--kind", "thermal", "--json").json()
+    assert (new["current"], old["current"]) == (False, False), "a method's correction counts when a person says so"
+    chosen = bench("correction", "choose", "SIM-0001", old["id"], "--by", "Ann", "--remark", "the passport's", "--json")
+    assert chosen.json()["current"] is True
+    assert [(d["act"], d["by"], d["remark"]) for d in chosen.json()["decisions"]] == [
+        ("chosen", "Ann", "the passport's")
+    ]
+    assert bench("correction", "approve", "SIM-0001", old["id"], "--valid-until", "2099-01-01T00:00:00Z").code == 0
+    assert "2099-01-01" in bench("corrections", "SIM-0001").out
+    assert bench("correction", "reject", "SIM-0001", old["id"]).code == 2, "a rejection has a reason"
+    refused = bench("correction", "reject", "SIM-0001", old["id"], "--remark", "another unit", "--json").json()
+    assert [d["act"] for d in refused["decisions"]] == ["chosen", "approved", "rejected"]
+    shown = bench("corrections", "SIM-0001").out
+    assert "current, not usable" in shown
+    assert "another unit; make another correction" in shown
+    one_line(bench("corrections", "SIM-0001", "--kind", "magnetic"), "kind")
+    one_line(bench("correction", "choose", "SIM-0001", "none"), "correction")
+
+
 def test_a_calibration_is_entered_from_a_file_and_exported(bench: Bench, tmp_path: Path) -> None:
     """Seen once: `enter` ended in a stack trace before anything was sent."""
     names = [name for axis, i in zip("xyz", "123", strict=True) for name in (f"b_{axis}", *(f"K{i}{j}" for j in "123"))]

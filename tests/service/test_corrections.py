@@ -48,6 +48,7 @@ def test_another_one_is_chosen_and_new_jobs_know_it(client: Client, made: list[d
     key = {"Idempotency-Key": "choose the old one"}
     chosen = client.http.post(f"{UNIT}/corrections/{old['id']}/current", headers=key)
     assert (chosen.status_code, chosen.json()["current"]) == (200, True)
+    assert [d["act"] for d in chosen.json()["decisions"]] == ["chosen"]
     assert client.http.get(UNIT).json()["thermal_correction"] == old["id"]
     assert not client.http.get(f"{UNIT}/corrections/{new['id']}").json()["current"]
     assert client.http.post(f"{UNIT}/corrections/{new['id']}/current").json()["current"]

@@ -20,6 +20,7 @@ from tests.correction_samples import converter, gyros, thermal, thermometers
 from tests.storage.conftest import CHANNELS
 
 NewResult = Callable[..., StoredResult]
+ANN = Decider("Ann", "the newer one was made cold")
 
 
 def test_a_correction_comes_back_to_the_last_bit(stores: Stores, new_result: NewResult) -> None:
@@ -59,18 +60,22 @@ def test_a_person_chooses_which_one_is_current(stores: Stores, new_result: NewRe
     new, old = stores.corrections.list("U-1", kind="thermal").items
     models = stores.corrections.current("U-1", "converter")
     key = Idempotency("k", "f")
-    chosen = stores.corrections.make_current("U-1", old.id, key)
-    assert chosen == replace(old, current=True)
+    chosen = stores.corrections.make_current("U-1", old.id, ANN, key)
+    assert chosen == replace(old, current=True, decisions=chosen.decisions)
     assert stores.corrections.list("U-1", kind="thermal").items == (replace(new, current=False), chosen)
     assert stores.corrections.current("U-1", "converter") == models, "the other kind is left alone"
-    assert stores.corrections.make_current("U-1", new.id).current
-    again = stores.corrections.make_current("U-1", old.id, key)
+    assert [(d.act, d.by, d.remark) for d in chosen.decisions] == [(Act.CHOSEN, ANN.by, ANN.remark)]
+    chosen_again = stores.corrections.make_current("U-1", new.id, ANN)
+    assert chosen_again.current
+    again = stores.corrections.make_current("U-1", old.id, ANN, key)
     assert not again.current, "a repeated request does not undo what was chosen since"
     with pytest.raises(IdempotencyConflict):
-        stores.corrections.make_current("U-1", old.id, Idempotency("k", "g"))
+        stores.corrections.make_current("U-1", old.id, ANN, Idempotency("k", "g"))
     with pytest.raises(NotFound):
-        stores.corrections.make_current("U-2", old.id)
-    assert stores.corrections.current("U-1", "thermal") == new
+        stores.corrections.make_current("U-2", old.id, ANN)
+    assert (
+        stores.corrections.current("U-1", "thermal") == chosen_again == replace(new, decisions=chosen_again.decisions)
+    )
 
 
 def test_of_many_choices_at_once_one_stands(stores: Stores, new_result: NewResult) -> None:
@@ -78,7 +83,7 @@ def test_of_many_choices_at_once_one_stands(stores: Stores, new_result: NewResul
         stores.results.add(new_result(), corrections=[thermal(seed)])
     ids = [c.id for c in stores.corrections.list("U-1").items]
     with ThreadPoolExecutor(4) as workers:
-        list(workers.map(lambda i: stores.corrections.make_current("U-1", ids[i % 4]), range(12)))
+        list(workers.map(lambda i: stores.corrections.make_current("U-1", ids[i % 4], ANN), range(12)))
         list(workers.map(lambda i: stores.results.add(new_result(), corrections=[thermal(i)]), range(4)))
     history = stores.corrections.list("U-1").items
     assert len(history) == 8

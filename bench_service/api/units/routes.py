@@ -10,6 +10,7 @@ from bench_service.api.http.printed import PDF, PRINTED, printed
 from bench_service.api.units.calibration_schemas import CalibrationApproval, CalibrationRejection
 from bench_service.api.units.calibrations import DeciderOf
 from bench_service.api.units.schemas import (
+    CorrectionChoice,
     CorrectionPage,
     CorrectionView,
     UnitDeclaration,
@@ -76,11 +77,19 @@ def read_correction(serial: str, correction_id: str, service: Service) -> Correc
     return CorrectionView.of(stored, service.stores.corrections.used_by(correction_id))
 
 
-@router.post("/{serial}/corrections/{correction_id}/current", responses=problems(404, 409, 507))
-def choose_correction(serial: str, correction_id: str, service: Service, key: IdempotencyKey = None) -> CorrectionView:
-    """Make a correction set the one that new jobs use; jobs that began before keep theirs."""
-    asked = Idempotency.of("corrections", key, [serial, correction_id])
-    return CorrectionView.of(service.stores.corrections.make_current(serial, correction_id, asked))
+@router.post("/{serial}/corrections/{correction_id}/current", responses=problems(404, 409, 413, 507))
+def choose_correction(
+    serial: str,
+    correction_id: str,
+    service: Service,
+    decider: DeciderOf,
+    body: CorrectionChoice | None = None,
+    key: IdempotencyKey = None,
+) -> CorrectionView:
+    """Make a correction set the one that new jobs use; jobs that began before keep theirs. A body is not needed."""
+    by = decider(None, "") if body is None else decider(body.by, body.remark)
+    asked = Idempotency.of("corrections", key, [serial, correction_id, *([] if body is None else [body])])
+    return CorrectionView.of(service.stores.corrections.make_current(serial, correction_id, by, asked))
 
 
 @router.post("/{serial}/corrections/{correction_id}/approve", responses=problems(404, 409, 413, 507))

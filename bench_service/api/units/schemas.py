@@ -1,11 +1,12 @@
 """Schemas of units and their corrections. Units of measurement are in the field names."""
 
 from datetime import datetime
+from typing import Annotated
 
 from pydantic import BaseModel, Field
 
-from bench_service.api.http.fields import Request
-from bench_service.api.units.calibration_schemas import DecisionView
+from bench_service.api.http.fields import NAME, Request
+from bench_service.api.units.calibration_schemas import DecisionView, Remark
 from bench_service.evidence.corrections import StoredCorrection
 from bench_service.mapping import copied
 from bench_service.model.calibrations import Approval
@@ -94,6 +95,13 @@ class CorrectionView(BaseModel):
             decisions=[DecisionView.of(d) for d in stored.decisions],
             results=results,
         )
+
+
+class CorrectionChoice(Request):
+    """Request to make a correction set the one that counts."""
+
+    by: Annotated[str, NAME] | None = Field(None, description="Who decides; null: the client's name")
+    remark: Remark = ""
 
 
 class CorrectionPage(BaseModel):

@@ -25,6 +25,7 @@ def analyse(
     method: Annotated[str, typer.Argument(autocompletion=method_names)],
     recording: Annotated[list[str], typer.Option(help="Id of a recording; may be repeated")] = NO_ITEMS,
     calibration: Annotated[list[str], typer.Option(help="Id of a calibration; may be repeated")] = NO_ITEMS,
+    unit: Annotated[str | None, typer.Option(help="Serial of the unit, for a method that needs no evidence")] = None,
     set_: Set = NO_ITEMS,
     where: Annotated[
         list[str],
@@ -50,6 +51,7 @@ def analyse(
         "recordings": recording,
         "calibrations": calibration,
         "parameters": dict(map(parameter, set_)),
+        "unit": unit,
     }
     with connect(context.obj, server, drive=False) as client:
         if where:

@@ -55,15 +55,19 @@ class SqlCorrectionStore:
         with self._database.read() as session:
             return tuple(session.scalars(query))
 
-    def make_current(self, unit: str, correction_id: str, idempotency: Idempotency | None = None) -> StoredCorrection:
+    def make_current(
+        self, unit: str, correction_id: str, by: Decider, idempotency: Idempotency | None = None
+    ) -> StoredCorrection:
         def once() -> StoredCorrection:
             with self._database.write() as session:
                 row = _found(session, unit, correction_id)
                 if made_before(session, idempotency, "correction choice") is None:
-                    remember(session, idempotency, "correction choice", correction_id, wall_clock.now())
+                    at = wall_clock.now()
+                    remember(session, idempotency, "correction choice", correction_id, at)
                     _lock_all(session, unit, row.kind)
                     retire_current(session, unit, row.kind)
                     row.is_current = True
+                    session.add(_decision(correction_id, by, Act.CHOSEN, at))
                     session.flush()
                 return _one(session, unit, correction_id)
 
@@ -104,22 +108,24 @@ class SqlCorrectionStore:
                     at = wall_clock.now()
                     remember(session, idempotency, kind, correction_id, at)
                     session.execute(update(CorrectionRow).where(CorrectionRow.id == correction_id).values(**values))
-                    session.add(
-                        CorrectionDecisionRow(
-                            id=wall_clock.new_id(),
-                            correction_id=correction_id,
-                            act=act.value,
-                            at=at,
-                            by=by.by,
-                            proven=by.proven,
-                            remark=by.remark,
-                        )
-                    )
+                    session.add(_decision(correction_id, by, act, at))
                     session.flush()
                     session.expire_all()
                 return _one(session, unit, correction_id)
 
         return again_after_conflict(once)
+
+
+def _decision(correction_id: str, by: Decider, act: Act, at: datetime) -> CorrectionDecisionRow:
+    return CorrectionDecisionRow(
+        id=wall_clock.new_id(),
+        correction_id=correction_id,
+        act=act.value,
+        at=at,
+        by=by.by,
+        proven=by.proven,
+        remark=by.remark,
+    )
 
 
 def _one(session: Session, unit: str, correction_id: str) -> StoredCorrection:

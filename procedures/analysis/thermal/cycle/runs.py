@@ -19,7 +19,7 @@ from procedures.analysis.thermal.runs import ThermalRun, thermal_run, without_la
 from procedures.core.arrays import Array
 from procedures.core.converter import ConverterTriad, at_reference
 from procedures.core.imu_model import TriadCalibration
-from procedures.core.thermal_correction import ThermalCorrection
+from procedures.core.thermal_correction import Form, ThermalCorrection
 
 GYRO_SENSORS = [i for i, name in enumerate(SENSORS) if name.startswith("temperature_gyro_")]
 PASSES = 2
@@ -116,15 +116,9 @@ def prepare(
 def with_forces(
     runs: Sequence[PreparedRun], settings: CycleSettings, calibration: TriadCalibration
 ) -> tuple[list[PreparedRun], list[str]]:
-    """The runs with the force that each accelerometer felt by the unit's calibration, and warnings.
-
-    ``f_i = (V_i − b_i)/K_ii`` at the reference temperatures: effective, with what mounting and cross-coupling put into
-    it. No soak is quite at the reference, so V there is the nearest soak's output, corrected by a first fit.
-    """
-    bias, scale = calibration.bias_array, np.diagonal(calibration.matrix_array)
-    for _ in range(PASSES):
-        correction, _ = fit_correction([r.cells for r in runs], settings.reference_c)
-        runs = [_with_force(r, (_at_reference(r.cells, correction) - bias) / scale) for r in runs]
+    """The runs with the force that each accelerometer felt by the unit's calibration (`felt_forces`), and warnings."""
+    cells = felt_forces([r.cells for r in runs], settings.reference_c, calibration)
+    runs = [_with_force(run, np.array(cell.force_m_s2)) for run, cell in zip(runs, cells, strict=True)]
     warnings: list[str] = []
     for run in runs:
         others = [f for axis, f in enumerate(run.cells.force_m_s2) if axis != run.series.up]
@@ -134,6 +128,23 @@ def with_forces(
                 f"{', '.join(f'{f:.3g}' for f in others)} m/s²: is it the unit that was calibrated, and was it level?"
             )
     return list(runs), warnings
+
+
+def felt_forces(
+    cells: Sequence[ThermalRun], reference_c: tuple[float, float], calibration: TriadCalibration, form: Form = Form.BOTH
+) -> list[ThermalRun]:
+    """The cells of each run with the force that each accelerometer felt by the unit's calibration.
+
+    ``f_i = (V_i − b_i)/K_ii`` at the reference temperatures: effective, with what mounting and cross-coupling put into
+    it. No soak is quite at the reference, so V there is the nearest soak's output, corrected by a first fit.
+    """
+    bias, scale = calibration.bias_array, np.diagonal(calibration.matrix_array)
+    found = list(cells)
+    for _ in range(PASSES):
+        correction, _ = fit_correction(found, reference_c, form)
+        forces = [((_at_reference(run, correction) - bias) / scale).tolist() for run in found]
+        found = [replace(run, force_m_s2=(f[0], f[1], f[2])) for run, f in zip(found, forces, strict=True)]
+    return found
 
 
 LARGEST_TILT = 0.05
