@@ -41,6 +41,7 @@ from procedures.procedure import (
     Procedure,
 )
 from procedures.reports import whole_turns as pictures
+from procedures.reports.calibration import budget_tables
 from procedures.site_parameters import Arcsec
 
 Rate = Annotated[float, Field(ge=0.1, le=3600.0)]
@@ -192,7 +193,14 @@ def calibrations(result: Result) -> tuple[TriadCalibration, ...]:
 def report(result: Result) -> Report:
     """Coefficients, scale factor over the rates, checks."""
     found = result.gyro
-    return Report(sections=(pictures.turns_table(found), *pictures.rate_figures(found), pictures.rate_table(found)))
+    return Report(
+        sections=(
+            pictures.turns_table(found),
+            *pictures.rate_figures(found),
+            *budget_tables("gyro", found.budgets),
+            pictures.rate_table(found),
+        )
+    )
 
 
 def _program(params: Params) -> TurnProgram:
@@ -202,13 +210,19 @@ def _program(params: Params) -> TurnProgram:
 
 
 def _plan(params: Params, context: Context) -> TurnPlan:
-    uncertainty = TableUncertainty(params.orthogonality_sd_arcsec or 0.0, params.pointing_sd_arcsec or 0.0)
+    site = _site(params, context)
+    uncertainty = TableUncertainty(
+        params.orthogonality_sd_arcsec or 0.0,
+        params.pointing_sd_arcsec or 0.0,
+        context.bench.accuracy.level_sd_arcsec,
+        site.azimuth_sd_arcsec,
+    )
     reference = params.reference_rate_deg_s or max(params.rates_deg_s)
     return TurnPlan(
         _program(params),
         context.unit,
         context.bench.axis_motion,
-        _site(params, context),
+        site,
         uncertainty,
         params.terms,
         reference * units.DEG,
@@ -289,7 +303,7 @@ def _checks(found: WholeTurns, params: Params) -> tuple[Check, ...]:
 
 
 PROCEDURE = Procedure(
-    *("scale_factor_whole_turns", "Gyro scale factor by whole turns", "1.1.0"),
+    *("scale_factor_whole_turns", "Gyro scale factor by whole turns", "1.2.0"),
     *(Params, Result, resolve, schedule, predict, acquire, analyse, report, calibrations),
     planned_checks=planned_checks,
 )

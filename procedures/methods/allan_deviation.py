@@ -59,7 +59,7 @@ class Params(RecordedParameters):
         "every whole number of samples; or a list [s], each taken as the nearest whole number of samples",
     )
     confidence: float = Field(0.6827, gt=0.0, lt=1.0, description="confidence level of the intervals")
-    density: bool = Field(True, description="the power spectral density beside each curve; none of a record too short")
+    density: bool = Field(True, description="the power spectral density with each curve; none for a record too short")
     band: Literal["none", "all_starts", "sampled_intervals"] = Field(
         "none",
         description="all_starts: least, mean and greatest deviation over every start; sampled_intervals: `intervals` "

@@ -48,7 +48,7 @@ class Params(RecordedParameters):
     """Channels, sensors and how they are judged."""
 
     channels: tuple[str, ...] | None = Field(
-        None, min_length=1, max_length=64, description="None: all that are no temperatures"
+        None, min_length=1, max_length=64, description="None: all except temperatures"
     )
     sensor: str | None = Field(None, description="temperature channel; None: the only one that the recordings have")
     own_sensors: dict[str, str] = Field(

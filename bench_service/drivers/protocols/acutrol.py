@@ -138,7 +138,9 @@ def text(dialect: Dialect, answer: bytes) -> str:
     try:
         found = rest.decode("ascii").strip()
     except UnicodeDecodeError:
-        raise BadAnswer(f"{shown(answer)} is no text after reply_prefix_bytes = {dialect.reply_prefix_bytes}") from None
+        raise BadAnswer(
+            f"{shown(answer)} is not text after reply_prefix_bytes = {dialect.reply_prefix_bytes}"
+        ) from None
     if not found or not found.isprintable():
         raise BadAnswer(
             f"{shown(answer)} has no printable text after reply_prefix_bytes = {dialect.reply_prefix_bytes}"
@@ -194,7 +196,7 @@ def word(dialect: Dialect, answer: bytes) -> str:
     """One word in lower case, as a mode or an interlock. Raises `BadAnswer`."""
     found = text(dialect, answer)
     if not found.replace(" ", "").isalpha():
-        raise BadAnswer(f"{found!r} is no word")
+        raise BadAnswer(f"{found!r} is not a word")
     return found.casefold()
 
 

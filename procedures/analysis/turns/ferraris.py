@@ -14,6 +14,7 @@ import numpy as np
 from procedures.analysis.calibration.station_means import StationMeans, station_means
 from procedures.analysis.calibration.station_noise import triad_covariance
 from procedures.analysis.calibration.table_errors import TableErrors, TableUncertainty, table_errors
+from procedures.analysis.turns.budget import turn_budgets, turn_parts
 from procedures.analysis.turns.fit import TurnEstimator, Turning, fitted, turn_estimator, turn_flaws, turning
 from procedures.analysis.turns.summary import WholeTurns, require_turns, whole_turns
 from procedures.core import units
@@ -64,7 +65,8 @@ def rests_and_turns(stations: Sequence[Station], seconds: Array, site: Site) -> 
     n = len(stations)
     angle, rate, moments = np.zeros(n), np.zeros(n), np.zeros((n, 3))
     angle[turns], rate[turns], moments[turns] = moving.angle_rad, moving.rate_rad_s, moving.moments
-    return Turning(np.asarray(seconds, dtype=np.float64), axis, angle, rate, earth, moments, angles)
+    rates = earth_rate_b(list(angles), site)
+    return Turning(np.asarray(seconds, dtype=np.float64), axis, angle, rate, earth, moments, angles, rates)
 
 
 def ferraris_flaws(motion: Turning, uncertainty: TableUncertainty) -> TableErrors:
@@ -103,7 +105,12 @@ def analyse_ferraris(
     first = ferraris_estimator(motion, None, uncertainty, np.eye(3))
     matrix = (first.gain @ outputs.T.ravel()).reshape(3, 4)[:, 1:]
     fit = fitted(ferraris_estimator(motion, noise, uncertainty, matrix), outputs, noise is not None)
-    return whole_turns(fit, (), motion, outputs, np.flatnonzero(turns).tolist(), noise is not None)
+    found = whole_turns(fit, (), motion, outputs, np.flatnonzero(turns).tolist(), noise is not None)
+    parts, names = (
+        turn_parts(record if noise is not None else None, means.windows),
+        [c.name for c in found.coefficients],
+    )
+    return replace(found, budgets=turn_budgets(fit, names, parts, ferraris_flaws(motion, uncertainty)))
 
 
 def faces_of(recordings: Sequence[Recording]) -> list[Station]:
@@ -132,7 +139,7 @@ def rest_means(recordings: Sequence[Recording]) -> StationMeans:
 def only(motion: Turning, which: Array) -> Turning:
     """The motion of some of the stations."""
     angles = tuple(a for a, taken in zip(motion.angles, which, strict=True) if taken)
-    fields = ("seconds", "axis_b", "angle_rad", "rate_rad_s", "earth_rad", "moments")
+    fields = ("seconds", "axis_b", "angle_rad", "rate_rad_s", "earth_rad", "moments", "earth_rate_b")
     return replace(motion, **{name: getattr(motion, name)[which] for name in fields}, angles=angles)
 
 
