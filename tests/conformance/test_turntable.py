@@ -60,7 +60,7 @@ def test_whole_turns_end_where_they_began(rig: TableRig) -> None:
         turn = Turn("outer", -2, 50.0, 1.0)
         begun = rig.clock.now_s()
         await rig.port.command_turn(turn)
-        with pytest.raises(DeviceFault, match="one demand at a time"):
+        with pytest.raises(DeviceFault, match="the table is moving"):
             await rig.port.move_to(TableAngles())
         await rig.port.settle()
         # From rest to rest the turn lasts turn.duration_s; a table that stopped short would be back sooner.
@@ -265,7 +265,7 @@ def test_an_interlock_that_opens_during_a_move_ends_it(tmp_path: Path) -> None:
         while abs(rig.rates_deg_s()[2]) < 30.0:
             await asyncio.sleep(0)
         rig.served.do(lambda bench: bench.table.open_interlock(2))
-        with pytest.raises(DeviceFault, match="interlock 3 of the turntable is open: a person looks why"):
+        with pytest.raises(DeviceFault, match="interlock 3 of the turntable is open: find out why"):
             await move
         await rig.port.make_safe()
         words = {word.name: word.raw for word in (await rig.port.read()).status}

@@ -76,7 +76,7 @@ def samples_of(recording: Recording, channel: str, directions: Sequence[float]) 
             f"station {label}: {len(encoder.time_s)} readings of the encoder where at least {LEAST_READINGS} are needed"
         )
     rates = info.nominal_scale([channel]).rates(raw[:, :1])[:, 0]
-    middles = (np.arange(len(raw)) + 0.5) / info.rate_hz
+    middles: Array = (np.arange(len(raw), dtype=np.float64) + 0.5) / info.rate_hz
     integrates = gyro.quantity is Quantity.ANGLE_INCREMENT
     return Samples(label, info.rate_hz, middles, rates, integrates, encoder)
 
