@@ -29,6 +29,7 @@ from bench_client.results.scale_factor_whole_turns import ScaleFactorWholeTurnsR
 from bench_client.results.static_run import StaticRunResult
 from bench_client.results.table_program import TableProgramResult
 from bench_client.results.temperature_dependence import TemperatureDependenceResult
+from bench_client.results.thermal_correction_of_recordings import ThermalCorrectionOfRecordingsResult
 from bench_client.results.thermal_cycle import ThermalCycleResult
 from bench_client.results.thermometer_calibration import ThermometerCalibrationResult
 from bench_client.results.verification_9_orientations import Verification9OrientationsResult
@@ -63,6 +64,7 @@ Result = (
     | RunToRunResult
     | ScalarCalibrationResult
     | TemperatureDependenceResult
+    | ThermalCorrectionOfRecordingsResult
     | OtherResult
 )
 """A result; `isinstance` or `match` says which, and then its `document` has fields of its own."""
@@ -96,6 +98,7 @@ CLASSES: dict[str, type[ResultHead]] = {
     "run_to_run": RunToRunResult,
     "scalar_calibration": ScalarCalibrationResult,
     "temperature_dependence": TemperatureDependenceResult,
+    "thermal_correction_of_recordings": ThermalCorrectionOfRecordingsResult,
 }
 
 

@@ -272,6 +272,51 @@ class TriadSummary(Part):
 Form = Literal["both", "switched", "single"]
 
 
+class ThermalShare(Part):
+    """Effect of the thermal correction on a calibration, JSON-ready."""
+
+    form: Form
+    """Form of the thermal correction"""
+    regime: str
+    """Regime assumed by the form ``switched``: "static"; empty for the other forms, which need none."""
+    case_c: tuple[float, ...]
+    """Case temperature at each station [°C]"""
+    converter_c: tuple[float, ...]
+    """Temperature of the unit's signal converter [°C]"""
+    change_m_s2: tuple[tuple[float, ...], ...]
+    """Correction added to the outputs x, y, z of each station [m/s²]"""
+    from_correction: dict[str, float]
+    """Standard uncertainty that the correction's coefficients leave in each calibration coefficient; it is part of
+    theirs.
+    """
+    from_sensors: dict[str, float]
+    """Standard uncertainty due to the temperature sensors' noise."""
+
+
+class DwellEnded(Part):
+    """Duration of one dwell under a stop rule."""
+
+    label: str
+    """Name for people"""
+    duration_s: float
+    """Duration [s]"""
+    longest_s: float
+    """Longest allowed dwell [s]"""
+    by_rule: bool
+    """True if the rule ended it; False if it ran to its longest time."""
+
+
+class DwellsSaved(Part):
+    """Time that a stop rule saved in a job."""
+
+    dwells: tuple[DwellEnded, ...]
+    """Dwells, in order"""
+    saved_s: float
+    """Sum of what the dwells were shorter than their longest time [s]"""
+    share: float
+    """Part of the longest time of all dwells together."""
+
+
 class Normalised(Part):
     """Normalised function: ``value_0·F(t)`` with F(t_0) = 1 if `relative`, else ``value_0 + F(t)`` with F(t_0) =
     0.
@@ -338,6 +383,8 @@ class WholeTurns(Part):
     """Chance of so large a statistic by noise alone"""
     noise_known: bool
     """Whether the noise is that of the unit's record"""
+    budgets: tuple[Budget, ...] = ()
+    """Uncertainty budget of each coefficient; empty in results of older versions."""
 
 
 class BandCurve(Part):
@@ -371,6 +418,38 @@ class Density(Part):
     """Ends of the interval at the requested confidence, by chi-square of each bin's degrees of freedom."""
 
 
+class AxisCorrection(Part):
+    """Thesis 4.1 of one accelerometer. α in 1/°C (α2, α4) and 1/°C², β in m/s² a °C (β1, β3) and a °C²."""
+
+    scale: float
+    """K0, m/s² a m/s² of nominal output."""
+    bias_m_s2: float
+    """Offset B0, which is *added*: minus the output at zero input, at the reference temperatures [m/s²]"""
+    alpha: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    """Temperature coefficients α1 … α4 of the scale factor (thesis 4.1)"""
+    beta: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    """Temperature coefficients β1 … β4 of the bias (thesis 4.1)"""
+    case_reference_c: float = 20.0
+    """Reading of the case (gyro) sensor at the standard calibration [°C]"""
+    converter_reference_c: float = 20.0
+    """Reading of the converter's sensor at which the correction does nothing [°C]"""
+    form: Form = "both"
+    """Form of the thermal correction"""
+    dynamic_offset: tuple[float, ...] = (0.0, 0.0)
+    """Change of K0 and B0 in the dynamic regime, for the form ``switched`` alone."""
+    covariance: tuple[tuple[float, ...], ...] = ()
+    """Covariance of α1 … α4, β1 … β4, (8, 8); rows of what the form does not use are zero. Empty: not known."""
+
+
+class TemperatureRange(Part):
+    """Between which readings of its two sensors a correction was fitted [°C]. Raises `BadParameter`."""
+
+    case_c: tuple[float, ...]
+    """Temperature of the unit's case [°C]"""
+    converter_c: tuple[float, ...]
+    """Temperature of the unit's signal converter [°C]"""
+
+
 class SensorCorrection(Part):
     """Correction of one temperature sensor about the set's reference."""
 
@@ -395,3 +474,25 @@ class ThermometerCorrection(Part):
     """Covariance of offset and slope of the first sensor, of the second, …, (2m, 2m)."""
     fitted_range_c: tuple[float, ...]
     """Lowest and highest temperature of the soaks; beyond them the lines are extrapolated [°C]"""
+
+
+class ThermalCorrection(Part):
+    """Thesis 4.1 of a triad, x, y, z."""
+
+    triad: str
+    """Triad: gyro or accelerometer"""
+    axes: tuple[AxisCorrection, ...]
+    """Correction of each axis, x, y, z"""
+    first_stage: tuple[ConverterModel, ...] | None = None
+    """The converter's models that were taken out of the outputs before the fit (`core.converter.at_reference`),
+    and so must be wherever the correction is used; None: it is for outputs as they are. The reference of the
+    whole is then these models' for the converter's own drift, and the axes' for the rest: best the same.
+    """
+    fitted_range: TemperatureRange | None = None
+    """Temperature range of the fit; beyond it the correction extrapolates. None: not known (older versions)."""
+    thermometers: ThermometerCorrection | None = None
+    """Correction of the sensors that was taken out of their readings before the fit, and so must be wherever the
+    correction is used: its temperatures are then temperatures. None: they are readings.
+    """
+    static_sensors: Literal["case", "gyros"] = "case"
+    """Sensor of the static terms: the case's for all axes, or the thermometer of each axis' own gyro (thesis 4.1)."""

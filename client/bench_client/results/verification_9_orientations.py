@@ -3,7 +3,7 @@
 from typing import Literal
 
 from bench_client.results.part import Part, ResultHead
-from bench_client.results.shared import Check, Magnitudes, Statement, Verdict
+from bench_client.results.shared import Check, DwellsSaved, Magnitudes, Statement, Verdict
 
 
 class Change(Part):
@@ -89,6 +89,8 @@ class Verification9OrientationsDocument(Part):
     """statement of conformity; None without checks and in results of older versions"""
     triads: tuple[TriadVerification, ...]
     """Triads, one entry each"""
+    dwells: DwellsSaved | None = None
+    """of a stop rule: each dwell, and the time saved"""
 
 
 class Verification9OrientationsResult(ResultHead):
