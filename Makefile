@@ -3,14 +3,15 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PORT   ?= 8000
 WORKERS ?= 2
-VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns alignment without_bench thermal thermometers dwells imports misfit access absence document acceptance
+VALIDATIONS := wires calibration multi_position diagnosis allan noise foreign_noise inspection conditioning whole_turns response alignment without_bench thermal thermometers dwells imports misfit access absence document acceptance wires_campaign
 FOREIGN := basil edie instro ixcom moto visa
+LONG_BENCHMARKS := $(addprefix tests.benchmarks.,growth lists analysis_workers)
 BENCHMARKS := tests.benchmarks $(addprefix tests.benchmarks.,wires allan static thermal thermal_cycle queue queueserver campaign listeners formats previews)
 
 COMPILE = $(BIN)/uv pip compile --quiet --python-version 3.11 --universal --generate-hashes --no-emit-index-url --no-header
 
 .DEFAULT_GOAL := help
-.PHONY: help run test browser screenshots figures clients bench bench-against profile mutants chaos soak format check validate rights references pictures newest-form lock audit images clean foreign
+.PHONY: help run test browser screenshots figures clients bench bench-long bench-against profile mutants chaos soak format check validate rights references pictures newest-form lock audit images clean foreign
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -43,11 +44,11 @@ screenshots: $(VENV)/.browser  ## take the pictures of the pages in docs/picture
 figures: $(VENV)/.browser  ## measure the pages in Chromium: stop, first paint, live charts over MINUTES (20), the feed
 	@$(BIN)/python -m tests.browser.figures --minutes $(or $(MINUTES),20)
 
-chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books; press stop while something is in its way
-	@kept=0; $(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both || kept=1; $(BIN)/python -m tests.chaos.stop_matrix --runs 5 || kept=1; exit $$kept
+chaos: $(VENV)/.ready  ## kill the service's processes 200 times over a campaign, on SQLite and on Postgres, and check the books; press stop while something is in its way; WIRES=1: faults and kills on a bench of drivers instead
+	@$(if $(WIRES),$(BIN)/python -m tests.soak.wires --minutes $(or $(MINUTES),15) --kill-s 90 || exit 1; exec $(BIN)/python -m tests.chaos.kills_over_wires; )kept=0; $(BIN)/python -m tests.chaos --kills 200 --seed 1 --database both || kept=1; $(BIN)/python -m tests.chaos.stop_matrix --runs 5 || kept=1; exit $$kept
 
-soak: $(VENV)/.ready  ## mixed load for MINUTES (60): memory, descriptors, threads and logs must stay level
-	@$(BIN)/python -m tests.soak --minutes $(or $(MINUTES),60)
+soak: $(VENV)/.ready  ## mixed load for MINUTES (60): memory, descriptors, threads and logs must stay level; WIRES=1: drivers at served simulators, with a fault a minute
+	@$(BIN)/python -m tests.soak$(if $(WIRES),.wires) --minutes $(or $(MINUTES),60)
 
 format: $(VENV)/.ready  ## format the code, put imports in order, mend what ruff can mend safely
 	@$(BIN)/ruff check --fix-only --quiet . ; $(BIN)/ruff format --quiet .
@@ -61,6 +62,9 @@ validate: $(VENV)/.ready  ## Monte Carlo against theory over 1000 simulated unit
 
 bench: $(VENV)/.ready  ## budgets, measured and printed beside their limits
 	@kept=0; for part in $(BENCHMARKS); do $(BIN)/python -m $$part || kept=1; done; exit $$kept
+
+bench-long: $(VENV)/.ready  ## growth of cost with size, lists over 10^5 jobs and 10^6 recordings, workers of analyses; an hour
+	@kept=0; for part in $(LONG_BENCHMARKS); do echo "== $$part"; $(BIN)/python -m $$part || kept=1; done; exit $$kept
 
 bench-against: $(VENV)/.ready  ## this checkout beside revision REV (e36ea0a), built beside it, in turns; ONLY=static,allan ROUNDS=5
 	@$(BIN)/python -m tests.benchmarks.against --rev $(or $(REV),e36ea0a) --rounds $(or $(ROUNDS),5) $(if $(ONLY),--only $(ONLY))

@@ -58,8 +58,8 @@ class FitParameters(JudgedParameters):
     terms: tuple[Kind, ...] = Field(
         (),
         max_length=3,
-        description="beside b and K: quadratic K2·v² and asymmetry KA·|v| of the accelerometers, g_sensitivity of the "
-        "gyros; each must be determined by the positions",
+        description="in addition to b and K: quadratic K2·v² and asymmetry KA·|v| of the accelerometers, "
+        "g_sensitivity of the gyros; each must be determined by the positions",
     )
     scalar_check: bool = Field(False, description="cross-check of the accelerometers with the magnitude alone")
     residual_p_value_min: float = Field(0.001, ge=0.0, le=1.0, description="least p-value of the residuals' chi-square")

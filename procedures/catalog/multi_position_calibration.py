@@ -33,7 +33,10 @@ class Params(FitParameters, TableParameters, DwellParameters):
     """Positions, dwell, site and fit; None takes the unit's or the bench's value, or the thesis's positions."""
 
     positions: tuple[tuple[Angle, Angle, Angle], ...] | None = Field(
-        None, min_length=1, max_length=500, description="(outer, middle, inner) [deg], in order; not beside `program`"
+        None,
+        min_length=1,
+        max_length=500,
+        description="(outer, middle, inner) [deg], in order; not together with `program`",
     )
     program: str | None = Field(
         None,

@@ -149,7 +149,7 @@ async def acquire(bench: Bench, stations: Sequence[Station]) -> AsyncIterator[St
 
 
 def analyse(recordings: Sequence[Recording], params: Params, context: Context) -> Result:
-    """Magnitudes of the corrected station means of both triads."""
+    """Compare the magnitudes of the corrected station means of both triads with gravity and the Earth's rate."""
     params = resolve(params, context)
     site = params.site(context)
     used = context.unit.thermal_correction if params.thermal_correction == "current" else None

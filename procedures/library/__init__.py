@@ -2,6 +2,7 @@
 
 ======================================  ==================================================================
 ``allan(y, rate_hz)``                   Allan, modified Allan, time or Hadamard deviation with intervals
+``allan_family(y, rate_hz)``            all of them in one pass
 ``noise(y, rate_hz)``                   noise coefficients Q, N, B, K, R of a record at rest, three methods
 ``split(y, rate_hz)``                   wavelet split of a record into slow and fast parts
 ``calibrate(outputs, vectors, sd)``     bias and matrix K of a triad from known vectors
@@ -22,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from procedures.core.errors import BadParameter, DomainError, Undetermined, UnfitRecording
     from procedures.library.columns import Columns, load
-    from procedures.library.deviations import Curve, allan
+    from procedures.library.deviations import Curve, allan, allan_family
     from procedures.library.record_noise import Noise, noise
     from procedures.library.temperature import Polynomial, thermal
     from procedures.library.triads import Calibration, calibrate, scalar
@@ -33,7 +34,7 @@ __version__ = "0.1.0"
 
 _ROOMS = {
     "core.errors": ("BadParameter", "DomainError", "Undetermined", "UnfitRecording"),
-    "library.deviations": ("Curve", "allan"),
+    "library.deviations": ("Curve", "allan", "allan_family"),
     "library.triads": ("Calibration", "calibrate", "scalar"),
     "library.columns": ("Columns", "load"),
     "library.record_noise": ("Noise", "noise"),
@@ -54,6 +55,7 @@ __all__ = [
     "Undetermined",
     "UnfitRecording",
     "allan",
+    "allan_family",
     "calibrate",
     "load",
     "noise",

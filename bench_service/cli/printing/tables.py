@@ -89,7 +89,7 @@ def calibration_table(calibrations: list[dict[str, Any]]) -> Table:
     """Table of calibrations: their origin, which one counts and by whose choice, and how long."""
     table = Table()
     for column in ("calibration", "triad", "made", "method", "verdict", "current", "approval", "valid until"):
-        table.add_column(column, overflow="fold")
+        table.add_column(column, overflow="fold", no_wrap=column == "calibration")
     for one in calibrations:
         chosen = ("by rule" if one["by_rule"] else "chosen") if one["current"] else ""
         origin = f"{one['method']}: {one['origin']}" if one["origin"] else one["method"]

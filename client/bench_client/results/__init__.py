@@ -5,6 +5,7 @@ from typing import Any
 from bench_client.results.allan_deviation import AllanDeviationResult
 from bench_client.results.calibration_12_orientations import Calibration12OrientationsResult
 from bench_client.results.converter_bench import ConverterBenchResult
+from bench_client.results.dynamic_response import DynamicResponseResult
 from bench_client.results.entered_thermal_correction import EnteredThermalCorrectionResult
 from bench_client.results.error_growth import ErrorGrowthResult
 from bench_client.results.ferraris_calibration import FerrarisCalibrationResult
@@ -37,6 +38,7 @@ from bench_client.results.verification_9_orientations import Verification9Orient
 Result = (
     Calibration12OrientationsResult
     | ConverterBenchResult
+    | DynamicResponseResult
     | FerrarisCalibrationResult
     | InitialAlignmentResult
     | MultiPositionCalibrationResult
@@ -71,6 +73,7 @@ Result = (
 CLASSES: dict[str, type[ResultHead]] = {
     "calibration_12_orientations": Calibration12OrientationsResult,
     "converter_bench": ConverterBenchResult,
+    "dynamic_response": DynamicResponseResult,
     "ferraris_calibration": FerrarisCalibrationResult,
     "initial_alignment": InitialAlignmentResult,
     "multi_position_calibration": MultiPositionCalibrationResult,

@@ -18,6 +18,7 @@ class AxisResult(Part):
     static_sd_m_s2: float | None
     """Root mean square of the residuals while the temperature stands; None where it never does [m/s²]"""
     dynamic_sd_m_s2: float | None
+    """Standard deviation of the residuals in the dynamic regime [m/s²]"""
     condition: float
     """Condition number of the column-scaled design"""
     bic: tuple[float, ...]

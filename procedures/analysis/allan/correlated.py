@@ -6,7 +6,7 @@ alone dominates 8.64 million samples, and next to nothing elsewhere. A modified 
 cluster: there a start a block is as good as all, and exact at these.
 """
 
-from functools import partial
+from functools import cached_property, partial
 from math import comb
 
 import numpy as np
@@ -49,38 +49,58 @@ def snapped(sizes: Sizes, statistic: Statistic, count: int) -> tuple[Sizes, Size
     return found, spacing[first]
 
 
-class CorrelatedSums:
-    """Sums of an overlapping member for many cluster sizes, from samples less a constant; no gaps."""
+class SharedProducts:
+    """Parts that the sums of every overlapping member are made from, accumulated once: products, blocks, both ends."""
 
-    def __init__(self, statistic: Statistic, count: int, sizes: Sizes) -> None:
-        self._statistic, self._count = statistic, count
-        self.sizes, self.strides = snapped(sizes, statistic, count)
-        self._near = self.sizes[self.strides == 1]
-        self._blocks = BlockMeans(count)
-        self._reach = statistic.differences * NEAR * self._blocks.size
-        self._lagged = LaggedProducts(self._reach, remainder_kernel(self._blocks.size))
-        self._head, self._tail = np.empty(self._reach), np.empty(max(TAIL, self._reach))
+    def __init__(self, count: int, differences: int) -> None:
+        """`differences`: of the member that takes most of them."""
+        self._count = count
+        self.blocks = BlockMeans(count)
+        reach = differences * NEAR * self.blocks.size
+        self.lagged = LaggedProducts(reach, remainder_kernel(self.blocks.size))
+        self.head, self.tail = np.empty(reach), np.empty(max(TAIL, reach))
         self._index = 0
 
     def add(self, y: Array) -> None:
-        """Add the next samples, (n,)."""
+        """Add the next samples, (n,), less a constant; no gaps."""
         end = self._index + len(y)
-        if self._index < len(self._head):
-            taken = y[: len(self._head) - self._index]
-            self._head[self._index : self._index + len(taken)] = taken
-        late = end - (self._count - len(self._tail))
+        if self._index < len(self.head):
+            taken = y[: len(self.head) - self._index]
+            self.head[self._index : self._index + len(taken)] = taken
+        late = end - (self._count - len(self.tail))
         if late > 0:
             taken = y[max(0, len(y) - late) :]
-            self._tail[late - len(taken) : late] = taken
+            self.tail[late - len(taken) : late] = taken
         self._index = end
-        self._blocks.add(y)
-        self._lagged.add(y)
+        self.blocks.add(y)
+        self.lagged.add(y)
+
+    @cached_property
+    def products(self) -> Array:
+        """Lagged products, (reach,), after the last sample."""
+        return self.lagged.finish()
+
+
+class CorrelatedSums:
+    """Sums of an overlapping member for many cluster sizes, from samples less a constant; no gaps."""
+
+    def __init__(self, statistic: Statistic, count: int, sizes: Sizes, shared: SharedProducts | None = None) -> None:
+        """`shared`: of several members, which are then fed through it, once."""
+        self._statistic, self._count = statistic, count
+        self.sizes, self.strides = snapped(sizes, statistic, count)
+        self._near = self.sizes[self.strides == 1]
+        self._shared = SharedProducts(count, statistic.differences) if shared is None else shared
+        self._blocks, self._lagged = self._shared.blocks, self._shared.lagged
+
+    def add(self, y: Array) -> None:
+        """Add the next samples, (n,)."""
+        self._shared.add(y)
 
     def finish(self) -> tuple[Array, NDArray[np.int64]]:
         """Sums and numbers of terms at `sizes`, (k,) each, after the last sample. Raises `Uncorrelatable`."""
-        products = self._lagged.finish()
+        products = self._shared.products
         near = padded_sums(products, self._statistic, self._near)
-        near -= edge_sums(self._head, self._tail, self._near, self._span, self._squares)
+        near -= edge_sums(self._shared.head, self._shared.tail, self._near, self._span, self._squares)
         spans = self._statistic.differences * self._near
         if len(near) and worst_rounding(near, spans, float(products[0])) > ROUNDING:
             raise Uncorrelatable("the rate drifts too far for the fast sums; ask for correlate=False")
@@ -96,7 +116,7 @@ class CorrelatedSums:
 
     def held(self) -> Held:
         """The points of the running sum that the noise identification needs."""
-        return Held(self._blocks.begins, self._blocks.size, np.cumsum(self._tail))
+        return Held(self._blocks.begins, self._blocks.size, np.cumsum(self._shared.tail))
 
     def _span(self, m: int) -> int:
         return self._statistic.differences * m - self._statistic.modified

@@ -16,6 +16,8 @@ from procedures.analysis.allan.statistic import OVERLAPPING_ALLAN, Sizes, Statis
 from procedures.core.arrays import Array
 from procedures.core.errors import UnfitRecording
 
+Sums = CorrelatedSums | OverlappingSums | NonOverlappingSums
+
 
 @dataclass(frozen=True)
 class Deviation:
@@ -69,7 +71,7 @@ class DeviationStream:
         wanted = checked_sizes(sizes, count, statistic)
         interval(np.ones(1), np.ones(1), confidence)
         self._integral = Integral(rate_hz, increments=increments, gaps=gaps)
-        self._sums: CorrelatedSums | OverlappingSums | NonOverlappingSums
+        self._sums: Sums
         if not statistic.overlapping:
             self._sums = NonOverlappingSums(statistic, count, wanted)
         elif count <= WHOLE or gaps != "refuse" or not correlate:
@@ -91,46 +93,48 @@ class DeviationStream:
     def finish(self) -> Deviation:
         """The deviation, after the last sample; cluster sizes without a single term (gaps) do not appear."""
         self._integral.check_end(self._count)
-        sums, terms = self._sums.finish()
-        if isinstance(self._sums, CorrelatedSums):
-            sums *= self._integral.scale**2
-        all_starts = self._sums.starts()
-        there = terms > 0
-        if not np.any(there):
-            raise UnfitRecording(
-                f"no cluster is whole: {self._integral.missing} of {self._count} samples are missing, the first at "
-                f"{self._integral.first_missing}"
-            )
-        sizes, terms, starts = self._sums.sizes[there], terms[there], all_starts[there]
-        variance = self._statistic.variance(sums[there], terms.astype(np.float64), sizes, self._rate_hz)
-        deviation = np.sqrt(variance)
-        alpha = exponents(self._sums.held(), sizes, self._statistic.order)
-        edf = np.array(
-            [
-                degrees_of_freedom(self._statistic, int(a), int(m), self._count)
-                for a, m in zip(alpha, sizes, strict=True)
-            ]
+        return from_sums(self._statistic, self._rate_hz, self._count, self._sums, self._integral, self._confidence)
+
+
+def from_sums(
+    statistic: Statistic, rate_hz: float, count: int, of: Sums, integral: Integral, confidence: float
+) -> Deviation:
+    """The deviation from sums that all samples, and their `integral`, have gone through."""
+    sums, terms = of.finish()
+    if isinstance(of, CorrelatedSums):
+        sums = sums * integral.scale**2
+    all_starts = of.starts()
+    there = terms > 0
+    if not np.any(there):
+        raise UnfitRecording(
+            f"no cluster is whole: {integral.missing} of {count} samples are missing, the first at "
+            f"{integral.first_missing}"
         )
-        edf *= terms / starts
-        lower, upper = interval(deviation, edf, self._confidence)
-        return Deviation(
-            statistic=self._statistic,
-            rate_hz=self._rate_hz,
-            count=self._count,
-            sizes=sizes,
-            tau_s=sizes / self._rate_hz,
-            deviation=deviation,
-            terms=terms,
-            left_out=starts - terms,
-            strides=self._sums.strides[there],
-            alpha=alpha,
-            edf=edf,
-            lower=lower,
-            upper=upper,
-            confidence=self._confidence,
-            missing=self._integral.missing,
-            first_missing=self._integral.first_missing,
-        )
+    sizes, terms, starts = of.sizes[there], terms[there], all_starts[there]
+    variance = statistic.variance(sums[there], terms.astype(np.float64), sizes, rate_hz)
+    alpha = exponents(of.held(), sizes, statistic.order)
+    kinds = zip(alpha, sizes, strict=True)
+    edf = np.array([degrees_of_freedom(statistic, int(a), int(m), count) for a, m in kinds]) * terms / starts
+    deviation = np.sqrt(variance)
+    lower, upper = interval(deviation, edf, confidence)
+    return Deviation(
+        statistic=statistic,
+        rate_hz=rate_hz,
+        count=count,
+        sizes=sizes,
+        tau_s=sizes / rate_hz,
+        deviation=deviation,
+        terms=terms,
+        left_out=starts - terms,
+        strides=of.strides[there],
+        alpha=alpha,
+        edf=edf,
+        lower=lower,
+        upper=upper,
+        confidence=confidence,
+        missing=integral.missing,
+        first_missing=integral.first_missing,
+    )
 
 
 def deviation(

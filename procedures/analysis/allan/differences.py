@@ -11,6 +11,8 @@ from procedures.core.arrays import Array
 BLOCK = 1 << 15
 """Terms per step; their memory fits into the cache."""
 
+TOGETHER = 1 << 12
+"""Points of a size that are differenced at once: a call costs as much as some thousands of them."""
 _UNTHREADED = 1 << 13
 """Longest product of one thread; OpenBLAS runs longer ones in threads, a thousandfold cost on a busy machine."""
 
@@ -74,7 +76,7 @@ def sum_of_smoothed_squares(x: Array, missing: Counts | None, m: int, reach: int
 
 
 class NonOverlappingSums:
-    """Sums of a non-overlapping member, exact at every size; memory for a few points a size."""
+    """Sums of a non-overlapping member, exact at every size; memory for `TOGETHER` points a size at most."""
 
     def __init__(self, statistic: Statistic, count: int, sizes: Sizes) -> None:
         self._statistic, self._count, self.sizes = statistic, count, sizes
@@ -82,31 +84,45 @@ class NonOverlappingSums:
         self._sums, self._terms = np.zeros(len(sizes)), np.zeros(len(sizes), np.int64)
         self._index = 1
         self._late = LatePoints(count)
-        self._last = [np.zeros(1) for _ in sizes]
-        self._last_gaps = [np.zeros(1, np.int64) for _ in sizes]
+        self._points = [[np.zeros(1)] for _ in sizes]
+        self._gaps: list[list[Counts]] = [[] for _ in sizes]
+        """Missing samples before the last of the points; nothing while there were none."""
+        self._held = [1] * len(sizes)
+        """Number of points of each size that wait for their differences."""
 
     def add(self, piece: Piece) -> None:
         """Add the next piece of the running sum."""
         self._late.add(piece)
-        p = self._statistic.differences
-        for i, size in enumerate(self.sizes):
-            first = -self._index % int(size)
-            points = np.concatenate([self._last[i], piece.x[first :: int(size)]])
-            gaps = None
+        for i, size in enumerate(self.sizes.tolist()):
+            points = piece.x[-self._index % size :: size]
+            if not len(points):
+                continue
+            self._held[i] += len(points)
+            whole = self._held[i] >= TOGETHER
+            self._points[i].append(points if whole else points.copy())
             if piece.missing is not None:
-                gaps = np.concatenate([self._last_gaps[i], piece.missing[first :: int(size)]])
-                self._last_gaps[i] = gaps[-p:]
-            if len(points) > p:
-                total, terms = sum_of_squares(points, gaps, 1, p, len(points) - p)
-                self._sums[i] += total
-                self._terms[i] += terms
-            self._last[i] = points[-p:]
-            if gaps is None:
-                self._last_gaps[i] = np.zeros(len(self._last[i]), np.int64)
+                self._gaps[i].append(piece.missing[-self._index % size :: size].copy())
+            if whole:
+                self._difference(i)
         self._index += len(piece.x)
+
+    def _difference(self, i: int) -> None:
+        points, p = np.concatenate(self._points[i]), self._statistic.differences
+        gaps = np.concatenate(self._gaps[i]) if self._gaps[i] else None
+        if gaps is not None:
+            gaps = np.concatenate([np.zeros(len(points) - len(gaps), np.int64), gaps])  # none before the first
+            self._gaps[i] = [gaps[-p:]]
+        if len(points) > p:
+            total, terms = sum_of_squares(points, gaps, 1, p, len(points) - p)
+            self._sums[i] += total
+            self._terms[i] += terms
+        self._points[i] = [points[-p:]]
+        self._held[i] = len(self._points[i][0])
 
     def finish(self) -> tuple[Array, NDArray[np.int64]]:
         """Sums and numbers of terms at `sizes`, (k,) each, after the last piece."""
+        for i in range(len(self.sizes)):
+            self._difference(i)
         return self._sums, self._terms
 
     def held(self) -> Held:

@@ -61,6 +61,12 @@ class Integral:
             self.count += len(y)
             yield rates
 
+    def rates_and_sums(self, block: Array | NDArray[np.int32]) -> Iterator[tuple[Array, Piece]]:
+        """Yield what `rates` and `add` give of a block, piece by piece; only where gaps are refused."""
+        for y in self._pieces(block):
+            rates, bad = self._checked(y)
+            yield rates, self._summed(rates.copy(), bad)
+
     @staticmethod
     def _pieces(block: Array | NDArray[np.int32]) -> Iterator[Array]:
         if block.ndim != 1:
@@ -93,7 +99,9 @@ class Integral:
         return rates, bad
 
     def _piece(self, y: Array) -> Piece:
-        x, bad = self._checked(y)
+        return self._summed(*self._checked(y))
+
+    def _summed(self, x: Array, bad: NDArray[np.bool_] | None) -> Piece:
         x[0] += self._last / self.scale
         np.cumsum(x, out=x)
         x *= self.scale
@@ -103,8 +111,8 @@ class Integral:
             missing = self.missing + np.cumsum(bad)
             self.missing = int(missing[-1])
         elif self.missing:
-            missing = np.full(len(y), self.missing)
-        self.count += len(y)
+            missing = np.full(len(x), self.missing)
+        self.count += len(x)
         return Piece(x, missing)
 
     def _without(self, y: Array, bad: NDArray[np.bool_]) -> Array:

@@ -17,7 +17,7 @@ from procedures.analysis.allan.statistic import Sizes, Statistic
 from procedures.core.arrays import Array
 
 SPAN = 16
-"""Ratio of a transform's length to the longest lag; large, so that little is spent on padding."""
+"""Ratio of a transform's length to the longest lag, made a power of two; large, so that little is spent on padding."""
 TOGETHER = 4
 """Fewest windows that are transformed at once: the rows share the processor's wide registers."""
 
@@ -31,7 +31,7 @@ class LaggedProducts:
 
     def __init__(self, reach: int, kernel: Array) -> None:
         """`kernel` κ(l), (≤ reach,): see `energy`."""
-        self._reach, self._length = reach, SPAN * reach
+        self._reach, self._length = reach, 1 << (SPAN * reach).bit_length() - 1
         self._window = self._length - reach
         self._rest = np.empty(0)
         self._power, self._seams = np.zeros(self._length + 2), np.zeros(2 * reach + 2)

@@ -176,7 +176,7 @@ def brought_by_unit(
 
 
 def suspected(found: Sequence[tuple[TriadSummary, TriadFit]]) -> tuple[TriadSummary, ...]:
-    """The summaries of triads at the same stations, each with the flaw that its residuals look like beside the others'.
+    """The summaries of triads at the same stations, each with the flaw that its residuals and the others' point to.
 
     A flaw of the table that one triad's residuals look like is not named where another triad's contradict it.
     """

@@ -40,15 +40,17 @@ END_REST_S = 2.0
 """Rest at the end of a recording of turns [s]."""
 
 
-def face_stations(rest_s: float, turns: int, rate_deg_s: float, ramp_s: float, settle_s: float) -> tuple[Station, ...]:
-    """Each face in turn: at rest, then whole turns there and back, each recording ending at rest for `END_REST_S`."""
+def face_stations(
+    rest_s: float, turns: int, rate_deg_s: float, ramp_s: float, settle_s: float, end_rest_s: float = END_REST_S
+) -> tuple[Station, ...]:
+    """Each face in turn: at rest, then whole turns there and back, each recording ending at rest for `end_rest_s`."""
     made: list[Station] = []
     for face, angles in FACES.items():
         made.append(Station(len(made), f"{face} at rest", angles, None, settle_s, rest_s))
         for sign in (1, -1):
             turn = Turn("outer", sign * turns, rate_deg_s, ramp_s)
             label = f"{face} {sign * rate_deg_s:+g} deg/s, {turn.turns:+d} turns"
-            made.append(Station(len(made), label, angles, None, settle_s, turn.duration_s + END_REST_S, turn=turn))
+            made.append(Station(len(made), label, angles, None, settle_s, turn.duration_s + end_rest_s, turn=turn))
     return tuple(made)
 
 
