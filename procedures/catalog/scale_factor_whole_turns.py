@@ -211,12 +211,9 @@ def _program(params: Params) -> TurnProgram:
 
 def _plan(params: Params, context: Context) -> TurnPlan:
     site = _site(params, context)
-    uncertainty = TableUncertainty(
-        params.orthogonality_sd_arcsec or 0.0,
-        params.pointing_sd_arcsec or 0.0,
-        context.bench.accuracy.level_sd_arcsec,
-        site.azimuth_sd_arcsec,
-    )
+    right, pointing = params.orthogonality_sd_arcsec or 0.0, params.pointing_sd_arcsec or 0.0
+    level, azimuth = context.bench.accuracy.level_sd_arcsec, site.azimuth_sd_arcsec
+    uncertainty = TableUncertainty(right, pointing, level, azimuth)
     reference = params.reference_rate_deg_s or max(params.rates_deg_s)
     return TurnPlan(
         _program(params),
